@@ -1,0 +1,1 @@
+//! The two-inertia axis: parameters, state and the Newmark step.

@@ -1,0 +1,15 @@
+//! `eixo diagnose`.
+
+use std::process::ExitCode;
+
+/// Arguments of `eixo diagnose`.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the command could not run.
+pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
+    anyhow::bail!("not built yet")
+}

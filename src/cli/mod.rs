@@ -1,0 +1,83 @@
+//! The command line: arguments, and one file a command.
+//!
+//! Exit codes: 0 fine, 1 findings, 2 could not run.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Could not run: bad input, unreadable file, unwritable output.
+pub const COULD_NOT_RUN: u8 = 2;
+/// The command ran and has findings to report.
+pub const FINDINGS: u8 = 1;
+
+/// The drive axis of a machine tool: FMU, identification, and diagnosis of the gap between model and machine.
+#[derive(Debug, Parser)]
+#[command(name = "eixo", version, about, propagate_version = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+macro_rules! commands {
+    ($($(#[$doc:meta])* $name:ident => $module:ident),* $(,)?) => {
+        $(mod $module;)*
+
+        /// The commands, one file each.
+        #[derive(Debug, Subcommand)]
+        pub enum Command {
+            $($(#[$doc])* $name($module::Args),)*
+        }
+
+        impl Command {
+            fn run(self) -> anyhow::Result<ExitCode> {
+                match self {
+                    $(Self::$name(args) => $module::run(args),)*
+                }
+            }
+        }
+    };
+}
+
+commands! {
+    /// Run the main job on bundled data, start to finish, ending in an HTML report
+    Demo => demo,
+    /// Make an excitation: Schroeder, random-phase or odd multisine
+    Excite => excite,
+    /// Export the axis as an FMI 2.0 co-simulation FMU
+    Export => export,
+    /// Drive an FMU, or the axis of an axis.toml, with an input trace and record the outputs
+    Simulate => simulate,
+    /// Validate any FMI 2.0 FMU, by what its XML says and by what its binary does
+    Validate => validate,
+    /// List platforms, capabilities, variables and units of any FMU
+    Info => info,
+    /// Identify the axis from a trace
+    Identify => identify,
+    /// Diagnose the gap between the model and a measured trace: where, which effect, how far it shrinks
+    Diagnose => diagnose,
+}
+
+/// Parses the arguments, runs the command, prints an error with its causes, and gives the exit code.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match cli.command.run() {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(COULD_NOT_RUN)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_argument_parser_is_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

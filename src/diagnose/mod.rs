@@ -1,0 +1,1 @@
+//! The gap between model and machine: where, which, how far.

@@ -1,0 +1,1 @@
+//! The unmodelled effects: one ordered, append-only list.

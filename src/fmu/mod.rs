@@ -1,0 +1,1 @@
+//! FMU archives from the outside: packaging, import host, validation rules, simulation.

@@ -1,0 +1,1 @@
+//! Identification: regressors, estimators, modal parameters, excitation estimate.

@@ -1,0 +1,24 @@
+//! `eixo`: the drive axis of a machine tool as an FMI 2.0 co-simulation FMU, its identification from logged traces,
+//! and the diagnosis of the gap between the model and the machine.
+//!
+//! Imports run downward only: `cli -> report -> diagnose -> identify -> trace -> axis -> effects`,
+//! `cli -> fmu -> variables -> axis` and `fmi2 -> variables`.
+
+pub mod axis;
+pub mod effects;
+pub mod fmi2;
+pub mod scalar;
+pub mod variables;
+
+#[cfg(feature = "cli")]
+pub mod cli;
+#[cfg(feature = "cli")]
+pub mod diagnose;
+#[cfg(feature = "cli")]
+pub mod fmu;
+#[cfg(feature = "cli")]
+pub mod identify;
+#[cfg(feature = "cli")]
+pub mod report;
+#[cfg(feature = "cli")]
+pub mod trace;

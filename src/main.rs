@@ -1,0 +1,7 @@
+//! The command line: see [`eixo::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    eixo::cli::main()
+}

@@ -1,0 +1,1 @@
+//! A report as data; SVG and HTML made from it.

@@ -1,0 +1,1 @@
+//! THE variable table of the FMU: nothing lists variables twice.
