@@ -1,0 +1,658 @@
+//! `modelDescription.xml` of FMI 2.0 as types (FMI 2.0.4, section 2.2), each with its line and column.
+//!
+//! Reading is tolerant: a value that cannot be understood falls back to its default, so that the rules can go on and
+//! report it (see `rules::schema`, which checks every attribute). [`Description::parse`] fails only on a document that
+//! is not well-formed or whose root is not an FMI 2.0 model description.
+
+use std::str::FromStr;
+
+use super::xml::{Document, Element, Position, XmlError};
+
+/// Why no description could be read.
+#[derive(Debug, thiserror::Error)]
+pub enum DescriptionError {
+    /// Not well-formed.
+    #[error("modelDescription.xml:{0}")]
+    Xml(#[from] XmlError),
+    /// Some other document, or another version of FMI.
+    #[error("modelDescription.xml: {0}")]
+    NotFmi2(String),
+}
+
+/// A closed set of words of the standard.
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name { $($(#[$vdoc])* $variant),* }
+
+        impl $name {
+            /// Every value.
+            pub const ALL: &[Self] = &[$(Self::$variant),*];
+
+            /// The word as the XML spells it.
+            #[must_use]
+            pub fn word(self) -> &'static str {
+                match self { $(Self::$variant => $text),* }
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = ();
+            fn from_str(text: &str) -> Result<Self, ()> {
+                match text { $($text => Ok(Self::$variant),)* _ => Err(()) }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.word())
+            }
+        }
+    };
+}
+
+words! {
+    /// What a variable is to its environment.
+    Causality {
+        /// Constant during the simulation, set by the environment before it.
+        Parameter = "parameter",
+        /// Computed from parameters.
+        CalculatedParameter = "calculatedParameter",
+        /// Set by the environment.
+        Input = "input",
+        /// Read by the environment.
+        Output = "output",
+        /// Neither.
+        Local = "local",
+        /// The independent variable, usually time.
+        Independent = "independent",
+    }
+}
+
+words! {
+    /// When a variable may change.
+    Variability {
+        /// Never.
+        Constant = "constant",
+        /// Not after initialisation.
+        Fixed = "fixed",
+        /// Between communication points, set by the environment.
+        Tunable = "tunable",
+        /// At events only.
+        Discrete = "discrete",
+        /// At any time.
+        Continuous = "continuous",
+    }
+}
+
+words! {
+    /// How a variable is initialised.
+    Initial {
+        /// From its start value.
+        Exact = "exact",
+        /// Iterated from its start value.
+        Approx = "approx",
+        /// Computed.
+        Calculated = "calculated",
+    }
+}
+
+words! {
+    /// The five types of variables.
+    BaseType {
+        /// `fmi2Real`.
+        Real = "Real",
+        /// `fmi2Integer`.
+        Integer = "Integer",
+        /// `fmi2Boolean`.
+        Boolean = "Boolean",
+        /// `fmi2String`.
+        String = "String",
+        /// An integer with named values.
+        Enumeration = "Enumeration",
+    }
+}
+
+words! {
+    /// How an unknown depends on a known.
+    DependencyKind {
+        /// In no known way.
+        Dependent = "dependent",
+        /// Linear with a constant factor.
+        Constant = "constant",
+        /// Linear with a fixed factor.
+        Fixed = "fixed",
+        /// Linear with a tunable factor.
+        Tunable = "tunable",
+        /// Linear with a discrete factor.
+        Discrete = "discrete",
+    }
+}
+
+/// A start value.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// Of a Real.
+    Real(f64),
+    /// Of an Integer or an Enumeration.
+    Integer(i32),
+    /// Of a Boolean.
+    Boolean(bool),
+    /// Of a String.
+    String(String),
+}
+
+/// The `ModelExchange` or `CoSimulation` element.
+#[derive(Debug, Clone)]
+pub struct Interface {
+    /// Prefix of the platform binary's file name.
+    pub model_identifier: String,
+    /// Needs a tool outside the FMU to run.
+    pub needs_execution_tool: bool,
+    /// `fmi2DoStep` with any step size.
+    pub can_handle_variable_step_size: bool,
+    /// Inputs interpolate through `fmi2SetRealInputDerivatives`.
+    pub can_interpolate_inputs: bool,
+    /// Order of the derivatives from `fmi2GetRealOutputDerivatives`; 0 is none.
+    pub max_output_derivative_order: u32,
+    /// `fmi2DoStep` may return `fmi2Pending`.
+    pub can_run_asynchronuously: bool,
+    /// One instance a process.
+    pub only_once: bool,
+    /// The FMU does not use the memory callbacks.
+    pub no_memory_callbacks: bool,
+    /// `fmi2GetFMUstate` and friends work.
+    pub can_get_and_set_state: bool,
+    /// `fmi2SerializeFMUstate` and friends work.
+    pub can_serialize_state: bool,
+    /// `fmi2GetDirectionalDerivative` works.
+    pub provides_directional_derivative: bool,
+    /// Names of source files, for FMUs with sources.
+    pub source_files: Vec<(String, Position)>,
+    /// Where.
+    pub position: Position,
+}
+
+/// The exponents of a unit in SI base units, with its factor and offset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaseUnit {
+    /// Exponents of kg, m, s, A, K, mol, cd, rad.
+    pub exponents: [i32; 8],
+    /// Value in base units is `factor*value + offset`.
+    pub factor: f64,
+    /// See `factor`.
+    pub offset: f64,
+}
+
+/// SI base units in the order of [`BaseUnit::exponents`].
+pub const SI_BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+/// A display unit of a unit.
+#[derive(Debug, Clone)]
+pub struct DisplayUnit {
+    /// Name.
+    pub name: String,
+    /// Displayed value is `factor*value + offset`.
+    pub factor: f64,
+    /// See `factor`.
+    pub offset: f64,
+    /// Where.
+    pub position: Position,
+}
+
+/// A unit definition.
+#[derive(Debug, Clone)]
+pub struct Unit {
+    /// Name.
+    pub name: String,
+    /// In SI base units, where given.
+    pub base: Option<BaseUnit>,
+    /// Display units.
+    pub display: Vec<DisplayUnit>,
+    /// Where.
+    pub position: Position,
+}
+
+/// The attributes that a variable's type element and a type definition share.
+#[derive(Debug, Clone)]
+pub struct TypeAttributes {
+    /// Which type.
+    pub base: BaseType,
+    /// Physical quantity.
+    pub quantity: Option<String>,
+    /// Unit name.
+    pub unit: Option<String>,
+    /// Display unit name.
+    pub display_unit: Option<String>,
+    /// The offset of a display unit is ignored.
+    pub relative_quantity: bool,
+    /// Smallest allowed value.
+    pub min: Option<f64>,
+    /// Largest allowed value.
+    pub max: Option<f64>,
+    /// Typical magnitude.
+    pub nominal: Option<f64>,
+    /// Values of an enumeration: name and value.
+    pub items: Vec<(String, i32, Position)>,
+    /// Where.
+    pub position: Position,
+}
+
+/// A type definition.
+#[derive(Debug, Clone)]
+pub struct SimpleType {
+    /// Name.
+    pub name: String,
+    /// What it fixes.
+    pub attributes: TypeAttributes,
+    /// Where.
+    pub position: Position,
+}
+
+/// A scalar variable.
+#[derive(Debug, Clone)]
+pub struct Variable {
+    /// Unique name.
+    pub name: String,
+    /// Handle of the value; the same for all aliases.
+    pub value_reference: u32,
+    /// Description.
+    pub description: Option<String>,
+    /// Causality, `local` when not given.
+    pub causality: Causality,
+    /// Variability, `continuous` when not given.
+    pub variability: Variability,
+    /// Initial as declared; see [`Variable::initial`].
+    pub declared_initial: Option<Initial>,
+    /// May be set several times at one time instant (model exchange).
+    pub can_handle_multiple_set: Option<bool>,
+    /// The type element's attributes; of the type element alone, see [`Description::resolved`].
+    pub attributes: TypeAttributes,
+    /// Name of the type definition.
+    pub declared_type: Option<String>,
+    /// Start value, when there and understood.
+    pub start: Option<Value>,
+    /// Whether a start attribute is there at all.
+    pub has_start: bool,
+    /// One-based index of the variable that this is the derivative of.
+    pub derivative: Option<u32>,
+    /// Model exchange: the state may be reinitialised.
+    pub reinit: bool,
+    /// Where.
+    pub position: Position,
+}
+
+impl Variable {
+    /// The type.
+    #[must_use]
+    pub fn base(&self) -> BaseType {
+        self.attributes.base
+    }
+
+    /// The effective `initial`: as declared, else the default of the table in section 2.2.7.
+    #[must_use]
+    pub fn initial(&self) -> Option<Initial> {
+        self.declared_initial.or_else(|| default_initial(self.causality, self.variability))
+    }
+}
+
+/// The default of `initial` for a causality and variability (FMI 2.0.4, section 2.2.7); none for inputs, the
+/// independent variable and combinations that are not allowed.
+#[must_use]
+pub fn default_initial(causality: Causality, variability: Variability) -> Option<Initial> {
+    use {Causality as C, Variability as V};
+    match (causality, variability) {
+        (C::Output | C::Local, V::Constant) | (C::Parameter, V::Fixed | V::Tunable) => Some(Initial::Exact),
+        (C::CalculatedParameter | C::Local, V::Fixed | V::Tunable)
+        | (C::Output | C::Local, V::Discrete | V::Continuous) => Some(Initial::Calculated),
+        _ => None,
+    }
+}
+
+/// An entry of the model structure.
+#[derive(Debug, Clone)]
+pub struct Unknown {
+    /// One-based index into the variables; 0 when it could not be understood.
+    pub index: u32,
+    /// One-based indices of the knowns; `None` means "all, as far as one knows".
+    pub dependencies: Option<Vec<u32>>,
+    /// Kinds, as many as dependencies.
+    pub kinds: Option<Vec<DependencyKind>>,
+    /// Where.
+    pub position: Position,
+}
+
+/// The model structure.
+#[derive(Debug, Clone, Default)]
+pub struct ModelStructure {
+    /// Outputs.
+    pub outputs: Vec<Unknown>,
+    /// State derivatives.
+    pub derivatives: Vec<Unknown>,
+    /// Unknowns at initialisation.
+    pub initial_unknowns: Vec<Unknown>,
+    /// Where.
+    pub position: Position,
+}
+
+/// The default experiment.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DefaultExperiment {
+    /// Start time, in s.
+    pub start_time: Option<f64>,
+    /// Stop time, in s.
+    pub stop_time: Option<f64>,
+    /// Relative tolerance.
+    pub tolerance: Option<f64>,
+    /// Communication step, in s.
+    pub step_size: Option<f64>,
+    /// Where.
+    pub position: Position,
+}
+
+/// A `modelDescription.xml`.
+#[derive(Debug, Clone)]
+pub struct Description {
+    /// `2.0`.
+    pub fmi_version: String,
+    /// Name of the model.
+    pub model_name: String,
+    /// Fingerprint shared with the binary.
+    pub guid: String,
+    /// One-line description.
+    pub description: Option<String>,
+    /// Author.
+    pub author: Option<String>,
+    /// Version of the model.
+    pub version: Option<String>,
+    /// Copyright.
+    pub copyright: Option<String>,
+    /// Licence.
+    pub license: Option<String>,
+    /// Tool that wrote the FMU.
+    pub generation_tool: Option<String>,
+    /// Date and time of generation.
+    pub generation_date_and_time: Option<String>,
+    /// Whether `variableNamingConvention` is `structured`.
+    pub structured_names: bool,
+    /// Number of event indicators (model exchange).
+    pub number_of_event_indicators: u32,
+    /// The co-simulation interface.
+    pub co_simulation: Option<Interface>,
+    /// The model exchange interface.
+    pub model_exchange: Option<Interface>,
+    /// Unit definitions.
+    pub units: Vec<Unit>,
+    /// Type definitions.
+    pub types: Vec<SimpleType>,
+    /// Log categories: name, description, place.
+    pub log_categories: Vec<(String, Option<String>, Position)>,
+    /// Default experiment.
+    pub default_experiment: Option<DefaultExperiment>,
+    /// Names of the tools with vendor annotations.
+    pub vendor_tools: Vec<String>,
+    /// The variables, in order: index 1 of the model structure is `variables[0]`.
+    pub variables: Vec<Variable>,
+    /// The model structure.
+    pub structure: ModelStructure,
+}
+
+impl Description {
+    /// Parses a `modelDescription.xml`.
+    ///
+    /// # Errors
+    /// When the document is not well-formed, or not a model description of FMI 2.0.
+    pub fn parse(bytes: &[u8]) -> Result<Self, DescriptionError> {
+        let document = Document::parse(bytes)?;
+        let root = &document.root;
+        if root.name != "fmiModelDescription" {
+            return Err(DescriptionError::NotFmi2(format!(
+                "the root element is {}, not fmiModelDescription",
+                root.name
+            )));
+        }
+        match root.get("fmiVersion") {
+            Some("2.0") => Ok(Self::from_document(&document)),
+            Some(other) => Err(DescriptionError::NotFmi2(format!("FMI version {other}; only 2.0 is supported"))),
+            None => Err(DescriptionError::NotFmi2("no fmiVersion attribute".into())),
+        }
+    }
+
+    /// Reads what can be understood; see the module's head.
+    #[must_use]
+    pub fn from_document(document: &Document) -> Self {
+        let root = &document.root;
+        let structure = root.child("ModelStructure");
+        let unknowns = |name: &str| -> Vec<Unknown> {
+            let section = structure.and_then(|s| s.child(name));
+            section.into_iter().flat_map(|s| s.children_named("Unknown")).map(unknown).collect()
+        };
+        Self {
+            fmi_version: text(root, "fmiVersion").unwrap_or_default(),
+            model_name: text(root, "modelName").unwrap_or_default(),
+            guid: text(root, "guid").unwrap_or_default(),
+            description: text(root, "description"),
+            author: text(root, "author"),
+            version: text(root, "version"),
+            copyright: text(root, "copyright"),
+            license: text(root, "license"),
+            generation_tool: text(root, "generationTool"),
+            generation_date_and_time: text(root, "generationDateAndTime"),
+            structured_names: root.get("variableNamingConvention") == Some("structured"),
+            number_of_event_indicators: number(root, "numberOfEventIndicators").unwrap_or(0),
+            co_simulation: root.child("CoSimulation").map(interface),
+            model_exchange: root.child("ModelExchange").map(interface),
+            units: within(root, "UnitDefinitions", "Unit").map(unit).collect(),
+            types: within(root, "TypeDefinitions", "SimpleType").filter_map(simple_type).collect(),
+            log_categories: within(root, "LogCategories", "Category")
+                .map(|e| (text(e, "name").unwrap_or_default(), text(e, "description"), e.position))
+                .collect(),
+            default_experiment: root.child("DefaultExperiment").map(|e| DefaultExperiment {
+                start_time: real(e, "startTime"),
+                stop_time: real(e, "stopTime"),
+                tolerance: real(e, "tolerance"),
+                step_size: real(e, "stepSize"),
+                position: e.position,
+            }),
+            vendor_tools: within(root, "VendorAnnotations", "Tool").filter_map(|e| text(e, "name")).collect(),
+            variables: within(root, "ModelVariables", "ScalarVariable").map(variable).collect(),
+            structure: ModelStructure {
+                outputs: unknowns("Outputs"),
+                derivatives: unknowns("Derivatives"),
+                initial_unknowns: unknowns("InitialUnknowns"),
+                position: structure.map_or(root.position, |s| s.position),
+            },
+        }
+    }
+
+    /// A variable by its name.
+    #[must_use]
+    pub fn variable(&self, name: &str) -> Option<&Variable> {
+        self.variables.iter().find(|v| v.name == name)
+    }
+
+    /// A variable by its one-based index.
+    #[must_use]
+    pub fn by_index(&self, index: u32) -> Option<&Variable> {
+        self.variables.get((index as usize).checked_sub(1)?)
+    }
+
+    /// The type definition of a variable.
+    #[must_use]
+    pub fn type_of(&self, variable: &Variable) -> Option<&SimpleType> {
+        let name = variable.declared_type.as_deref()?;
+        self.types.iter().find(|t| t.name == name)
+    }
+
+    /// A variable's type attributes with those of its type definition filled in where the variable gives none.
+    #[must_use]
+    pub fn resolved(&self, variable: &Variable) -> TypeAttributes {
+        let mut own = variable.attributes.clone();
+        if let Some(definition) = self.type_of(variable) {
+            let other = &definition.attributes;
+            own.quantity = own.quantity.or_else(|| other.quantity.clone());
+            own.unit = own.unit.or_else(|| other.unit.clone());
+            own.display_unit = own.display_unit.or_else(|| other.display_unit.clone());
+            own.min = own.min.or(other.min);
+            own.max = own.max.or(other.max);
+            own.nominal = own.nominal.or(other.nominal);
+            own.relative_quantity |= other.relative_quantity;
+            if own.items.is_empty() {
+                own.items.clone_from(&other.items);
+            }
+        }
+        own
+    }
+}
+
+/// Parses an `xs:boolean`.
+#[must_use]
+pub fn parse_boolean(text: &str) -> Option<bool> {
+    match text.trim() {
+        "true" | "1" => Some(true),
+        "false" | "0" => Some(false),
+        _ => None,
+    }
+}
+
+/// Parses an `xs:double`.
+#[must_use]
+pub fn parse_real(text: &str) -> Option<f64> {
+    match text.trim() {
+        "INF" => Some(f64::INFINITY),
+        "-INF" => Some(f64::NEG_INFINITY),
+        "NaN" => Some(f64::NAN),
+        number if number.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)) => number.parse().ok(),
+        _ => None,
+    }
+}
+
+/// Parses an `xs:int` or one of its unsigned kin.
+#[must_use]
+pub fn parse_integer<T: FromStr>(text: &str) -> Option<T> {
+    text.trim().parse().ok()
+}
+
+fn within<'a>(root: &'a Element, section: &str, item: &'a str) -> impl Iterator<Item = &'a Element> {
+    root.child(section).into_iter().flat_map(move |s| s.children_named(item))
+}
+
+fn text(element: &Element, name: &str) -> Option<String> {
+    element.get(name).map(str::to_owned)
+}
+
+fn real(element: &Element, name: &str) -> Option<f64> {
+    element.get(name).and_then(parse_real)
+}
+
+fn number<T: FromStr>(element: &Element, name: &str) -> Option<T> {
+    element.get(name).and_then(parse_integer)
+}
+
+fn flag(element: &Element, name: &str) -> bool {
+    element.get(name).and_then(parse_boolean).unwrap_or(false)
+}
+
+fn interface(e: &Element) -> Interface {
+    Interface {
+        model_identifier: text(e, "modelIdentifier").unwrap_or_default(),
+        needs_execution_tool: flag(e, "needsExecutionTool"),
+        can_handle_variable_step_size: flag(e, "canHandleVariableCommunicationStepSize"),
+        can_interpolate_inputs: flag(e, "canInterpolateInputs"),
+        max_output_derivative_order: number(e, "maxOutputDerivativeOrder").unwrap_or(0),
+        can_run_asynchronuously: flag(e, "canRunAsynchronuously"),
+        only_once: flag(e, "canBeInstantiatedOnlyOncePerProcess"),
+        no_memory_callbacks: flag(e, "canNotUseMemoryManagementFunctions"),
+        can_get_and_set_state: flag(e, "canGetAndSetFMUstate"),
+        can_serialize_state: flag(e, "canSerializeFMUstate"),
+        provides_directional_derivative: flag(e, "providesDirectionalDerivative"),
+        source_files: within(e, "SourceFiles", "File")
+            .map(|f| (text(f, "name").unwrap_or_default(), f.position))
+            .collect(),
+        position: e.position,
+    }
+}
+
+fn unit(e: &Element) -> Unit {
+    let base = e.child("BaseUnit").map(|b| BaseUnit {
+        exponents: SI_BASE.map(|name| number(b, name).unwrap_or(0)),
+        factor: real(b, "factor").unwrap_or(1.0),
+        offset: real(b, "offset").unwrap_or(0.0),
+    });
+    let display = e.children_named("DisplayUnit").map(|d| DisplayUnit {
+        name: text(d, "name").unwrap_or_default(),
+        factor: real(d, "factor").unwrap_or(1.0),
+        offset: real(d, "offset").unwrap_or(0.0),
+        position: d.position,
+    });
+    Unit { name: text(e, "name").unwrap_or_default(), base, display: display.collect(), position: e.position }
+}
+
+fn type_element(e: &Element) -> Option<(BaseType, &Element)> {
+    e.children.iter().find_map(|child| Some((child.name.parse().ok()?, child)))
+}
+
+fn type_attributes(base: BaseType, e: &Element) -> TypeAttributes {
+    TypeAttributes {
+        base,
+        quantity: text(e, "quantity"),
+        unit: text(e, "unit"),
+        display_unit: text(e, "displayUnit"),
+        relative_quantity: flag(e, "relativeQuantity"),
+        min: real(e, "min"),
+        max: real(e, "max"),
+        nominal: real(e, "nominal"),
+        items: e
+            .children_named("Item")
+            .map(|i| (text(i, "name").unwrap_or_default(), number(i, "value").unwrap_or(0), i.position))
+            .collect(),
+        position: e.position,
+    }
+}
+
+fn simple_type(e: &Element) -> Option<SimpleType> {
+    let (base, inner) = type_element(e)?;
+    let attributes = type_attributes(base, inner);
+    Some(SimpleType { name: text(e, "name").unwrap_or_default(), attributes, position: e.position })
+}
+
+fn variable(e: &Element) -> Variable {
+    let (base, inner) = type_element(e).unwrap_or((BaseType::Real, e));
+    let start = inner.get("start").and_then(|start| match base {
+        BaseType::Real => parse_real(start).map(Value::Real),
+        BaseType::Integer | BaseType::Enumeration => parse_integer(start).map(Value::Integer),
+        BaseType::Boolean => parse_boolean(start).map(Value::Boolean),
+        BaseType::String => Some(Value::String(start.to_owned())),
+    });
+    Variable {
+        name: text(e, "name").unwrap_or_default(),
+        value_reference: number(e, "valueReference").unwrap_or(u32::MAX),
+        description: text(e, "description"),
+        causality: word(e, "causality").unwrap_or(Causality::Local),
+        variability: word(e, "variability").unwrap_or(Variability::Continuous),
+        declared_initial: word(e, "initial"),
+        can_handle_multiple_set: e.get("canHandleMultipleSetPerTimeInstant").and_then(parse_boolean),
+        attributes: type_attributes(base, inner),
+        declared_type: text(inner, "declaredType"),
+        has_start: inner.get("start").is_some(),
+        start,
+        derivative: number(inner, "derivative"),
+        reinit: flag(inner, "reinit"),
+        position: e.position,
+    }
+}
+
+fn word<T: FromStr>(e: &Element, name: &str) -> Option<T> {
+    e.get(name).and_then(|text| text.parse().ok())
+}
+
+fn unknown(e: &Element) -> Unknown {
+    let list = |name: &str| e.get(name).map(|text| text.split_whitespace().collect::<Vec<_>>());
+    Unknown {
+        index: number(e, "index").unwrap_or(0),
+        dependencies: list("dependencies").map(|l| l.iter().filter_map(|i| i.parse().ok()).collect()),
+        kinds: list("dependenciesKind").map(|l| l.iter().filter_map(|k| k.parse().ok()).collect()),
+        position: e.position,
+    }
+}

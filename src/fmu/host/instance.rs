@@ -1,0 +1,502 @@
+//! One instance of an FMU.
+
+use std::ffi::{CString, c_void};
+use std::sync::Arc;
+use std::sync::PoisonError;
+
+use tempfile::TempDir;
+
+use super::abi::{self, Call, Callbacks, Component, State, Text};
+use super::logger::{self, LogMessage, LogSink, lossy};
+use super::{Binary, HostError, Status, note};
+
+/// How to make an instance.
+#[derive(Debug, Clone)]
+pub struct InstanceOptions {
+    /// Name of the instance.
+    pub name: String,
+    /// GUID to hand over.
+    pub guid: String,
+    /// URI of the resources folder.
+    pub resources: String,
+    /// Whether the FMU may show windows.
+    pub visible: bool,
+    /// Whether the FMU logs.
+    pub logging: bool,
+}
+
+impl Default for InstanceOptions {
+    fn default() -> Self {
+        Self { name: "instance".into(), guid: String::new(), resources: String::new(), visible: false, logging: false }
+    }
+}
+
+/// A captured FMU state; free it with [`Instance::free_state`], else it lives until the process ends.
+#[derive(Debug)]
+pub struct StateHandle(pub(crate) State);
+
+/// One instance. Freed when dropped.
+pub struct Instance {
+    pub(crate) component: Component,
+    _callbacks: Box<Callbacks>,
+    binary: Arc<Binary>,
+    log: Box<LogSink>,
+    freed: bool,
+    // Kept for FMUs that go on using the pointers handed to them.
+    _texts: [CString; 3],
+    _folder: Option<Arc<TempDir>>,
+}
+
+impl std::fmt::Debug for Instance {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Instance").field("component", &self.component).finish_non_exhaustive()
+    }
+}
+
+// SAFETY: FMI 2.0 allows an instance to be used from any thread, one at a time; the log sink is locked.
+unsafe impl Send for Instance {}
+
+unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
+    // SAFETY: `calloc` takes any numbers.
+    unsafe { abi::calloc(count.max(1), size.max(1)) }
+}
+
+unsafe extern "C" fn release(memory: *mut c_void) {
+    // SAFETY: the FMU hands back what `allocate` gave, or null.
+    unsafe { abi::free(memory) }
+}
+
+fn c_string(text: &str) -> Result<CString, HostError> {
+    CString::new(text).map_err(|_| HostError::Nul(text.to_owned()))
+}
+
+/// Calls a function of the binary, noting it first; gives its result, or the error that it is not exported.
+macro_rules! call {
+    ($self:ident, $function:ident ($($arg:expr),*)) => {
+        match $self.binary.functions.$function {
+            Some(function) => {
+                note(Call::$function);
+                // SAFETY: the component is alive, the pointers are valid for the lengths given with them.
+                let result = unsafe { function($self.component, $($arg),*) };
+                note(Call::None);
+                Ok(result)
+            }
+            None => Err(HostError::Missing(abi::CALLS[Call::$function as usize])),
+        }
+    };
+}
+
+/// As [`call!`], with the status made an error unless it is fine.
+macro_rules! checked {
+    ($self:ident, $function:ident ($($arg:expr),*)) => {
+        call!($self, $function($($arg),*)).map(Status::from).and_then(|status| {
+            match status.is_ok() {
+                true => Ok(()),
+                false => Err(HostError::Status { function: abi::CALLS[Call::$function as usize], status }),
+            }
+        })
+    };
+}
+
+impl Instance {
+    /// Makes an instance of a loaded binary; `folder` is kept alive as long as the instance.
+    ///
+    /// # Errors
+    /// When the FMU refuses, or lacks a function.
+    pub fn new(
+        binary: Arc<Binary>,
+        folder: Option<Arc<TempDir>>,
+        options: &InstanceOptions,
+    ) -> Result<Self, HostError> {
+        let texts = [c_string(&options.name)?, c_string(&options.guid)?, c_string(&options.resources)?];
+        let log = Box::new(LogSink::default());
+        let callbacks = Box::new(Callbacks {
+            logger: logger::logger(),
+            allocate: Some(allocate),
+            free: Some(release),
+            step_finished: std::ptr::null(),
+            environment: std::ptr::from_ref::<LogSink>(&log).cast_mut().cast(),
+        });
+        let function = binary.functions.instantiate.ok_or(HostError::Missing("fmi2Instantiate"))?;
+        note(Call::instantiate);
+        // SAFETY: all pointers stay valid as long as the instance; co-simulation is 1 in `fmi2Type`.
+        let component = unsafe {
+            let [name, guid, resources] = &texts;
+            let flags = (i32::from(options.visible), i32::from(options.logging));
+            function(name.as_ptr(), 1, guid.as_ptr(), resources.as_ptr(), &raw const *callbacks, flags.0, flags.1)
+        };
+        note(Call::None);
+        let instance =
+            Self { component, _callbacks: callbacks, binary, log, freed: false, _texts: texts, _folder: folder };
+        if component.is_null() {
+            let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
+            return Err(HostError::Refused(said.join("; ")));
+        }
+        Ok(instance)
+    }
+
+    /// The messages logged since the last time, and forgets them.
+    #[must_use]
+    pub fn take_log(&self) -> Vec<LogMessage> {
+        let mut messages = self.log.messages.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut messages.0)
+    }
+
+    /// `fmi2GetTypesPlatform`.
+    ///
+    /// # Errors
+    /// When it is not exported.
+    pub fn types_platform(&self) -> Result<String, HostError> {
+        static_text(&self.binary, Call::get_types_platform)
+    }
+
+    /// `fmi2GetVersion`.
+    ///
+    /// # Errors
+    /// When it is not exported.
+    pub fn version(&self) -> Result<String, HostError> {
+        static_text(&self.binary, Call::get_version)
+    }
+
+    /// `fmi2SetDebugLogging`.
+    ///
+    /// # Errors
+    /// When it is not exported or does not return `fmi2OK` or `fmi2Warning`; so for all methods below.
+    pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Result<(), HostError> {
+        let texts = categories.iter().map(|c| c_string(c)).collect::<Result<Vec<_>, _>>()?;
+        let pointers: Vec<Text> = texts.iter().map(|t| t.as_ptr()).collect();
+        checked!(self, set_debug_logging(i32::from(on), pointers.len(), pointers.as_ptr()))
+    }
+
+    /// `fmi2SetupExperiment`; times in s.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn setup_experiment(&mut self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Result<(), HostError> {
+        let (has_tolerance, has_stop) = (i32::from(tolerance.is_some()), i32::from(stop.is_some()));
+        let (tolerance, stop) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
+        checked!(self, setup_experiment(has_tolerance, tolerance, start, has_stop, stop))
+    }
+
+    /// `fmi2EnterInitializationMode`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn enter_initialization(&mut self) -> Result<(), HostError> {
+        checked!(self, enter_initialization())
+    }
+
+    /// `fmi2ExitInitializationMode`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn exit_initialization(&mut self) -> Result<(), HostError> {
+        checked!(self, exit_initialization())
+    }
+
+    /// Sets up, enters and exits initialisation.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn initialize(&mut self, start: f64, stop: Option<f64>) -> Result<(), HostError> {
+        self.setup_experiment(None, start, stop)?;
+        self.enter_initialization()?;
+        self.exit_initialization()
+    }
+
+    /// `fmi2Terminate`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn terminate(&mut self) -> Result<(), HostError> {
+        checked!(self, terminate())
+    }
+
+    /// `fmi2Reset`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn reset(&mut self) -> Result<(), HostError> {
+        checked!(self, reset())
+    }
+
+    /// `fmi2DoStep`, with its status as it is: a discarded step is no error of the caller.
+    ///
+    /// # Errors
+    /// When it is not exported.
+    pub fn do_step_status(&mut self, time: f64, step: f64, no_set_prior: bool) -> Result<Status, HostError> {
+        call!(self, do_step(time, step, i32::from(no_set_prior))).map(Status::from)
+    }
+
+    /// `fmi2DoStep` from `time` by `step`, in s.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`]; `fmi2Discard` and `fmi2Pending` are errors too.
+    pub fn do_step(&mut self, time: f64, step: f64) -> Result<(), HostError> {
+        checked!(self, do_step(time, step, 1))
+    }
+
+    /// `fmi2CancelStep`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn cancel_step(&mut self) -> Result<(), HostError> {
+        checked!(self, cancel_step())
+    }
+
+    /// `fmi2GetRealStatus(fmi2LastSuccessfulTime)`, in s.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn last_successful_time(&mut self) -> Result<f64, HostError> {
+        let mut time = f64::NAN;
+        checked!(self, get_real_status(2, &raw mut time)).map(|()| time)
+    }
+
+    /// `fmi2GetBooleanStatus(fmi2Terminated)`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn terminated(&mut self) -> Result<bool, HostError> {
+        let mut value = 0;
+        checked!(self, get_boolean_status(3, &raw mut value)).map(|()| value != 0)
+    }
+
+    /// `fmi2GetStatus(fmi2DoStepStatus)`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn step_status(&mut self) -> Result<Status, HostError> {
+        let mut value = -1;
+        checked!(self, get_status(0, &raw mut value)).map(|()| Status::from(value))
+    }
+
+    /// `fmi2GetReal` into a slice of the same length as `references`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    ///
+    /// # Panics
+    /// When the lengths differ; so for all that follow.
+    pub fn get_real_into(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), HostError> {
+        assert_eq!(references.len(), values.len());
+        checked!(self, get_real(references.as_ptr(), references.len(), values.as_mut_ptr()))
+    }
+
+    /// `fmi2GetReal`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn get_real(&mut self, references: &[u32]) -> Result<Vec<f64>, HostError> {
+        let mut values = vec![f64::NAN; references.len()];
+        self.get_real_into(references, &mut values).map(|()| values)
+    }
+
+    /// `fmi2GetInteger`, for Integer and Enumeration variables.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn get_integer(&mut self, references: &[u32]) -> Result<Vec<i32>, HostError> {
+        let mut values = vec![0; references.len()];
+        checked!(self, get_integer(references.as_ptr(), references.len(), values.as_mut_ptr())).map(|()| values)
+    }
+
+    /// `fmi2GetBoolean`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn get_boolean(&mut self, references: &[u32]) -> Result<Vec<bool>, HostError> {
+        let mut values = vec![0; references.len()];
+        checked!(self, get_boolean(references.as_ptr(), references.len(), values.as_mut_ptr()))
+            .map(|()| values.iter().map(|&v| v != 0).collect())
+    }
+
+    /// `fmi2GetString`; a null pointer reads as an empty text.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn get_string(&mut self, references: &[u32]) -> Result<Vec<String>, HostError> {
+        let mut values = vec![std::ptr::null(); references.len()];
+        checked!(self, get_string(references.as_ptr(), references.len(), values.as_mut_ptr()))?;
+        // SAFETY: the FMU gave C strings, valid until the next call.
+        Ok(values.iter().map(|&text| unsafe { lossy(text) }).collect())
+    }
+
+    /// `fmi2SetReal`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), HostError> {
+        assert_eq!(references.len(), values.len());
+        checked!(self, set_real(references.as_ptr(), references.len(), values.as_ptr()))
+    }
+
+    /// `fmi2SetInteger`, for Integer and Enumeration variables.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), HostError> {
+        assert_eq!(references.len(), values.len());
+        checked!(self, set_integer(references.as_ptr(), references.len(), values.as_ptr()))
+    }
+
+    /// `fmi2SetBoolean`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn set_boolean(&mut self, references: &[u32], values: &[bool]) -> Result<(), HostError> {
+        assert_eq!(references.len(), values.len());
+        let raw: Vec<i32> = values.iter().map(|&v| i32::from(v)).collect();
+        checked!(self, set_boolean(references.as_ptr(), references.len(), raw.as_ptr()))
+    }
+
+    /// `fmi2SetString`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn set_string(&mut self, references: &[u32], values: &[&str]) -> Result<(), HostError> {
+        assert_eq!(references.len(), values.len());
+        let texts = values.iter().map(|c| c_string(c)).collect::<Result<Vec<_>, _>>()?;
+        let pointers: Vec<Text> = texts.iter().map(|t| t.as_ptr()).collect();
+        checked!(self, set_string(references.as_ptr(), references.len(), pointers.as_ptr()))
+    }
+
+    /// `fmi2SetRealInputDerivatives`: one order (1 or more) a reference.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), HostError> {
+        assert!(references.len() == orders.len() && references.len() == values.len());
+        let length = references.len();
+        checked!(self, set_input_derivatives(references.as_ptr(), length, orders.as_ptr(), values.as_ptr()))
+    }
+
+    /// `fmi2GetRealOutputDerivatives`: one order (1 or more) a reference.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn get_output_derivatives(&mut self, references: &[u32], orders: &[i32]) -> Result<Vec<f64>, HostError> {
+        assert_eq!(references.len(), orders.len());
+        let mut values = vec![f64::NAN; references.len()];
+        let length = references.len();
+        checked!(self, get_output_derivatives(references.as_ptr(), length, orders.as_ptr(), values.as_mut_ptr()))
+            .map(|()| values)
+    }
+
+    /// `fmi2GetDirectionalDerivative`: the change of the unknowns for a seed on the knowns, `dz = (dz/dv) dv`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+    ) -> Result<Vec<f64>, HostError> {
+        assert_eq!(knowns.len(), seed.len());
+        let mut values = vec![f64::NAN; unknowns.len()];
+        let (known, known_len) = (knowns.as_ptr(), knowns.len());
+        checked!(
+            self,
+            directional_derivative(
+                unknowns.as_ptr(),
+                unknowns.len(),
+                known,
+                known_len,
+                seed.as_ptr(),
+                values.as_mut_ptr()
+            )
+        )
+        .map(|()| values)
+    }
+
+    /// `fmi2GetFMUstate`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn get_state(&mut self) -> Result<StateHandle, HostError> {
+        let mut state = std::ptr::null_mut();
+        checked!(self, get_state(&raw mut state)).map(|()| StateHandle(state))
+    }
+
+    /// `fmi2SetFMUstate`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn set_state(&mut self, state: &StateHandle) -> Result<(), HostError> {
+        checked!(self, set_state(state.0))
+    }
+
+    /// `fmi2FreeFMUstate`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn free_state(&mut self, mut state: StateHandle) -> Result<(), HostError> {
+        checked!(self, free_state(&raw mut state.0))
+    }
+
+    /// `fmi2SerializedFMUstateSize` and `fmi2SerializeFMUstate`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn serialize_state(&mut self, state: &StateHandle) -> Result<Vec<u8>, HostError> {
+        let mut size = 0;
+        checked!(self, serialized_size(state.0, &raw mut size))?;
+        let mut bytes = vec![0; size];
+        checked!(self, serialize(state.0, bytes.as_mut_ptr(), size)).map(|()| bytes)
+    }
+
+    /// `fmi2DeSerializeFMUstate`.
+    ///
+    /// # Errors
+    /// See [`Instance::set_debug_logging`].
+    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<StateHandle, HostError> {
+        let mut state = std::ptr::null_mut();
+        checked!(self, deserialize(bytes.as_ptr(), bytes.len(), &raw mut state)).map(|()| StateHandle(state))
+    }
+
+    /// `fmi2FreeInstance`, which dropping does too.
+    pub fn free(mut self) {
+        self.free_once();
+    }
+
+    fn free_once(&mut self) {
+        if !self.freed && !self.component.is_null() {
+            self.freed = true;
+            if let Some(function) = self.binary.functions.free_instance {
+                note(Call::free_instance);
+                // SAFETY: the component is alive and freed once.
+                unsafe { function(self.component) };
+                note(Call::None);
+            }
+        }
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        self.free_once();
+    }
+}
+
+/// `fmi2GetTypesPlatform` or `fmi2GetVersion` of a binary.
+///
+/// # Errors
+/// When the function is not exported.
+pub(crate) fn static_text(binary: &Binary, call: Call) -> Result<String, HostError> {
+    let function = match call {
+        Call::get_types_platform => binary.functions.get_types_platform,
+        _ => binary.functions.get_version,
+    };
+    let function = function.ok_or(HostError::Missing(abi::CALLS[call as usize]))?;
+    note(call);
+    // SAFETY: the functions take nothing and give a C string that lives as long as the library.
+    let text = unsafe { lossy(function()) };
+    note(Call::None);
+    Ok(text)
+}

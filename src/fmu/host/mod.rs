@@ -1,0 +1,318 @@
+//! Loading an FMU's binary and calling it: every FMI 2.0 co-simulation function behind a safe method.
+//!
+//! "Safe" as far as the FMU keeps the standard: its code runs in this process and can do anything. Code that must
+//! survive any FMU runs it in a child process ([`super::isolation`]).
+
+#![allow(unsafe_code)]
+
+pub(crate) mod abi;
+mod instance;
+pub(crate) mod logger;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
+
+use libloading::Library;
+use tempfile::TempDir;
+
+use super::archive::{Archive, ArchiveError};
+use super::description::{Description, DescriptionError, Interface};
+use abi::{Call, Functions};
+pub use instance::{Instance, InstanceOptions, StateHandle};
+pub use logger::LogMessage;
+
+/// What a call returned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// All well.
+    Ok,
+    /// Went on, with a warning.
+    Warning,
+    /// Refused; the instance goes on.
+    Discard,
+    /// Failed; the instance can only be reset or freed.
+    Error,
+    /// Failed; no instance of this FMU can be used any more.
+    Fatal,
+    /// Still running.
+    Pending,
+    /// A number that FMI does not define.
+    Other(i32),
+}
+
+impl From<i32> for Status {
+    fn from(raw: i32) -> Self {
+        match raw {
+            0 => Self::Ok,
+            1 => Self::Warning,
+            2 => Self::Discard,
+            3 => Self::Error,
+            4 => Self::Fatal,
+            5 => Self::Pending,
+            other => Self::Other(other),
+        }
+    }
+}
+
+impl Status {
+    /// Whether the call did what was asked: `fmi2OK` or `fmi2Warning`.
+    #[must_use]
+    pub fn is_ok(self) -> bool {
+        matches!(self, Self::Ok | Self::Warning)
+    }
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Ok => f.write_str("fmi2OK"),
+            Self::Warning => f.write_str("fmi2Warning"),
+            Self::Discard => f.write_str("fmi2Discard"),
+            Self::Error => f.write_str("fmi2Error"),
+            Self::Fatal => f.write_str("fmi2Fatal"),
+            Self::Pending => f.write_str("fmi2Pending"),
+            Self::Other(raw) => write!(f, "{raw} (no fmi2Status)"),
+        }
+    }
+}
+
+/// Why an FMU cannot be used, or a call failed.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// The archive.
+    #[error(transparent)]
+    Archive(#[from] ArchiveError),
+    /// The description.
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
+    /// Only model exchange.
+    #[error("{0}: the FMU offers no co-simulation")]
+    NoCoSimulation(PathBuf),
+    /// No binary for this platform.
+    #[error("the FMU has no binary {expected} for this platform; it has: {found}")]
+    NoBinary {
+        /// Path inside the archive.
+        expected: String,
+        /// Platform folders that are there.
+        found: String,
+    },
+    /// The system cannot load the binary.
+    #[error("{file}: cannot be loaded: {message}")]
+    Load {
+        /// Path inside the archive.
+        file: String,
+        /// What the system says.
+        message: String,
+    },
+    /// The binary lacks a function.
+    #[error("the binary does not export {0}")]
+    Missing(&'static str),
+    /// `fmi2Instantiate` returned null.
+    #[error("fmi2Instantiate refused to make an instance{}", match .0.is_empty() { true => String::new(), false => format!(": {}", .0) })]
+    Refused(String),
+    /// A call returned neither `fmi2OK` nor `fmi2Warning`.
+    #[error("{function} returned {status}")]
+    Status {
+        /// Which function.
+        function: &'static str,
+        /// What it returned.
+        status: Status,
+    },
+    /// A text with a NUL byte.
+    #[error("the text {0:?} holds a NUL byte, which C strings cannot")]
+    Nul(String),
+}
+
+/// Folder of this platform's binaries, and the file name extension (FMI 2.0.4, section 2.3).
+#[must_use]
+pub fn platform() -> (&'static str, &'static str) {
+    let wide = cfg!(target_pointer_width = "64");
+    if cfg!(windows) {
+        (if wide { "win64" } else { "win32" }, "dll")
+    } else if cfg!(target_vendor = "apple") {
+        (if wide { "darwin64" } else { "darwin32" }, "dylib")
+    } else {
+        (if wide { "linux64" } else { "linux32" }, "so")
+    }
+}
+
+/// Where the number of the call under way is written, so that another process can read it; null when nowhere.
+pub(crate) static CALL_SLOT: AtomicPtr<AtomicU32> = AtomicPtr::new(std::ptr::null_mut());
+
+/// Notes which call is made next.
+pub(crate) fn note(call: Call) {
+    let slot = CALL_SLOT.load(Ordering::Relaxed);
+    if !slot.is_null() {
+        // SAFETY: the slot is set once to memory that lives as long as the process.
+        unsafe { &*slot }.store(call as u32, Ordering::Relaxed);
+    }
+}
+
+/// A loaded binary.
+pub struct Binary {
+    pub(crate) functions: Functions,
+    library: Option<Library>,
+}
+
+impl std::fmt::Debug for Binary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Binary")
+    }
+}
+
+impl Binary {
+    /// Loads a library; `now` resolves every symbol at once instead of on first use.
+    ///
+    /// # Errors
+    /// When the system cannot load it.
+    pub fn load(file: &Path, now: bool) -> Result<Self, HostError> {
+        note(Call::Load);
+        let fail = |error: libloading::Error| {
+            let mut message = error.to_string();
+            let mut cause = std::error::Error::source(&error);
+            while let Some(error) = cause {
+                message = format!("{message}: {error}");
+                cause = error.source();
+            }
+            HostError::Load { file: file.display().to_string(), message }
+        };
+        // SAFETY: running the library's initialisers is what loading an FMU means; see the module's head.
+        let library = unsafe { open_library(file, now) }.map_err(fail)?;
+        // SAFETY: an FMU's symbols have the signatures of FMI 2.0.
+        let functions = unsafe { Functions::load(&library) };
+        note(Call::None);
+        Ok(Self { functions, library: Some(library) })
+    }
+
+    /// Whether a symbol is exported.
+    #[must_use]
+    pub fn exports(&self, symbol: &str) -> bool {
+        // SAFETY: the symbol's address is only looked up, never called.
+        self.library.as_ref().is_some_and(|l| unsafe { l.get::<*const ()>(symbol.as_bytes()) }.is_ok())
+    }
+}
+
+impl Drop for Binary {
+    fn drop(&mut self) {
+        note(Call::Unload);
+        drop(self.library.take());
+        note(Call::None);
+    }
+}
+
+#[cfg(unix)]
+unsafe fn open_library(file: &Path, now: bool) -> Result<Library, libloading::Error> {
+    use libloading::os::unix;
+    let flags = if now { unix::RTLD_NOW } else { unix::RTLD_LAZY };
+    // SAFETY: the caller's.
+    unsafe { unix::Library::open(Some(file), flags | unix::RTLD_LOCAL) }.map(Library::from)
+}
+
+#[cfg(windows)]
+unsafe fn open_library(file: &Path, _now: bool) -> Result<Library, libloading::Error> {
+    use libloading::os::windows;
+    // Dependencies are looked for beside the library first.
+    // SAFETY: the caller's.
+    unsafe { windows::Library::load_with_flags(file, windows::LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Library::from)
+}
+
+/// An FMU, extracted and loaded. The folder is deleted when the value and its instances are gone.
+#[derive(Debug)]
+pub struct Fmu {
+    /// The model description.
+    pub description: Description,
+    binary: Arc<Binary>,
+    // After the library: it is closed before its file goes.
+    folder: Arc<TempDir>,
+}
+
+impl Fmu {
+    /// Opens an archive, extracts it, and loads the co-simulation binary of this platform.
+    ///
+    /// # Errors
+    /// When the archive, the description or the binary cannot be used.
+    pub fn open(path: &Path) -> Result<Self, HostError> {
+        let mut archive = Archive::open(path)?;
+        let description = Description::parse(&archive.read("modelDescription.xml")?)?;
+        let folder = archive.extract()?;
+        let Some(interface) = &description.co_simulation else {
+            return Err(HostError::NoCoSimulation(path.to_owned()));
+        };
+        let file = binary_file(folder.path(), interface)?;
+        let binary = Arc::new(Binary::load(&file, false)?);
+        Ok(Self { description, binary, folder: Arc::new(folder) })
+    }
+
+    /// The co-simulation interface.
+    #[must_use]
+    pub fn interface(&self) -> &Interface {
+        // Checked in `open`.
+        self.description.co_simulation.as_ref().expect("an opened FMU offers co-simulation")
+    }
+
+    /// The URI of the resources folder, for `fmi2Instantiate`.
+    #[must_use]
+    pub fn resources(&self) -> String {
+        resource_uri(self.folder.path())
+    }
+
+    /// Makes an instance with the FMU's own GUID and resources.
+    ///
+    /// # Errors
+    /// When the FMU refuses, or lacks a function.
+    pub fn instantiate(&self, name: &str) -> Result<Instance, HostError> {
+        let options = InstanceOptions {
+            name: name.to_owned(),
+            guid: self.description.guid.clone(),
+            resources: self.resources(),
+            ..InstanceOptions::default()
+        };
+        self.instantiate_with(&options)
+    }
+
+    /// Makes an instance.
+    ///
+    /// # Errors
+    /// As [`Fmu::instantiate`].
+    pub fn instantiate_with(&self, options: &InstanceOptions) -> Result<Instance, HostError> {
+        Instance::new(Arc::clone(&self.binary), Some(Arc::clone(&self.folder)), options)
+    }
+}
+
+/// The URI of the resources folder of an extracted FMU.
+#[must_use]
+pub fn resource_uri(folder: &Path) -> String {
+    let path = folder.join("resources").to_string_lossy().replace('\\', "/");
+    let mut uri = String::from("file://");
+    if !path.starts_with('/') {
+        uri.push('/');
+    }
+    for byte in path.bytes() {
+        if byte.is_ascii_alphanumeric() || b"/-._~:".contains(&byte) {
+            uri.push(char::from(byte));
+        } else {
+            uri.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    uri
+}
+
+/// The binary of this platform in an extracted FMU.
+///
+/// # Errors
+/// When there is none.
+pub fn binary_file(folder: &Path, interface: &Interface) -> Result<PathBuf, HostError> {
+    let (platform, extension) = platform();
+    let relative = format!("binaries/{platform}/{}.{extension}", interface.model_identifier);
+    let file = folder.join(&relative);
+    if file.is_file() {
+        return Ok(file);
+    }
+    let mut found: Vec<String> = std::fs::read_dir(folder.join("binaries"))
+        .map(|dir| dir.filter_map(|e| Some(e.ok()?.file_name().to_string_lossy().into_owned())).collect())
+        .unwrap_or_default();
+    found.sort();
+    let found = if found.is_empty() { "none at all".into() } else { found.join(", ") };
+    Err(HostError::NoBinary { expected: relative, found })
+}
