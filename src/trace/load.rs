@@ -1,0 +1,330 @@
+//! From the columns of a file to a trace: which column is which signal, in which unit, and on which grid.
+
+use std::path::Path;
+
+use super::error::{TraceError, nearest};
+use super::sampling::{NoGrid, Sampling, grid, resample};
+use super::signal::{Motion, Quantity, Signal};
+use super::table::Table;
+use super::units::Unit;
+use super::{Grid, Hold, Trace};
+
+/// Least samples of a trace.
+const SHORTEST: usize = 16;
+
+/// Where a signal stands in a log: `value = scale*column + offset`, after the column's unit is brought to SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name of the column, without unit.
+    pub column: String,
+    /// Unit, where the header has none in brackets.
+    pub unit: Option<String>,
+    /// Factor to SI, or from the drive's units to the torque.
+    pub scale: f64,
+    /// Added after scaling, SI.
+    pub offset: f64,
+}
+
+impl Column {
+    /// A column of that name in SI units.
+    #[must_use]
+    pub fn named(column: &str) -> Self {
+        Self { column: column.to_owned(), unit: None, scale: 1.0, offset: 0.0 }
+    }
+
+    fn is_plain(&self) -> bool {
+        self.unit.is_none() && self.scale == 1.0 && self.offset == 0.0
+    }
+}
+
+/// How a log's columns become signals: `[signals]` of axis.toml.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mapping {
+    /// The column of time; its unit must be a time.
+    pub time: Column,
+    /// Sampling interval, s, for a log without a time column.
+    pub dt: Option<f64>,
+    /// The signals that are mapped; empty: every column that has a signal's name.
+    pub signals: Vec<(Signal, Column)>,
+    /// What the torque does between samples.
+    pub hold: Hold,
+    /// Rotary or linear units.
+    pub motion: Motion,
+}
+
+impl Default for Mapping {
+    fn default() -> Self {
+        Self { time: Column::named("time"), dt: None, signals: Vec::new(), hold: Hold::Zoh, motion: Motion::Rotary }
+    }
+}
+
+/// A trace and what the user should know about it.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The record.
+    pub trace: Trace,
+    /// Each a sentence that says what to do.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a trace file.
+///
+/// # Errors
+/// [`TraceError`], naming file, row and column.
+pub fn load(path: &Path, mapping: &Mapping) -> Result<Loaded, TraceError> {
+    from_table(&Table::read(path)?, mapping)
+}
+
+/// Makes the trace of a table.
+///
+/// # Errors
+/// [`TraceError`], naming file, row and column.
+pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError> {
+    let mut warnings = Vec::new();
+    let wanted = wanted(table, mapping, &mut warnings)?;
+    if table.rows() < SHORTEST {
+        return Err(TraceError::TooShort { file: table.file.clone(), found: table.rows(), needed: SHORTEST });
+    }
+    let (grid, jittered) = time_grid(table, mapping, &mut warnings)?;
+    let mut trace = Trace::new(grid.start, grid.dt, mapping.hold);
+    for (signal, column) in wanted {
+        let mut values = values(table, &column, signal.name(), signal.quantity(mapping.motion))?;
+        // The torque belongs to its sample under either hold: only the motion is read off at the grid's times.
+        if let (Some(time), true) = (&jittered, signal != Signal::T) {
+            values = resample(time, &values, &grid);
+        }
+        trace.set(signal, values)?;
+    }
+    if trace.is_empty() {
+        return Err(TraceError::NoTable {
+            file: table.file.clone(),
+            what: format!(
+                "no column has a signal's name ({}); the columns are: {}. Map them in [signals] of an axis file and \
+                 give it with --axis",
+                Signal::ALL.map(Signal::name).join(", "),
+                table.names()
+            ),
+        });
+    }
+    Ok(Loaded { trace, warnings })
+}
+
+fn wanted(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Result<Vec<(Signal, Column)>, TraceError> {
+    if mapping.signals.is_empty() {
+        let by_name = |s: &Signal| table.position(s.name()).is_some();
+        return Ok(Signal::ALL.into_iter().filter(by_name).map(|s| (s, Column::named(s.name()))).collect());
+    }
+    // The log of the axis file, or a trace this program wrote: one or the other, never a mixture.
+    let mapped = |c: &Column| table.position(&c.column).is_some();
+    let own = |s: Signal| table.position(s.name()).is_some();
+    if !mapping.signals.iter().any(|(_, c)| mapped(c)) && mapping.signals.iter().any(|(s, _)| own(*s)) {
+        warnings.push(format!(
+            "{}: none of the columns that [signals] maps are there; the columns with the signals' own names are used, \
+             in SI units without scale or offset",
+            table.file
+        ));
+        let present = mapping.signals.iter().filter(|(s, _)| own(*s));
+        return Ok(present.map(|(s, _)| (*s, Column::named(s.name()))).collect());
+    }
+    for (signal, column) in &mapping.signals {
+        if !mapped(column) {
+            return Err(missing(table, signal.name(), &column.column));
+        }
+    }
+    Ok(mapping.signals.clone())
+}
+
+fn missing(table: &Table, signal: &str, wanted: &str) -> TraceError {
+    TraceError::MissingColumn {
+        file: table.file.clone(),
+        signal: signal.to_owned(),
+        wanted: wanted.to_owned(),
+        hint: nearest(wanted, table.headers.iter().map(|h| h.name.as_str())),
+        present: table.names(),
+    }
+}
+
+/// The values of a column in SI units, scaled.
+fn values(table: &Table, column: &Column, signal: &str, quantity: Quantity) -> Result<Vec<f64>, TraceError> {
+    let index = table.position(&column.column).ok_or_else(|| missing(table, signal, &column.column))?;
+    let mut scale = column.scale;
+    if let Some(text) = table.headers[index].unit.as_ref().or(column.unit.as_ref()) {
+        let unit = Unit::parse(text).ok_or_else(|| TraceError::UnknownUnit {
+            file: table.file.clone(),
+            column: column.column.clone(),
+            unit: text.clone(),
+            signal: signal.to_owned(),
+            known: Unit::of(quantity),
+        })?;
+        let drives = matches!(quantity, Quantity::Torque | Quantity::Force) && unit.quantity == Quantity::Drive;
+        if unit.quantity != quantity && !drives {
+            return Err(TraceError::WrongUnit {
+                file: table.file.clone(),
+                column: column.column.clone(),
+                unit: text.clone(),
+                is: unit.quantity.name(),
+                signal: signal.to_owned(),
+                needed: quantity.name(),
+                known: Unit::of(quantity),
+            });
+        }
+        scale *= unit.factor;
+    }
+    let raw = table.column(index)?;
+    Ok(if scale == 1.0 && column.offset == 0.0 {
+        raw.to_vec()
+    } else {
+        raw.iter().map(|v| v * scale + column.offset).collect()
+    })
+}
+
+/// The grid, and the time stamps themselves where the record has to be resampled.
+fn time_grid(
+    table: &Table,
+    mapping: &Mapping,
+    warnings: &mut Vec<String>,
+) -> Result<(Grid, Option<Vec<f64>>), TraceError> {
+    let mut column = mapping.time.clone();
+    if table.position(&column.column).is_none() {
+        if let Some(dt) = mapping.dt {
+            return Ok((Grid { start: 0.0, dt, sampling: Sampling::Uniform }, None));
+        }
+        if table.position("time").is_some() {
+            column = Column::named("time");
+        } else if column.is_plain() && column.column == "time" {
+            return Err(TraceError::NoTable {
+                file: table.file.clone(),
+                what: format!(
+                    "no column \"time\"; the columns are: {}. Name the column of time in [signals] of the axis file \
+                     (time = \"...\"), or give the interval there (dt = 0.001)",
+                    table.names()
+                ),
+            });
+        }
+    }
+    let time = values(table, &column, "time", Quantity::Time)?;
+    let file = table.file.clone();
+    let found = grid(&time).map_err(|e| match e {
+        NoGrid::TooShort => TraceError::TooShort { file, found: time.len(), needed: SHORTEST },
+        NoGrid::NotIncreasing { row } => {
+            TraceError::NotIncreasing { file, line: table.line(row), before: time[row - 1], after: time[row] }
+        }
+        NoGrid::Gap { row, gap, dt } => TraceError::Gap {
+            file,
+            line: table.line(row),
+            gap,
+            missing: ((gap / dt).round() as usize).saturating_sub(1).max(1),
+            dt,
+        },
+        NoGrid::Jitter { row, jitter, dt } => TraceError::Jitter {
+            file,
+            line: table.line(row),
+            jitter: 100.0 * jitter,
+            limit: 100.0 * Sampling::RESAMPLED,
+            dt,
+        },
+    })?;
+    if let Sampling::Jittered { jitter } = found.sampling {
+        warnings.push(format!(
+            "{}: the time stamps are up to {:.1} % of a sample off uniform sampling; the trace was resampled to dt = \
+             {:.9e} s. If the sampling is uniform and only its stamps are not, give dt in [signals] and leave the time \
+             column out",
+            table.file,
+            100.0 * jitter,
+            found.dt
+        ));
+        return Ok((found, Some(time)));
+    }
+    Ok((found, None))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn csv(header: &str, row: impl Fn(usize) -> String) -> Table {
+        let mut text = header.to_owned();
+        for k in 0..20 {
+            text.push('\n');
+            text.push_str(&row(k));
+        }
+        Table::parse(text.as_bytes(), "log.csv").unwrap()
+    }
+
+    #[test]
+    fn units_in_the_header_are_brought_to_si() {
+        let table = csv("time [ms],T [mN.m],theta1 [deg],x2 [um]", |k| format!("{k},250,90,{k}"));
+        let trace = from_table(&table, &Mapping::default()).unwrap().trace;
+        assert!((trace.dt() - 1e-3).abs() < 1e-15);
+        assert!((trace.get(Signal::T).unwrap()[3] - 0.25).abs() < 1e-15);
+        assert!((trace.get(Signal::Theta1).unwrap()[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        assert!((trace.get(Signal::X2).unwrap()[7] - 7e-6).abs() < 1e-18);
+    }
+
+    #[test]
+    fn a_wrong_or_unknown_unit_names_the_units_that_fit() {
+        let table = csv("time [s],T [N]", |k| format!("{k},1"));
+        let error = from_table(&table, &Mapping::default()).unwrap_err().to_string();
+        assert!(error.contains("a force") && error.contains("N.m"), "{error}");
+        let table = csv("time [s],theta1 [grads]", |k| format!("{k},1"));
+        let error = from_table(&table, &Mapping::default()).unwrap_err().to_string();
+        assert!(error.contains("[grads]") && error.contains("mrad"), "{error}");
+    }
+
+    #[test]
+    fn a_mapped_column_is_scaled_and_a_missing_one_gets_a_near_name() {
+        let table = csv("t_s,iq_meas_A,theta_motor_rad", |k| format!("{},2,{k}", 0.5 * k as f64));
+        let mut mapping = Mapping {
+            time: Column::named("t_s"),
+            signals: vec![
+                (Signal::T, Column { scale: 0.52, offset: -0.04, ..Column::named("iq_meas_A") }),
+                (Signal::Theta1, Column::named("theta_motor_rad")),
+            ],
+            ..Mapping::default()
+        };
+        let trace = from_table(&table, &mapping).unwrap().trace;
+        assert_eq!(trace.get(Signal::T).unwrap()[0], 1.0);
+        assert_eq!(trace.dt(), 0.5);
+        mapping.signals[1].1.column = "theta_moter_rad".into();
+        let error = from_table(&table, &mapping).unwrap_err().to_string();
+        assert!(error.contains("did you mean \"theta_motor_rad\""), "{error}");
+    }
+
+    #[test]
+    fn a_trace_of_our_own_is_read_with_the_axis_file_of_a_foreign_log() {
+        let table = csv("time,T,theta1", |k| format!("{k},1,2"));
+        let mapping = Mapping {
+            time: Column::named("t_s"),
+            signals: vec![(Signal::T, Column { scale: 3.0, ..Column::named("iq") })],
+            ..Mapping::default()
+        };
+        let loaded = from_table(&table, &mapping).unwrap();
+        assert_eq!(loaded.trace.get(Signal::T).unwrap()[0], 1.0);
+        assert!(!loaded.trace.has(Signal::Theta1));
+        assert_eq!(loaded.warnings.len(), 1);
+    }
+
+    #[test]
+    fn a_gap_and_a_short_trace_name_row_and_file() {
+        let table = csv("time,T", |k| format!("{},1", if k < 9 { k } else { k + 4 }));
+        let error = from_table(&table, &Mapping::default()).unwrap_err().to_string();
+        assert!(error.contains("log.csv: row 11") && error.contains("4 missing"), "{error}");
+        let table = Table::parse(b"time,T\n0,1\n1,1\n", "log.csv").unwrap();
+        assert!(from_table(&table, &Mapping::default()).unwrap_err().to_string().contains("2 samples"));
+    }
+
+    #[test]
+    fn jitter_is_resampled_with_a_warning() {
+        let stamp = |k: usize| k as f64 + if k % 2 == 1 { 0.137 } else { 0.0 };
+        let table = csv("time,T,theta1", |k| {
+            let t = if k == 19 { 19.0 } else { stamp(k) };
+            format!("{t},{k},{}", 3.0 * t)
+        });
+        let loaded = from_table(&table, &Mapping::default()).unwrap();
+        assert_eq!(loaded.warnings.len(), 1);
+        for k in 0..20 {
+            assert!((loaded.trace.get(Signal::Theta1).unwrap()[k] - 3.0 * k as f64).abs() < 1e-9);
+            assert_eq!(loaded.trace.get(Signal::T).unwrap()[k], k as f64);
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Is a record uniformly sampled, and on which grid.
+//!
+//! The grid is the line `start + k*dt` through the first and the last time stamp. Time stamps off the line by no more
+//! than the file's own rounding are uniform; by up to [`Sampling::RESAMPLED`] of an interval they are resampled; a step
+//! of 1.5 intervals or more is a gap.
+
+/// The uniform grid of a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// Interval, s.
+    pub dt: f64,
+    /// How the time stamps lie to it.
+    pub sampling: Sampling,
+}
+
+/// How a record's time stamps lie to its grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sampling {
+    /// Uniform up to rounding.
+    Uniform,
+    /// Off by at most `jitter` intervals: to be resampled.
+    Jittered {
+        /// Largest distance, in intervals.
+        jitter: f64,
+    },
+}
+
+/// Why a record has no grid. Rows are indices of samples, from 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoGrid {
+    /// Fewer than three samples.
+    TooShort,
+    /// `time[row] <= time[row - 1]`.
+    NotIncreasing {
+        /// The sample.
+        row: usize,
+    },
+    /// Samples missing before `row`.
+    Gap {
+        /// The first sample after the gap.
+        row: usize,
+        /// Its length, s.
+        gap: f64,
+        /// The usual interval, s.
+        dt: f64,
+    },
+    /// Too uneven to resample.
+    Jitter {
+        /// The worst sample.
+        row: usize,
+        /// Its distance, in intervals.
+        jitter: f64,
+        /// The usual interval, s.
+        dt: f64,
+    },
+}
+
+impl Sampling {
+    /// Distance from the grid that is still uniform, in intervals.
+    pub const UNIFORM: f64 = 1e-3;
+    /// Distance from the grid up to which a record is resampled, in intervals.
+    pub const RESAMPLED: f64 = 0.3;
+}
+
+/// The uniform grid of the time stamps (s).
+///
+/// # Errors
+/// [`NoGrid`]: too short, not increasing, a gap, or too uneven.
+pub fn grid(time: &[f64]) -> Result<Grid, NoGrid> {
+    let n = time.len();
+    if n < 3 {
+        return Err(NoGrid::TooShort);
+    }
+    let mut steps = Vec::with_capacity(n - 1);
+    for k in 1..n {
+        let step = time[k] - time[k - 1];
+        if step <= 0.0 {
+            return Err(NoGrid::NotIncreasing { row: k });
+        }
+        steps.push(step);
+    }
+    let middle = steps.len() / 2;
+    let (_, &mut usual, _) = steps.clone().select_nth_unstable_by(middle, f64::total_cmp);
+    if let Some(k) = steps.iter().position(|step| *step > 1.5 * usual) {
+        return Err(NoGrid::Gap { row: k + 1, gap: steps[k], dt: usual });
+    }
+    let start = time[0];
+    let dt = (time[n - 1] - start) / (n - 1) as f64;
+    let (row, worst) = time
+        .iter()
+        .enumerate()
+        .map(|(k, t)| (k, (t - (start + k as f64 * dt)).abs()))
+        .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+    let jitter = worst / dt;
+    let sampling = if jitter <= Sampling::UNIFORM || worst <= rounding(time) {
+        Sampling::Uniform
+    } else if jitter <= Sampling::RESAMPLED {
+        Sampling::Jittered { jitter }
+    } else {
+        return Err(NoGrid::Jitter { row, jitter, dt: usual });
+    };
+    Ok(Grid { start, dt, sampling })
+}
+
+/// How far from uniform the time stamps may lie through being written with few decimals: one unit of the last decimal
+/// (half for the stamp, half for the ends of the line); zero where they are not multiples of a power of ten.
+fn rounding(time: &[f64]) -> f64 {
+    for decimals in 0..=9 {
+        let scale = 10f64.powi(decimals);
+        if time.iter().all(|t| {
+            let scaled = t * scale;
+            (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1.0)
+        }) {
+            return 1.0001 / scale;
+        }
+    }
+    0.0
+}
+
+/// Values of a smooth signal on the grid, by the cubic through the four samples around each grid time (Lagrange).
+///
+/// `time` and `values` have the same length, at least four; the time stamps lie within half an interval of the grid.
+#[must_use]
+pub fn resample(time: &[f64], values: &[f64], grid: &Grid) -> Vec<f64> {
+    let n = time.len();
+    (0..n)
+        .map(|k| {
+            let t = grid.start + k as f64 * grid.dt;
+            let below = if time[k] <= t { k } else { k.saturating_sub(1) };
+            let first = below.saturating_sub(1).min(n.saturating_sub(4));
+            let points = first..(first + 4).min(n);
+            let mut sum = 0.0;
+            for i in points.clone() {
+                let mut weight = 1.0;
+                for j in points.clone() {
+                    if i != j {
+                        weight *= (t - time[j]) / (time[i] - time[j]);
+                    }
+                }
+                sum += weight * values[i];
+            }
+            sum
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_written_with_few_decimals_is_still_uniform() {
+        let dt = 5.626e-4;
+        let time: Vec<f64> = (0..500).map(|k| (f64::from(k) * dt * 1e5).round() / 1e5).collect();
+        let found = grid(&time).unwrap();
+        assert_eq!(found.sampling, Sampling::Uniform);
+        assert!((found.dt - dt).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_gap_names_the_sample_after_it() {
+        let mut time: Vec<f64> = (0..100).map(|k| f64::from(k) * 0.01).collect();
+        time.drain(40..43);
+        match grid(&time) {
+            Err(NoGrid::Gap { row, gap, .. }) => {
+                assert_eq!(row, 40);
+                assert!((gap - 0.04).abs() < 1e-12);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn time_that_stands_still_is_refused() {
+        assert_eq!(grid(&[0.0, 1.0, 1.0, 2.0]), Err(NoGrid::NotIncreasing { row: 2 }));
+    }
+
+    #[test]
+    fn a_cubic_is_resampled_exactly() {
+        let time: Vec<f64> = (0..50).map(|k| f64::from(k) + 0.2 * f64::from(k * 7 % 5 - 2) / 2.0).collect();
+        let mut time = time;
+        (time[0], time[49]) = (0.0, 49.0);
+        let cubic = |t: f64| 1.0 - t + 0.3 * t * t - 0.01 * t * t * t;
+        let values: Vec<f64> = time.iter().map(|t| cubic(*t)).collect();
+        let found = grid(&time).unwrap();
+        assert!(matches!(found.sampling, Sampling::Jittered { .. }), "{found:?}");
+        for (k, value) in resample(&time, &values, &found).into_iter().enumerate() {
+            assert!((value - cubic(k as f64)).abs() < 1e-9, "{k}");
+        }
+    }
+}

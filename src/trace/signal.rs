@@ -1,0 +1,180 @@
+//! The signals of the axis by the seed paper's names, and the quantity each one is.
+
+use serde::{Deserialize, Serialize};
+
+/// Whether the axis is described in rotary units (kg.m2, rad, N.m) or by the paper's linear analogue (kg, m, N).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Motion {
+    /// Inertias in kg.m2, angles in rad, torques in N.m.
+    #[default]
+    Rotary,
+    /// Masses in kg, positions in m, forces in N.
+    Linear,
+}
+
+/// A physical quantity, as far as a trace needs to tell one unit from another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// s
+    Time,
+    /// N.m
+    Torque,
+    /// N
+    Force,
+    /// rad
+    Angle,
+    /// m
+    Length,
+    /// rad/s
+    AngularVelocity,
+    /// m/s
+    Velocity,
+    /// rad/s2
+    AngularAcceleration,
+    /// m/s2
+    Acceleration,
+    /// A, V or %: a drive signal in proportion to the torque, its constant unknown
+    Drive,
+}
+
+/// A signal of the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Signal {
+    /// Driving torque (force) on the motor side.
+    T,
+    /// Motor angle.
+    #[serde(rename = "theta1")]
+    Theta1,
+    /// Motor speed.
+    #[serde(rename = "omega1")]
+    Omega1,
+    /// Motor acceleration.
+    #[serde(rename = "alpha1")]
+    Alpha1,
+    /// Table angle.
+    #[serde(rename = "theta2")]
+    Theta2,
+    /// Table speed.
+    #[serde(rename = "omega2")]
+    Omega2,
+    /// Table acceleration.
+    #[serde(rename = "alpha2")]
+    Alpha2,
+    /// Table position, `x2 = rho*theta2`.
+    #[serde(rename = "x2")]
+    X2,
+}
+
+impl Signal {
+    /// How many signals there are.
+    pub const COUNT: usize = 8;
+
+    /// All signals, in the order of a trace file.
+    pub const ALL: [Self; Self::COUNT] =
+        [Self::T, Self::Theta1, Self::Omega1, Self::Alpha1, Self::Theta2, Self::Omega2, Self::Alpha2, Self::X2];
+
+    /// Position in [`Signal::ALL`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The name in files and in the FMU.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::T => "T",
+            Self::Theta1 => "theta1",
+            Self::Omega1 => "omega1",
+            Self::Alpha1 => "alpha1",
+            Self::Theta2 => "theta2",
+            Self::Omega2 => "omega2",
+            Self::Alpha2 => "alpha2",
+            Self::X2 => "x2",
+        }
+    }
+
+    /// The signal of a name, as it is written in files.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|s| s.name() == name)
+    }
+
+    /// What the signal measures.
+    #[must_use]
+    pub const fn quantity(self, motion: Motion) -> Quantity {
+        match (self, motion) {
+            (Self::T, Motion::Rotary) => Quantity::Torque,
+            (Self::T, Motion::Linear) => Quantity::Force,
+            (Self::Theta1 | Self::Theta2, Motion::Rotary) => Quantity::Angle,
+            (Self::Theta1 | Self::Theta2, Motion::Linear) | (Self::X2, _) => Quantity::Length,
+            (Self::Omega1 | Self::Omega2, Motion::Rotary) => Quantity::AngularVelocity,
+            (Self::Omega1 | Self::Omega2, Motion::Linear) => Quantity::Velocity,
+            (Self::Alpha1 | Self::Alpha2, Motion::Rotary) => Quantity::AngularAcceleration,
+            (Self::Alpha1 | Self::Alpha2, Motion::Linear) => Quantity::Acceleration,
+        }
+    }
+
+    /// The SI unit of the signal.
+    #[must_use]
+    pub const fn unit(self, motion: Motion) -> &'static str {
+        self.quantity(motion).unit()
+    }
+}
+
+impl Quantity {
+    /// The SI unit of the quantity, as written in the brackets of a trace's header.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Time => "s",
+            Self::Torque => "N.m",
+            Self::Force => "N",
+            Self::Angle => "rad",
+            Self::Length => "m",
+            Self::AngularVelocity => "rad/s",
+            Self::Velocity => "m/s",
+            Self::AngularAcceleration => "rad/s2",
+            Self::Acceleration => "m/s2",
+            Self::Drive => "A, V or %",
+        }
+    }
+
+    /// What the quantity is called in a message.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Time => "a time",
+            Self::Torque => "a torque",
+            Self::Force => "a force",
+            Self::Angle => "an angle",
+            Self::Length => "a length",
+            Self::AngularVelocity => "an angular velocity",
+            Self::Velocity => "a velocity",
+            Self::AngularAcceleration => "an angular acceleration",
+            Self::Acceleration => "an acceleration",
+            Self::Drive => "a drive signal",
+        }
+    }
+}
+
+impl std::fmt::Display for Signal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_signal_is_found_by_its_name_and_stands_at_its_index() {
+        for (k, signal) in Signal::ALL.into_iter().enumerate() {
+            assert_eq!(signal.index(), k);
+            assert_eq!(Signal::from_name(signal.name()), Some(signal));
+            assert_eq!(serde_json::to_string(&signal).unwrap(), format!("\"{}\"", signal.name()));
+        }
+    }
+}
