@@ -1,1 +1,3 @@
-//! Identification: regressors, estimators, modal parameters, excitation estimate.
+//! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
+
+pub mod levenberg;

@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use super::signal::Quantity;
+use super::units::Unit;
+
 /// A trace, or its file, that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -66,7 +69,7 @@ pub enum TraceError {
         /// The file.
         file: String,
         /// The signal (or time) that needs it.
-        signal: String,
+        signal: &'static str,
         /// The column's name.
         wanted: String,
         /// The nearest name, when one is near.
@@ -87,7 +90,7 @@ pub enum TraceError {
         second: usize,
     },
     /// The unit in a header is not known.
-    #[error("{file}: column {column}: the unit [{unit}] is not known; for {signal} use one of {known}")]
+    #[error("{file}: column {column}: the unit [{unit}] is not known; for {signal} use one of {}", Unit::of(*needed))]
     UnknownUnit {
         /// The file.
         file: String,
@@ -96,14 +99,15 @@ pub enum TraceError {
         /// The unit as written.
         unit: String,
         /// The signal.
-        signal: String,
-        /// The units that fit.
-        known: String,
+        signal: &'static str,
+        /// What it measures.
+        needed: Quantity,
     },
     /// The unit in a header measures something else.
     #[error(
-        "{file}: column {column}: [{unit}] is {is}, but {signal} is {needed}; use one of {known}, or check [units] \
-         motion and [signals] of the axis file"
+        "{file}: column {column}: [{unit}] is {}, but {signal} is {}; use one of {}, or check [units] motion and \
+         [signals] of the axis file",
+        is.name(), needed.name(), Unit::of(*needed)
     )]
     WrongUnit {
         /// The file.
@@ -113,13 +117,11 @@ pub enum TraceError {
         /// The unit as written.
         unit: String,
         /// What it measures.
-        is: &'static str,
+        is: Quantity,
         /// The signal.
-        signal: String,
+        signal: &'static str,
         /// What it should measure.
-        needed: &'static str,
-        /// The units that fit.
-        known: String,
+        needed: Quantity,
     },
     /// Time runs backwards or stands still.
     #[error(

@@ -134,10 +134,10 @@ fn wanted(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Resul
     Ok(mapping.signals.clone())
 }
 
-fn missing(table: &Table, signal: &str, wanted: &str) -> TraceError {
+fn missing(table: &Table, signal: &'static str, wanted: &str) -> TraceError {
     TraceError::MissingColumn {
         file: table.file.clone(),
-        signal: signal.to_owned(),
+        signal,
         wanted: wanted.to_owned(),
         hint: nearest(wanted, table.headers.iter().map(|h| h.name.as_str())),
         present: table.names(),
@@ -145,7 +145,7 @@ fn missing(table: &Table, signal: &str, wanted: &str) -> TraceError {
 }
 
 /// The values of a column in SI units, scaled.
-fn values(table: &Table, column: &Column, signal: &str, quantity: Quantity) -> Result<Vec<f64>, TraceError> {
+fn values(table: &Table, column: &Column, signal: &'static str, quantity: Quantity) -> Result<Vec<f64>, TraceError> {
     let index = table.position(&column.column).ok_or_else(|| missing(table, signal, &column.column))?;
     let mut scale = column.scale;
     if let Some(text) = table.headers[index].unit.as_ref().or(column.unit.as_ref()) {
@@ -153,8 +153,8 @@ fn values(table: &Table, column: &Column, signal: &str, quantity: Quantity) -> R
             file: table.file.clone(),
             column: column.column.clone(),
             unit: text.clone(),
-            signal: signal.to_owned(),
-            known: Unit::of(quantity),
+            signal,
+            needed: quantity,
         })?;
         let drives = matches!(quantity, Quantity::Torque | Quantity::Force) && unit.quantity == Quantity::Drive;
         if unit.quantity != quantity && !drives {
@@ -162,10 +162,9 @@ fn values(table: &Table, column: &Column, signal: &str, quantity: Quantity) -> R
                 file: table.file.clone(),
                 column: column.column.clone(),
                 unit: text.clone(),
-                is: unit.quantity.name(),
-                signal: signal.to_owned(),
-                needed: quantity.name(),
-                known: Unit::of(quantity),
+                is: unit.quantity,
+                signal,
+                needed: quantity,
             });
         }
         scale *= unit.factor;
