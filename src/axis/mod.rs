@@ -1,1 +1,28 @@
-//! The two-inertia axis: parameters, state and the Newmark step.
+//! The drive axis: two inertias joined by a spring and a damper, stepped in time.
+//!
+//! ```text
+//! I1*a1 + B*(w1 - w2) + K*(th1 - th2) = T     motor and screw     (paper, eq. 2)
+//! I2*a2 - B*(w1 - w2) - K*(th1 - th2) = 0     table
+//! x2 = rho*th2                                table position
+//! ```
+//!
+//! Effects of [`crate::effects`] add forces to either row, and change the torque on its way in and the positions on
+//! their way out. The linear analogue (kg, N, m) is the same model in other units.
+
+mod axis_model;
+mod criterion;
+mod oscillator;
+mod parameters;
+mod propagator;
+mod simulate;
+mod step;
+
+pub use axis_model::{Axis, Motions, State};
+pub use criterion::{dt_criterion, period_elongation};
+pub use oscillator::Scheme;
+pub use parameters::{Modal, ParameterError, Parameters, PhysicalData, Structure};
+pub use propagator::Propagator;
+pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps};
+
+#[cfg(test)]
+mod tests;

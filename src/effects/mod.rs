@@ -1,1 +1,165 @@
-//! The unmodelled effects: one ordered, append-only list.
+//! The effects a nominal axis leaves out: one ordered, append-only list.
+//!
+//! An effect is a type with an [`EffectInfo`] and the physics of its shape: [`DryFriction`] gives the level of a
+//! set-valued friction force, [`Force`] a torque with its tangent from the motion, [`Input`] changes the torque on its
+//! way to the motor, [`Sensor`] the positions on their way to the log. **A new effect is one new file and one new line
+//! in [the list](EFFECTS).** Everything else (the FMU's parameters, `--set`, the diagnosis, the documentation, the
+//! tests every effect must pass) iterates the list.
+
+mod backlash;
+mod coulomb;
+mod coupling_hysteresis;
+mod cubic_stiffness;
+mod disturbance;
+mod drift;
+mod end_stop;
+mod flexible_mode;
+mod info;
+mod input;
+mod load;
+mod presliding;
+mod quadratic_drag;
+mod ripple;
+mod sensor;
+mod settings;
+mod shapes;
+mod viscous;
+
+pub use info::{EffectInfo, Family, ParameterInfo, Place, Role};
+pub use input::{Ramp, TorqueHistory};
+pub use sensor::{Reading, SensorHistory};
+pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
+pub(crate) use settings::{MEMORY, StepMotion};
+pub use shapes::{Base, DryFriction, Force, Input, Moment, Motion, Reaction, Sensor};
+
+use crate::scalar::Scalar;
+
+/// Helper of the list: the call where the shape has it, else the other value.
+macro_rules! when {
+    (dry, dry, $call:expr, $other:expr) => {
+        $call
+    };
+    (force, force, $call:expr, $other:expr) => {
+        $call
+    };
+    (input, input, $call:expr, $other:expr) => {
+        $call
+    };
+    (sensor, sensor, $call:expr, $other:expr) => {
+        $call
+    };
+    ($wanted:ident, $shape:ident, $call:expr, $other:expr) => {
+        $other
+    };
+}
+
+macro_rules! effects {
+    ($($shape:ident $name:ident = $law:ty;)*) => {
+        /// An effect of the list.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[repr(u8)]
+        pub enum Effect {
+            $(#[doc = concat!("See [`", stringify!($law), "`].")] $name,)*
+        }
+
+        /// The list itself, in order.
+        pub const EFFECTS: &[Effect] = &[$(Effect::$name,)*];
+
+        impl Effect {
+            /// What the effect is: id, place, family, parameters, reference.
+            #[must_use]
+            pub const fn info(self) -> &'static EffectInfo {
+                match self {
+                    $(Self::$name => &<$law>::INFO,)*
+                }
+            }
+
+            /// True for a set-valued friction.
+            #[must_use]
+            pub const fn is_dry(self) -> bool {
+                match self { $(Self::$name => when!(dry, $shape, true, false),)* }
+            }
+
+            /// True for a force from the motion.
+            #[must_use]
+            pub const fn is_force(self) -> bool {
+                match self { $(Self::$name => when!(force, $shape, true, false),)* }
+            }
+
+            /// True for an effect on the torque's way in.
+            #[must_use]
+            pub const fn is_input(self) -> bool {
+                match self { $(Self::$name => when!(input, $shape, true, false),)* }
+            }
+
+            /// True for an effect on the positions' way out.
+            #[must_use]
+            pub const fn is_sensor(self) -> bool {
+                match self { $(Self::$name => when!(sensor, $shape, true, false),)* }
+            }
+
+            #[inline]
+            fn level<S: Scalar>(self, p: &[S], direction: f64, speed: S, at: f64) -> (S, f64) {
+                match self {
+                    $(Self::$name => when!(dry, $shape, <$law>::level(p, direction, speed, at), (S::default(), 0.0)),)*
+                }
+            }
+
+            #[inline]
+            fn torque<S: Scalar>(self, p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
+                match self {
+                    $(Self::$name => when!(
+                        force, $shape, <$law>::torque(p, base, moment, memory), Reaction::default()
+                    ),)*
+                }
+            }
+
+            fn transform_input<S: Scalar>(self, p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
+                match self {
+                    $(Self::$name => when!(input, $shape, <$law>::transform(p, ramp, h, history), ramp),)*
+                }
+            }
+
+            fn transform_sensor<S: Scalar>(
+                self,
+                p: &[S],
+                reading: Reading<S>,
+                history: &SensorHistory<S>,
+                dt: f64,
+            ) -> Reading<S> {
+                match self {
+                    $(Self::$name => when!(sensor, $shape, <$law>::transform(p, reading, history, dt), reading),)*
+                }
+            }
+        }
+    };
+}
+
+effects! {
+    dry CoulombMotor = coulomb::CoulombMotor;
+    dry CoulombTable = coulomb::CoulombTable;
+    force PreslidingMotor = presliding::PreslidingMotor;
+    force PreslidingTable = presliding::PreslidingTable;
+    force ViscousMotor = viscous::ViscousMotor;
+    force ViscousTable = viscous::ViscousTable;
+    force LoadMotor = load::LoadMotor;
+    force LoadTable = load::LoadTable;
+    force TorqueRipple = ripple::TorqueRipple;
+    force Backlash = backlash::Backlash;
+    force CubicStiffness = cubic_stiffness::CubicStiffness;
+    force CouplingHysteresis = coupling_hysteresis::CouplingHysteresis;
+    force StiffnessDrift = drift::StiffnessDrift;
+    dry FrictionDrift = drift::FrictionDrift;
+    force FlexibleMode = flexible_mode::FlexibleMode;
+    force Disturbance = disturbance::Disturbance;
+    force Unbalance = ripple::Unbalance;
+    force QuadraticDrag = quadratic_drag::QuadraticDrag;
+    force EndStop = end_stop::EndStop;
+    input TorqueGain = input::TorqueGain;
+    input Saturation = input::Saturation;
+    input Delay = input::Delay;
+    input ActuatorLag = input::ActuatorLag;
+    sensor SensorDelay = sensor::SensorDelay;
+    sensor LeadError = sensor::LeadError;
+    sensor EncoderQuantisation = sensor::EncoderQuantisation;
+}

@@ -1,0 +1,176 @@
+//! The axis ready to step, and its state.
+
+use super::oscillator::Scheme;
+use super::parameters::{Parameters, Structure};
+use super::propagator::{Compliance, Linear, Propagator};
+use crate::effects::{ActiveEffects, Base, Effect, Memory, Reading, Settings};
+use crate::scalar::Scalar;
+
+/// The axis with its effects, prepared for steps of one length.
+#[derive(Debug, Clone, Copy)]
+pub struct Axis<S = f64> {
+    pub(super) parameters: Parameters<S>,
+    pub(super) structure: Structure,
+    pub(super) scheme: Scheme,
+    pub(super) effects: Settings<S>,
+    pub(super) on: ActiveEffects,
+    pub(super) step: Propagator<S>,
+    pub(super) compliance: Compliance,
+    pub(super) base: Base<S>,
+}
+
+impl<S: Scalar> Axis<S> {
+    /// Prepares the axis for steps of `h` seconds.
+    pub fn new(parameters: Parameters<S>, structure: Structure, effects: Settings<S>, scheme: Scheme, h: f64) -> Self {
+        Self::with_active(parameters, structure, effects, effects.active(), scheme, h)
+    }
+
+    /// The same with some effects taken as on whatever their size, so that derivatives at the off value exist.
+    pub fn with_on(
+        parameters: Parameters<S>,
+        structure: Structure,
+        effects: Settings<S>,
+        also: &[Effect],
+        scheme: Scheme,
+        h: f64,
+    ) -> Self {
+        Self::with_active(parameters, structure, effects, effects.active_with(also), scheme, h)
+    }
+
+    fn with_active(
+        parameters: Parameters<S>,
+        structure: Structure,
+        effects: Settings<S>,
+        on: ActiveEffects,
+        scheme: Scheme,
+        h: f64,
+    ) -> Self {
+        let step = Propagator::new(&parameters, structure, scheme, h.into());
+        let base = match structure {
+            Structure::TwoInertia => Base { k: parameters.k, b: parameters.b },
+            // A rigid axis has no coupling for an effect to act on.
+            Structure::Rigid => Base { k: S::default(), b: S::default() },
+        };
+        Self { parameters, structure, scheme, effects, on, step, compliance: step.compliance(), base }
+    }
+
+    /// The parameters.
+    pub fn parameters(&self) -> &Parameters<S> {
+        &self.parameters
+    }
+
+    /// The effects.
+    pub fn effects(&self) -> &Settings<S> {
+        &self.effects
+    }
+
+    /// Which effects act.
+    pub fn on(&self) -> &ActiveEffects {
+        &self.on
+    }
+
+    /// Length of a step, s.
+    pub fn h(&self) -> f64 {
+        self.step.h().re()
+    }
+
+    /// The state with these angles and speeds at `time`, everything else at rest.
+    pub fn state(&self, theta1: S, omega1: S, theta2: S, omega2: S, time: f64) -> State<S> {
+        let linear = match self.structure {
+            Structure::TwoInertia => [theta1, omega1, theta1 - theta2, omega1 - omega2],
+            Structure::Rigid => [theta1, omega1, S::default(), S::default()],
+        };
+        let mut state = State {
+            linear,
+            friction: [S::default(); 2],
+            force: [S::default(); 2],
+            memory: [S::default(); crate::effects::MEMORY],
+            dry: [0; 2],
+            contact: 0,
+        };
+        state.dry = [mode(state.omega1()), mode(state.omega2())];
+        self.settle_contact(&mut state);
+        self.refresh_force(&mut state, time);
+        state
+    }
+
+    /// Accelerations `[alpha1, alpha2]` under the torque `torque` on the motor, rad/s2 (paper, eq. 2).
+    pub fn accelerations(&self, s: &State<S>, torque: S) -> [S; 2] {
+        let motor = torque - s.force[0] - s.friction[0];
+        let table = -s.force[1] - s.friction[1];
+        match self.structure {
+            Structure::Rigid => {
+                let a = (motor + table) / (self.parameters.i1 + self.parameters.i2);
+                [a, a]
+            }
+            Structure::TwoInertia => {
+                let coupling = self.parameters.k * s.linear[2] + self.parameters.b * s.linear[3];
+                [(motor - coupling) / self.parameters.i1, (table + coupling) / self.parameters.i2]
+            }
+        }
+    }
+}
+
+fn mode<S: Scalar>(v: S) -> i8 {
+    if v.re() > 0.0 {
+        1
+    } else if v.re() < 0.0 {
+        -1
+    } else {
+        0
+    }
+}
+
+/// Motion of motor, table and twist.
+pub type Motions<S> = [crate::effects::Motion<S>; 3];
+
+/// Everything that the axis remembers from one step to the next; `Copy`, so that a rollback is a copy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State<S = f64> {
+    /// `[theta1, omega1, twist, twist rate]`.
+    pub(super) linear: Linear<S>,
+    /// Dry friction while it sticks, N.m.
+    pub(super) friction: [S; 2],
+    /// Torques of the effects at this state, N.m.
+    pub(super) force: [S; 2],
+    /// Internal states of the effects.
+    pub(super) memory: Memory<S>,
+    /// Dry friction of motor and table: -1 or +1 sliding that way, 0 sticking.
+    pub(super) dry: [i8; 2],
+    /// Backlash: -1 or +1 in contact at that side, 0 in the gap.
+    pub(super) contact: i8,
+}
+
+impl<S: Scalar> State<S> {
+    /// Angle of the motor, rad.
+    pub fn theta1(&self) -> S {
+        self.linear[0]
+    }
+    /// Speed of the motor, rad/s.
+    pub fn omega1(&self) -> S {
+        self.linear[1]
+    }
+    /// Angle of the table side, rad.
+    pub fn theta2(&self) -> S {
+        self.linear[0] - self.linear[2]
+    }
+    /// Speed of the table side, rad/s.
+    pub fn omega2(&self) -> S {
+        self.linear[1] - self.linear[3]
+    }
+    /// All four, as an encoder without effects reads them.
+    pub fn reading(&self) -> Reading<S> {
+        Reading { theta1: self.theta1(), omega1: self.omega1(), theta2: self.theta2(), omega2: self.omega2() }
+    }
+    /// Internal states of the effects.
+    pub fn memory(&self) -> &Memory<S> {
+        &self.memory
+    }
+    /// The same motion with the effects' internal states and discrete modes of another state.
+    #[must_use]
+    pub fn with_internals_of(mut self, other: &Self) -> Self {
+        self.memory = other.memory;
+        self.contact = other.contact;
+        self
+    }
+}

@@ -1,0 +1,42 @@
+//! Backlash: a dead zone of the spring; in the gap nothing, in contact the spring and damper, and contact cannot pull.
+//!
+//! With `d` the twist and `g` the half gap: force zero while `|d| < g`; at the side `s = +-1`,
+//! `K*(d - s*g) + B*d'`, released when it would pull. The side is a discrete state that the step locates in time
+//! ([`Moment::contact`]); here is the force of a given side, less the `K*d + B*d'` that the linear axis already has.
+//! Nordin, Gutman, Automatica 38(10), 2002 (the physical model of backlash).
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// Backlash of the coupling.
+pub struct Backlash;
+
+impl Force for Backlash {
+    const INFO: EffectInfo = EffectInfo {
+        id: "backlash",
+        place: Place::Coupling,
+        family: Family::Backlash,
+        title: "Play in coupling or nut: a dead zone of the spring; contact cannot pull",
+        equation: "f = max(0, K*(d - g) + B*d') at d > g, mirrored at d < -g, else 0",
+        reference: "Nordin, Gutman, Automatica 38(10), 2002",
+        parameters: &[
+            ParameterInfo::size("half_gap", "rad", 0.0, 1e3, "Half of the play, on the motor side").nominal(1e-3)
+        ],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        if p[0].re() <= 0.0 {
+            // The derivative at a closed gap: the dead zone grows on the side that is in contact.
+            let side = if m.end.x.re() < 0.0 { -1.0 } else { 1.0 };
+            return Reaction { torque: -(base.k * p[0] * side), ..Reaction::default() };
+        }
+        if m.contact == 0 {
+            Reaction { torque: -(base.k * m.end.x + base.b * m.end.v), stiffness: -base.k.re(), damping: -base.b.re() }
+        } else {
+            Reaction { torque: -(base.k * p[0] * f64::from(m.contact)), ..Reaction::default() }
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Cubic stiffness: the spring is `K*(d + k3*d^3)`, hardening (`k3 > 0`) or softening.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// Cubic stiffness of the coupling.
+pub struct CubicStiffness;
+
+impl Force for CubicStiffness {
+    const INFO: EffectInfo = EffectInfo {
+        id: "cubic_stiffness",
+        place: Place::Coupling,
+        family: Family::NonlinearStiffness,
+        title: "A spring that hardens or softens with the twist",
+        equation: "f = K*k3*d^3",
+        reference: "Kovacic, Brennan, The Duffing Equation, Wiley 2011",
+        parameters: &[ParameterInfo::size("k3", "1/rad2", -1e9, 1e9, "Cubic term as a share of K").nominal(1.0)],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        let k3 = base.k * p[0];
+        let square = m.end.x.squared();
+        Reaction { torque: k3 * square * m.end.x, stiffness: 3.0 * k3.re() * square.re(), damping: 0.0 }
+    }
+}

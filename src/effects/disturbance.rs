@@ -1,0 +1,33 @@
+//! An external torque on the table at a fixed frequency: chatter, a neighbouring machine.
+
+use std::f64::consts::TAU;
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// A periodic torque from outside.
+pub struct Disturbance;
+
+impl Force for Disturbance {
+    const INFO: EffectInfo = EffectInfo {
+        id: "disturbance",
+        place: Place::Table,
+        family: Family::Disturbance,
+        title: "External periodic torque on the table at a fixed frequency",
+        equation: "f = -amplitude*sin(2*pi*frequency*t + phase)",
+        reference: "Bodson, Douglas, Automatica 33(12), 1997",
+        parameters: &[
+            ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude of the torque").nominal(1e-2),
+            ParameterInfo::shape("frequency", "Hz", 10.0, 1e-6, 1e6, "Frequency of the torque"),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at time zero"),
+        ],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        let angle = p[1] * (TAU * m.time) + p[2];
+        Reaction { torque: -(p[0] * angle.sin()), ..Reaction::default() }
+    }
+}

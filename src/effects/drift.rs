@@ -1,0 +1,52 @@
+//! Slow changes over the record: warming, wear.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, DryFriction, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// Drift of the coupling's stiffness: `K*(1 + rate*t)`.
+pub struct StiffnessDrift;
+
+impl Force for StiffnessDrift {
+    const INFO: EffectInfo = EffectInfo {
+        id: "stiffness_drift",
+        place: Place::Coupling,
+        family: Family::Drift,
+        title: "A stiffness that changes slowly over the record",
+        equation: "f = K*rate*t*d",
+        reference: "First-order term of any slow change of K",
+        parameters: &[ParameterInfo::size("rate", "1/s", -1e3, 1e3, "Relative change of K per second").nominal(1e-2)],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        let k = base.k * p[0] * m.time;
+        Reaction { torque: k * m.end.x, stiffness: k.re(), damping: 0.0 }
+    }
+}
+
+/// Drift of the motor's friction: a level and a viscous coefficient that grow from zero with time.
+pub struct FrictionDrift;
+
+impl DryFriction for FrictionDrift {
+    const INFO: EffectInfo = EffectInfo {
+        id: "friction_drift",
+        place: Place::Motor,
+        family: Family::Drift,
+        title: "A friction of the motor that changes slowly over the record",
+        equation: "f = sgn(v)*(level_rate*t + viscous_rate*t*|v|)",
+        reference: "First-order term of any slow change of friction",
+        parameters: &[
+            ParameterInfo::size("level_rate", "N.m/s", -1e6, 1e6, "Change of the Coulomb level per second")
+                .nominal(1e-3),
+            ParameterInfo::size("viscous_rate", "N.m/rad", -1e6, 1e6, "Change of the viscous coefficient per second")
+                .nominal(1e-4),
+        ],
+        memory: 0,
+    };
+
+    fn level<S: Scalar>(p: &[S], _direction: f64, speed: S, at: f64) -> (S, f64) {
+        ((p[0] + p[1] * speed) * at, p[1].re() * at)
+    }
+}

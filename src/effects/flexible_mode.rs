@@ -1,0 +1,60 @@
+//! A third inertia on a spring and a damper behind the table.
+//!
+//! `I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0`; the table feels the spring. The third inertia is condensed
+//! out of the step: trapezoidal rule for it alone, driven by the trial motion of the table.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// A flexible mode behind the table.
+///
+/// Memory: twist `th2 - th3` and its rate, relative so that a turning axis loses no digits.
+pub struct FlexibleMode;
+
+impl Force for FlexibleMode {
+    const INFO: EffectInfo = EffectInfo {
+        id: "flexible_mode",
+        place: Place::Table,
+        family: Family::FlexibleMode,
+        title: "A third inertia on a spring behind the table",
+        equation: "I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0; f = damping*(w2 - w3) + stiffness*(th2 - th3)",
+        reference: "Den Hartog, Mechanical Vibrations, 1956, chapter 3",
+        parameters: &[
+            ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia behind the table").nominal(1e-6),
+            ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the table and it"),
+            ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the table and it"),
+        ],
+        memory: 3,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
+        let (inertia, k, b) = (p[0], p[1], p[2]);
+        if inertia.re() <= 0.0 && m.h.re() == 0.0 {
+            return Reaction::default();
+        }
+        // Absolute motion of the third inertia, from the relative memory.
+        let (e, rate) = (memory[0], memory[1]);
+        if m.h.re() == 0.0 {
+            return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re() };
+        }
+        let half = m.h * 0.5;
+        let w3 = m.start.v - rate;
+        // Trapezoid: w3+ = w3 + h/2*(a3 + a3+), e+ = e + (x2+ - x2) - h/2*(w3 + w3+), I3*a3 = b*(w2 - w3) + k*(th2 - th3).
+        let a3 = memory[2];
+        let free = w3 + half * a3;
+        let dx = m.end.x - m.start.x;
+        // I3*a3+ = b*(v2+ - w3+) + k*(e + dx - half*(w3 + w3+)), w3+ = free + half*a3+.
+        let rhs = b * (m.end.v - free) + k * (e + dx - half * (w3 + free));
+        let effective = inertia + half * b + half * half * k;
+        let a = rhs / effective;
+        let w = free + half * a;
+        let torque = inertia * a;
+        memory[0] = e + dx - half * (w3 + w);
+        memory[1] = m.end.v - w;
+        memory[2] = a;
+        let ratio = inertia.re() / effective.re();
+        Reaction { torque, stiffness: ratio * k.re(), damping: ratio * b.re() }
+    }
+}

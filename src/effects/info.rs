@@ -1,0 +1,162 @@
+//! What is known of an effect without running it.
+
+/// The place in the chain where an effect acts.
+///
+/// ```text
+/// command --> [input] --> T --> [motor: I1] == [coupling: K, B] == [table: I2] --> [sensor] --> trace
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Place {
+    /// Between the command and the torque on the motor.
+    Input,
+    /// On the motor's inertia.
+    Motor,
+    /// Between the two inertias, equal and opposite.
+    Coupling,
+    /// On the table's inertia.
+    Table,
+    /// Between the motion and the log.
+    Sensor,
+}
+
+impl Place {
+    /// All places, in the order of the chain.
+    pub const ALL: [Self; 5] = [Self::Input, Self::Motor, Self::Coupling, Self::Table, Self::Sensor];
+
+    /// The name used in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Input => "input",
+            Self::Motor => "motor",
+            Self::Coupling => "coupling",
+            Self::Table => "table",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
+/// Effects of one kind, whatever their place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum Family {
+    DryFriction,
+    ViscousFriction,
+    LoadTorque,
+    TorqueRipple,
+    Backlash,
+    NonlinearStiffness,
+    Hysteresis,
+    Drift,
+    FlexibleMode,
+    Disturbance,
+    EndStop,
+    Saturation,
+    ActuatorLag,
+    Delay,
+    Parameters,
+    Sensor,
+}
+
+impl Family {
+    /// The name used in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::DryFriction => "dry_friction",
+            Self::ViscousFriction => "viscous_friction",
+            Self::LoadTorque => "load_torque",
+            Self::TorqueRipple => "torque_ripple",
+            Self::Backlash => "backlash",
+            Self::NonlinearStiffness => "nonlinear_stiffness",
+            Self::Hysteresis => "hysteresis",
+            Self::Drift => "drift",
+            Self::FlexibleMode => "flexible_mode",
+            Self::Disturbance => "disturbance",
+            Self::EndStop => "end_stop",
+            Self::Saturation => "saturation",
+            Self::ActuatorLag => "actuator_lag",
+            Self::Delay => "delay",
+            Self::Parameters => "parameters",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
+/// Whether a parameter makes the effect, or shapes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The effect is on when any of its sizes differs from its off value.
+    Size,
+    /// Means nothing while the effect is off.
+    Shape,
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterInfo {
+    /// Name, unique in its effect; the FMU's name is `effect.parameter`.
+    pub name: &'static str,
+    /// Unit of the rotary axis.
+    pub unit: &'static str,
+    /// Size or shape.
+    pub role: Role,
+    /// The start value: for a size, the value that means the effect is off.
+    pub off: f64,
+    /// Smallest value allowed.
+    pub min: f64,
+    /// Largest value allowed.
+    pub max: f64,
+    /// A typical magnitude.
+    pub nominal: f64,
+    /// One sentence.
+    pub doc: &'static str,
+}
+
+impl ParameterInfo {
+    /// A size whose off value is zero.
+    #[must_use]
+    pub const fn size(name: &'static str, unit: &'static str, min: f64, max: f64, doc: &'static str) -> Self {
+        Self { name, unit, role: Role::Size, off: 0.0, min, max, nominal: 1.0, doc }
+    }
+
+    /// A shape with its start value.
+    #[must_use]
+    pub const fn shape(
+        name: &'static str,
+        unit: &'static str,
+        start: f64,
+        min: f64,
+        max: f64,
+        doc: &'static str,
+    ) -> Self {
+        Self { name, unit, role: Role::Shape, off: start, min, max, nominal: 1.0, doc }
+    }
+
+    /// The same with another typical magnitude.
+    #[must_use]
+    pub const fn nominal(self, nominal: f64) -> Self {
+        Self { nominal, ..self }
+    }
+}
+
+/// What an effect is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectInfo {
+    /// Name used in files and on the command line.
+    pub id: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// Its kind.
+    pub family: Family,
+    /// One sentence for people.
+    pub title: &'static str,
+    /// Its equation, as text.
+    pub equation: &'static str,
+    /// Literature.
+    pub reference: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [ParameterInfo],
+    /// Number of internal states (force effects).
+    pub memory: usize,
+}

@@ -1,0 +1,52 @@
+//! A constant torque: gravity on a tilted axis, the offset of an amplifier. `f = torque`.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+const PARAMETERS: &[ParameterInfo] =
+    &[ParameterInfo::size("torque", "N.m", -1e6, 1e6, "Torque that resists positive motion").nominal(1e-2)];
+const EQUATION: &str = "f = torque";
+const REFERENCE: &str = "Paper, section 2: T = Tm - Tc";
+
+/// Constant load on the motor side.
+pub struct LoadMotor;
+
+impl Force for LoadMotor {
+    const INFO: EffectInfo = EffectInfo {
+        id: "load_motor",
+        place: Place::Motor,
+        family: Family::LoadTorque,
+        title: "Constant torque on the motor: amplifier offset, weight",
+        equation: EQUATION,
+        reference: REFERENCE,
+        parameters: PARAMETERS,
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        Reaction { torque: p[0], ..Reaction::default() }
+    }
+}
+
+/// Constant load on the table side.
+pub struct LoadTable;
+
+impl Force for LoadTable {
+    const INFO: EffectInfo = EffectInfo {
+        id: "load_table",
+        place: Place::Table,
+        family: Family::LoadTorque,
+        title: "Constant torque on the table: gravity on a tilted axis",
+        equation: EQUATION,
+        reference: REFERENCE,
+        parameters: PARAMETERS,
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        Reaction { torque: p[0], ..Reaction::default() }
+    }
+}

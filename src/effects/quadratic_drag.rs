@@ -1,0 +1,29 @@
+//! Quadratic drag: `f = coefficient*w2*|w2|`, the churning of oil or air.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// Quadratic drag on the table.
+pub struct QuadraticDrag;
+
+impl Force for QuadraticDrag {
+    const INFO: EffectInfo = EffectInfo {
+        id: "quadratic_drag",
+        place: Place::Table,
+        family: Family::ViscousFriction,
+        title: "Drag that grows with the square of the speed",
+        equation: "f = coefficient*w2*|w2|",
+        reference: "Batchelor, An Introduction to Fluid Dynamics, 1967, section 5.11",
+        parameters: &[
+            ParameterInfo::size("coefficient", "N.m.s2/rad2", 0.0, 1e6, "Drag torque per speed squared").nominal(1e-4)
+        ],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        let speed = m.end.v.abs();
+        Reaction { torque: p[0] * m.end.v * speed, stiffness: 0.0, damping: 2.0 * p[0].re() * speed.re() }
+    }
+}

@@ -1,0 +1,73 @@
+//! Torques periodic in the angle: ripple of the motor, unbalance of the table.
+//!
+//! `f = -amplitude*sin(order*theta + phase)`: the sign makes the amplitude a torque that drives.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::{Base, Force, Moment, Reaction};
+use crate::scalar::Scalar;
+
+fn torque<S: Scalar>(amplitude: S, order: S, phase: S, x: S) -> Reaction<S> {
+    let angle = order * x + phase;
+    Reaction {
+        torque: -(amplitude * angle.sin()),
+        stiffness: -(amplitude.re() * order.re() * angle.re().cos()),
+        damping: 0.0,
+    }
+}
+
+/// Torque ripple: cogging, commutation, screw eccentricity.
+pub struct TorqueRipple;
+
+impl Force for TorqueRipple {
+    const INFO: EffectInfo = EffectInfo {
+        id: "torque_ripple",
+        place: Place::Motor,
+        family: Family::TorqueRipple,
+        title: "Torque periodic in the motor's angle: cogging, commutation, screw eccentricity",
+        equation: "f = -amplitude*sin(order*theta1 + phase)",
+        reference: "Proca, Keyhani, IEEE Trans. Energy Conversion 17(1), 2002; order-tracked, not at a fixed frequency",
+        parameters: &[
+            ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude of the ripple").nominal(1e-2),
+            ParameterInfo::shape(
+                "order",
+                "1/rad",
+                1.0,
+                1e-6,
+                1e6,
+                "Periods per radian of theta1: harmonic order of the turn",
+            ),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta1 = 0"),
+        ],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        torque(p[0], p[1], p[2], m.end.x)
+    }
+}
+
+/// Unbalance: a torque once per turn of the table's shaft.
+pub struct Unbalance;
+
+impl Force for Unbalance {
+    const INFO: EffectInfo = EffectInfo {
+        id: "unbalance",
+        place: Place::Table,
+        family: Family::LoadTorque,
+        title: "Torque once per turn on the table side: a mass off its axis",
+        equation: "f = -amplitude*sin(theta2 + phase)",
+        reference: "Gravity on an eccentric mass: m*g*e*sin(theta2 + phase)",
+        parameters: &[
+            ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude: mass times gravity times eccentricity")
+                .nominal(1e-2),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0"),
+        ],
+        memory: 0,
+    };
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        torque(p[0], S::from(1.0), p[1], m.end.x)
+    }
+}

@@ -1,0 +1,150 @@
+//! Effects on the positions' way out: what the measurement does, not the machine.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::shapes::Sensor;
+use crate::scalar::Scalar;
+
+/// What the encoders read.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Reading<S> {
+    /// Angle of the motor, rad.
+    pub theta1: S,
+    /// Speed of the motor, rad/s.
+    pub omega1: S,
+    /// Angle of the table side, rad.
+    pub theta2: S,
+    /// Speed of the table side, rad/s.
+    pub omega2: S,
+}
+
+/// Longest look back, in samples.
+const LONGEST: usize = 128;
+
+/// The motion of the last samples, newest last.
+#[derive(Debug, Clone, Copy)]
+pub struct SensorHistory<S> {
+    past: [Reading<S>; LONGEST],
+    newest: usize,
+}
+
+impl<S: Scalar> SensorHistory<S> {
+    /// A history in which the axis has coasted up to `reading` at its present speed.
+    #[must_use]
+    pub fn settled(reading: Reading<S>, dt: f64) -> Self {
+        let mut past = [reading; LONGEST];
+        for (k, slot) in past.iter_mut().enumerate() {
+            let ago = (LONGEST - 1 - k) as f64 * dt;
+            slot.theta1 = reading.theta1 - reading.omega1 * ago;
+            slot.theta2 = reading.theta2 - reading.omega2 * ago;
+        }
+        Self { past, newest: LONGEST - 1 }
+    }
+
+    /// Appends the motion of the next sample.
+    pub fn push(&mut self, reading: Reading<S>) {
+        self.newest = (self.newest + 1) % LONGEST;
+        self.past[self.newest] = reading;
+    }
+
+    /// The motion now.
+    #[must_use]
+    pub fn now(&self) -> Reading<S> {
+        self.past[self.newest]
+    }
+
+    fn ago(&self, samples: usize) -> &Reading<S> {
+        &self.past[(self.newest + LONGEST - samples.min(LONGEST - 1)) % LONGEST]
+    }
+
+    /// Angle and speed of the table side `delay` seconds ago, by cubic Hermite interpolation between samples.
+    fn table_at(&self, delay: S, dt: f64) -> (S, S) {
+        let steps = delay / dt;
+        let whole = steps.re().max(0.0).floor().min((LONGEST - 2) as f64);
+        let (after, before) = (self.ago(whole as usize), self.ago(whole as usize + 1));
+        // s = 0 at `before`, 1 at `after`.
+        let s = S::from(1.0) - (steps - whole);
+        let rise = after.theta2 - before.theta2;
+        let (v0, v1) = (before.omega2 * dt, after.omega2 * dt);
+        // before + v0*s + (3*rise - 2*v0 - v1)*s^2 + (v0 + v1 - 2*rise)*s^3
+        let c2 = rise * 3.0 - v0 * 2.0 - v1;
+        let c3 = v0 + v1 - rise * 2.0;
+        let theta = before.theta2 + s * (v0 + s * (c2 + s * c3));
+        let omega = (v0 + s * (c2 * 2.0 + s * c3 * 3.0)) / dt;
+        (theta, omega)
+    }
+}
+
+/// Delay of the table's encoder against the motor's.
+pub struct SensorDelay;
+
+impl Sensor for SensorDelay {
+    const INFO: EffectInfo = EffectInfo {
+        id: "sensor_delay",
+        place: Place::Sensor,
+        family: Family::Sensor,
+        title: "The table's encoder is read late",
+        equation: "theta2 read at t is theta2(t - time)",
+        reference: "A delay of both encoders is one of the input; only their difference is a sensor's own",
+        parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay of the reading").nominal(1e-3)],
+        memory: 0,
+    };
+
+    fn transform<S: Scalar>(p: &[S], reading: Reading<S>, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
+        let (theta2, omega2) = history.table_at(p[0], dt);
+        Reading { theta2, omega2, ..reading }
+    }
+}
+
+/// Lead error of the table's position: a wrong scale, and a part periodic in the turn.
+pub struct LeadError;
+
+impl Sensor for LeadError {
+    const INFO: EffectInfo = EffectInfo {
+        id: "lead_error",
+        place: Place::Sensor,
+        family: Family::Sensor,
+        title: "The table's scale is off: in its pitch, or once or more per turn",
+        equation: "theta2 read = theta2*(1 + scale) + amplitude*sin(order*theta2 + phase)",
+        reference: "ISO 230-2:2014, 3.3 (systematic and periodic positioning deviation)",
+        parameters: &[
+            ParameterInfo::size("scale", "1", -0.9, 10.0, "Relative error of the pitch").nominal(1e-3),
+            ParameterInfo::size("amplitude", "rad", -1e3, 1e3, "Amplitude of the periodic part").nominal(1e-3),
+            ParameterInfo::shape("order", "1/rad", 1.0, 1e-6, 1e6, "Periods per radian of theta2"),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0"),
+        ],
+        memory: 0,
+    };
+
+    fn transform<S: Scalar>(p: &[S], r: Reading<S>, _history: &SensorHistory<S>, _dt: f64) -> Reading<S> {
+        let angle = p[2] * r.theta2 + p[3];
+        let theta2 = r.theta2 * (p[0] + 1.0) + p[1] * angle.sin();
+        let omega2 = r.omega2 * (p[0] + 1.0 + p[1] * p[2] * angle.cos());
+        Reading { theta2, omega2, ..r }
+    }
+}
+
+/// Quantisation of both encoders.
+pub struct EncoderQuantisation;
+
+impl Sensor for EncoderQuantisation {
+    const INFO: EffectInfo = EffectInfo {
+        id: "encoder_quantisation",
+        place: Place::Sensor,
+        family: Family::Sensor,
+        title: "The encoders count whole steps",
+        equation: "theta read = step*round(theta/step)",
+        reference: "Widrow, Kollar, Quantization Noise, Cambridge 2008",
+        parameters: &[ParameterInfo::size("step", "rad", 0.0, 1e3, "Angle of one count").nominal(1e-3)],
+        memory: 0,
+    };
+
+    fn transform<S: Scalar>(p: &[S], r: Reading<S>, _history: &SensorHistory<S>, _dt: f64) -> Reading<S> {
+        let step = p[0].re();
+        if step <= 0.0 {
+            return r;
+        }
+        // The rounding moves by whole counts: its derivative is that of the motion, on average.
+        let round = |x: S| x.chain((x.re() / step).round() * step, 1.0);
+        Reading { theta1: round(r.theta1), theta2: round(r.theta2), ..r }
+    }
+}

@@ -1,0 +1,324 @@
+//! Which effects are on, and with which parameters.
+
+use std::fmt;
+
+use super::info::{Place, Role};
+use super::input::{Ramp, TorqueHistory};
+use super::sensor::{Reading, SensorHistory};
+use super::shapes::{Base, Moment, Motion, Reaction};
+use super::{EFFECTS, Effect};
+use crate::scalar::Scalar;
+
+const COUNT: usize = EFFECTS.len();
+
+/// Where each effect's parameters start in the flat array; the last entry is their number.
+const OFFSETS: [usize; COUNT + 1] = {
+    let mut offsets = [0; COUNT + 1];
+    let mut i = 0;
+    while i < COUNT {
+        offsets[i + 1] = offsets[i] + EFFECTS[i].info().parameters.len();
+        i += 1;
+    }
+    offsets
+};
+
+/// Where each effect's internal states start; the last entry is their number.
+const MEMORY_OFFSETS: [usize; COUNT + 1] = {
+    let mut offsets = [0; COUNT + 1];
+    let mut i = 0;
+    while i < COUNT {
+        offsets[i + 1] = offsets[i] + EFFECTS[i].info().memory;
+        i += 1;
+    }
+    offsets
+};
+
+/// Number of effect parameters in all.
+pub(super) const PARAMETERS: usize = OFFSETS[COUNT];
+pub(crate) const MEMORY: usize = MEMORY_OFFSETS[COUNT];
+
+/// Internal states of all effects.
+pub type Memory<S> = [S; MEMORY];
+
+/// A name that is no effect, or no parameter of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnknownEffect {
+    /// The name given, `effect` or `effect.parameter`.
+    pub name: String,
+}
+
+impl fmt::Display for UnknownEffect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "no effect or effect parameter is named `{}`", self.name)
+    }
+}
+
+impl std::error::Error for UnknownEffect {}
+
+impl Effect {
+    /// The effect of that id.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn from_id(id: &str) -> Result<Self, UnknownEffect> {
+        EFFECTS.iter().copied().find(|e| e.info().id == id).ok_or_else(|| UnknownEffect { name: id.to_owned() })
+    }
+
+    /// Index of a parameter of that name.
+    ///
+    /// # Errors
+    /// If the effect has none of that name.
+    pub fn parameter(self, name: &str) -> Result<usize, UnknownEffect> {
+        let info = self.info();
+        info.parameters
+            .iter()
+            .position(|p| p.name == name)
+            .ok_or_else(|| UnknownEffect { name: format!("{}.{name}", info.id) })
+    }
+}
+
+/// The parameters of every effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings<S = f64> {
+    values: [S; PARAMETERS],
+}
+
+impl<S: Scalar> Default for Settings<S> {
+    /// Every effect off.
+    fn default() -> Self {
+        let mut values = [S::default(); PARAMETERS];
+        for &effect in EFFECTS {
+            for (i, p) in effect.info().parameters.iter().enumerate() {
+                values[OFFSETS[effect as usize] + i] = p.off.into();
+            }
+        }
+        Self { values }
+    }
+}
+
+impl<S: Scalar> Settings<S> {
+    /// The same over another scalar, as constants.
+    #[must_use]
+    pub fn lift(other: &Settings<f64>) -> Self {
+        Self { values: other.values.map(S::from) }
+    }
+
+    /// The parameters of an effect, in the order of its info.
+    #[must_use]
+    pub fn of(&self, effect: Effect) -> &[S] {
+        &self.values[OFFSETS[effect as usize]..OFFSETS[effect as usize + 1]]
+    }
+
+    /// The parameters of an effect, to be changed.
+    pub fn of_mut(&mut self, effect: Effect) -> &mut [S] {
+        &mut self.values[OFFSETS[effect as usize]..OFFSETS[effect as usize + 1]]
+    }
+
+    /// True if a size of the effect differs from its off value.
+    #[must_use]
+    pub fn is_on(&self, effect: Effect) -> bool {
+        #[allow(clippy::float_cmp, reason = "off is an exact value, not a measurement")]
+        effect.info().parameters.iter().zip(self.of(effect)).any(|(p, v)| p.role == Role::Size && v.re() != p.off)
+    }
+
+    /// The effects that are on, sorted by shape, ready for the step.
+    #[must_use]
+    pub fn active(&self) -> ActiveEffects {
+        self.active_with(&[])
+    }
+
+    /// The same, with some taken as on whatever their size: a derivative at the off value needs them.
+    #[must_use]
+    pub fn active_with(&self, also: &[Effect]) -> ActiveEffects {
+        let mut active = ActiveEffects::default();
+        for &effect in EFFECTS {
+            if self.is_on(effect) || also.contains(&effect) {
+                let list = if effect.is_force() {
+                    &mut active.forces
+                } else if effect.is_dry() {
+                    &mut active.dry
+                } else if effect.is_input() {
+                    &mut active.inputs
+                } else {
+                    &mut active.sensors
+                };
+                list.push(effect);
+            }
+        }
+        active
+    }
+
+    /// Level of dry friction at a place, for motion in `direction` at `speed`, and its derivative to the speed, N.m.
+    #[inline]
+    pub(crate) fn dry_level(&self, on: &ActiveEffects, place: Place, direction: f64, speed: S, at: f64) -> (S, f64) {
+        let mut sum = (S::default(), 0.0);
+        for &effect in on.dry.as_slice() {
+            if effect.info().place == place {
+                let (level, slope) = effect.level(self.of(effect), direction, speed, at);
+                sum.0 += level;
+                sum.1 += slope;
+            }
+        }
+        sum
+    }
+
+    /// Sums the force effects: torque on motor and table and the tangent, with the trial memory left in `memory`.
+    #[inline]
+    pub(crate) fn forces(
+        &self,
+        on: &ActiveEffects,
+        base: &Base<S>,
+        step: &StepMotion<S>,
+        memory: &mut Memory<S>,
+    ) -> Forces<S> {
+        let mut sum = Forces::default();
+        for &effect in on.forces.as_slice() {
+            let i = effect as usize;
+            let place = effect.info().place;
+            let moment = step.moment(place);
+            let reaction =
+                effect.torque(self.of(effect), base, &moment, &mut memory[MEMORY_OFFSETS[i]..MEMORY_OFFSETS[i + 1]]);
+            sum.add(place, &reaction);
+        }
+        sum
+    }
+
+    /// The torque on the motor over a step, from the torque commanded over it.
+    pub fn transform_input(&self, on: &ActiveEffects, ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
+        on.inputs.as_slice().iter().fold(ramp, |ramp, &e| e.transform_input(self.of(e), ramp, h, history))
+    }
+
+    /// What the encoders read, from the motion up to now, sampled `dt` seconds apart.
+    pub fn transform_sensor(&self, on: &ActiveEffects, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
+        on.sensors
+            .as_slice()
+            .iter()
+            .fold(history.now(), |reading, &e| e.transform_sensor(self.of(e), reading, history, dt))
+    }
+}
+
+/// Motion of both inertias at the start and at the trial end of a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepMotion<S> {
+    pub start: [Motion<S>; 3],
+    pub end: [Motion<S>; 3],
+    pub time: f64,
+    pub h: S,
+    pub contact: i8,
+}
+
+impl<S: Scalar> StepMotion<S> {
+    fn moment(&self, place: Place) -> Moment<S> {
+        let coordinate = match place {
+            Place::Table => 1,
+            Place::Coupling => 2,
+            Place::Motor | Place::Input | Place::Sensor => 0,
+        };
+        Moment {
+            start: self.start[coordinate],
+            end: self.end[coordinate],
+            time: self.time,
+            h: self.h,
+            contact: self.contact,
+        }
+    }
+}
+
+/// Torques on motor and table that resist, with their tangent; row = inertia, column = coordinate.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Forces<S> {
+    pub torque: [S; 2],
+    pub stiffness: [[f64; 2]; 2],
+    pub damping: [[f64; 2]; 2],
+}
+
+impl<S: Scalar> Forces<S> {
+    #[inline]
+    pub(crate) fn add(&mut self, place: Place, r: &Reaction<S>) {
+        match place {
+            Place::Table => {
+                self.torque[1] += r.torque;
+                self.stiffness[1][1] += r.stiffness;
+                self.damping[1][1] += r.damping;
+            }
+            Place::Coupling => {
+                self.torque[0] += r.torque;
+                self.torque[1] -= r.torque;
+                for (row, column, sign) in [(0, 0, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)] {
+                    self.stiffness[row][column] += sign * r.stiffness;
+                    self.damping[row][column] += sign * r.damping;
+                }
+            }
+            Place::Motor | Place::Input | Place::Sensor => {
+                self.torque[0] += r.torque;
+                self.stiffness[0][0] += r.stiffness;
+                self.damping[0][0] += r.damping;
+            }
+        }
+    }
+}
+
+/// A short list without heap.
+#[derive(Debug, Clone, Copy)]
+struct Few {
+    effects: [Effect; COUNT],
+    len: usize,
+}
+
+impl Default for Few {
+    fn default() -> Self {
+        Self { effects: [EFFECTS[0]; COUNT], len: 0 }
+    }
+}
+
+impl Few {
+    fn push(&mut self, effect: Effect) {
+        self.effects[self.len] = effect;
+        self.len += 1;
+    }
+    #[inline]
+    fn as_slice(&self) -> &[Effect] {
+        &self.effects[..self.len]
+    }
+}
+
+/// The effects that are on, by shape.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ActiveEffects {
+    dry: Few,
+    forces: Few,
+    inputs: Few,
+    sensors: Few,
+}
+
+impl ActiveEffects {
+    /// True if nothing acts on the motion: the step is then the linear one.
+    #[must_use]
+    pub fn motion_is_linear(&self) -> bool {
+        self.dry.len == 0 && self.forces.len == 0
+    }
+
+    /// The dry frictions that are on.
+    #[must_use]
+    pub fn dry(&self) -> &[Effect] {
+        self.dry.as_slice()
+    }
+
+    /// The force effects that are on.
+    #[must_use]
+    pub fn forces(&self) -> &[Effect] {
+        self.forces.as_slice()
+    }
+
+    /// The input effects that are on.
+    #[must_use]
+    pub fn inputs(&self) -> &[Effect] {
+        self.inputs.as_slice()
+    }
+
+    /// The sensor effects that are on.
+    #[must_use]
+    pub fn sensors(&self) -> &[Effect] {
+        self.sensors.as_slice()
+    }
+}

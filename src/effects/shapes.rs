@@ -1,0 +1,89 @@
+//! The shapes of an effect: what each kind must provide.
+
+use super::info::EffectInfo;
+use super::input::{Ramp, TorqueHistory};
+use super::sensor::{Reading, SensorHistory};
+use crate::scalar::Scalar;
+
+/// Position and velocity of the coordinate an effect sees: `theta1`, `theta2`, or the twist `theta1 - theta2`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Motion<S> {
+    /// Position, rad.
+    pub x: S,
+    /// Velocity, rad/s.
+    pub v: S,
+}
+
+/// The nominal parameters an effect may need.
+#[derive(Debug, Clone, Copy)]
+pub struct Base<S> {
+    /// Stiffness of the coupling, N.m/rad.
+    pub k: S,
+    /// Damping of the coupling, N.m.s/rad.
+    pub b: S,
+}
+
+/// A step as a force effect sees it: from the committed start to a trial end.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<S> {
+    /// Motion at the start, committed.
+    pub start: Motion<S>,
+    /// Motion at the end, on trial.
+    pub end: Motion<S>,
+    /// Time at the end, s.
+    pub time: f64,
+    /// Length of the step, s; zero asks for the force at the start itself.
+    pub h: S,
+    /// The side of contact (backlash): -1, 0 (in the gap) or +1.
+    pub contact: i8,
+}
+
+/// A torque that resists the motion, with its tangent for Newton's method.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reaction<S> {
+    /// Torque on the left-hand side of the equation of motion (positive resists positive motion), N.m.
+    pub torque: S,
+    /// Its derivative to the position at the end, N.m/rad.
+    pub stiffness: f64,
+    /// Its derivative to the velocity at the end, N.m.s/rad.
+    pub damping: f64,
+}
+
+/// A set-valued friction: `torque = level*sgn(v)`, anything between while at rest.
+pub trait DryFriction {
+    /// What the effect is.
+    const INFO: EffectInfo;
+
+    /// The level for motion in `direction` (+1 or -1) at `speed >= 0` and time `at` s, and its derivative to the speed.
+    fn level<S: Scalar>(p: &[S], direction: f64, speed: S, at: f64) -> (S, f64);
+}
+
+/// A torque from the motion.
+///
+/// `memory` comes in as committed and is left as the trial value: the caller keeps the committed copy, so that Newton
+/// may retry a step (trial / commit / revert, as OpenSees' `UniaxialMaterial`).
+pub trait Force {
+    /// What the effect is.
+    const INFO: EffectInfo;
+
+    /// The torque at the end of the step, and its tangent.
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [S]) -> Reaction<S>;
+}
+
+/// A change of the torque on its way from the command to the motor.
+pub trait Input {
+    /// What the effect is.
+    const INFO: EffectInfo;
+
+    /// The torque over a step of length `h`, from the torque commanded over it.
+    fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S>;
+}
+
+/// A change of the positions on their way from the axis to the log.
+pub trait Sensor {
+    /// What the effect is.
+    const INFO: EffectInfo;
+
+    /// What is read now: `reading` as changed by the effects before, `history` the motion up to now, `dt` s apart.
+    fn transform<S: Scalar>(p: &[S], reading: Reading<S>, history: &SensorHistory<S>, dt: f64) -> Reading<S>;
+}
