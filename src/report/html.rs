@@ -1,0 +1,216 @@
+//! One self-contained HTML page: inline style and SVG, no script, nothing fetched.
+//!
+//! Every text is escaped by the template (maud escapes all that is not markup of ours); what could steer a terminal or
+//! the direction of the text is taken out of the finished page. The page's own policy forbids scripts and the network.
+
+use maud::{DOCTYPE, Markup, html};
+
+use super::chart::{Colour, Dash, Shape, Size};
+use super::format::{self, Medium};
+use super::{Block, Cell, Drawing, Figure, Report, Section, Table, Tone, Verdict, chain, chart, polar};
+
+const STYLE: &str = include_str!("style.css");
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; form-action 'none'; base-uri 'none'";
+
+/// The page as one string.
+#[must_use]
+pub fn page(report: &Report) -> String {
+    let headings: Vec<(usize, &str)> = report
+        .sections
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| !s.heading.is_empty())
+        .map(|(i, s)| (i, s.heading.as_str()))
+        .collect();
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                title { (report.title) }
+                style { (maud::PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (report.title) }
+                    @if !report.subject.is_empty() { p class="subject" { (report.subject) } }
+                }
+                @if headings.len() > 2 {
+                    nav aria-label="Sections" { @for (i, h) in &headings { a href={ "#s" (i) } { (h) } } }
+                }
+                main { @for (i, s) in report.sections.iter().enumerate() { (section(i, s)) } }
+                @if !report.footer.is_empty() { footer { (report.footer) } }
+            }
+        }
+    };
+    format::printable(&markup.into_string()).into_owned()
+}
+
+fn section(index: usize, section: &Section) -> Markup {
+    html! {
+        section id={ "s" (index) } {
+            @if !section.heading.is_empty() { h2 { (section.heading) } }
+            @for b in &section.blocks { (block(b)) }
+        }
+    }
+}
+
+fn block(block: &Block) -> Markup {
+    match block {
+        Block::Verdict(v) => verdict(v),
+        Block::Paragraph(text) => html! { p { (text) } },
+        Block::Warning(text) => {
+            html! { p class="warning" role="note" { span class="sign" aria-hidden="true" { "!" } span { (text) } } }
+        }
+        Block::Steps(steps) => html! { ol class="steps" { @for s in steps { li { (s) } } } },
+        Block::KeyValues(pairs) => key_values(pairs),
+        Block::Table(t) => table(t),
+        Block::Figure(f) => html! { div class="full" { (figure(f, Size { width: 1040.0, height: 330.0 })) } },
+        Block::Figures(all) => {
+            html! { div class="grid2" { @for f in all { (figure(f, Size { width: 510.0, height: 310.0 })) } } }
+        }
+        Block::Details(summary, blocks) => {
+            html! { details { summary { (summary) } @for b in blocks { (self::block(b)) } } }
+        }
+    }
+}
+
+fn verdict(v: &Verdict) -> Markup {
+    let (class, sign, name) = match v.tone {
+        Tone::Good => ("good", "✓", "Good"),
+        Tone::Finding => ("finding", "!", "Finding"),
+        Tone::Unsure => ("unsure", "?", "Not sure"),
+        Tone::Neutral => ("neutral", "i", "Result"),
+    };
+    html! {
+        div class={ "verdict " (class) } {
+            div class="sentence" {
+                span class="sign" role="img" aria-label=(name) { (sign) }
+                p { (v.sentence) }
+            }
+            @if !v.detail.is_empty() { p class="detail" { (v.detail) } }
+            @if !v.figures.is_empty() {
+                dl class="figures" { @for (k, c) in &v.figures { div { dt { (k) } dd { (format::cell(c, Medium::Page)) } } } }
+            }
+        }
+    }
+}
+
+fn key_values(pairs: &[(String, Cell)]) -> Markup {
+    html! { dl class="pairs" { @for (k, c) in pairs { div { dt { (k) } dd { (format::cell(c, Medium::Page)) } } } } }
+}
+
+fn table(t: &Table) -> Markup {
+    // A column is set flush right when all that stands in it is numbers.
+    let numeric: Vec<bool> = (0..t.columns.len())
+        .map(|c| {
+            let mut cells = t.rows.iter().filter_map(|r| r.cells.get(c)).filter(|c| **c != Cell::Empty).peekable();
+            cells.peek().is_some() && cells.all(Cell::is_numeric)
+        })
+        .collect();
+    let class = |c: usize| numeric.get(c).copied().unwrap_or(false).then_some("num");
+    html! {
+        div class="scroll" role="region" tabindex="0" aria-label=(t.caption) {
+            table {
+                @if !t.caption.is_empty() { caption { (t.caption) } }
+                thead { tr { @for (c, name) in t.columns.iter().enumerate() { th scope="col" class=[class(c)] { (heading(name)) } } } }
+                tbody {
+                    @for r in &t.rows {
+                        tr class=[r.strong.then_some("strong")] {
+                            @for (c, cell) in r.cells.iter().enumerate() { td class=[class(c)] { (cell_markup(cell)) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A heading with the unit in its brackets typeset.
+fn heading(name: &str) -> String {
+    match (name.rfind('['), name.ends_with(']')) {
+        (Some(at), true) => format!("{}[{}]", &name[..at], format::unit(&name[at + 1..name.len() - 1], Medium::Page)),
+        _ => name.to_owned(),
+    }
+}
+
+fn cell_markup(cell: &Cell) -> Markup {
+    let text = format::cell(cell, Medium::Page);
+    match cell {
+        Cell::Bar(share) => {
+            let width = if share.is_finite() { share.clamp(0.0, 1.0) * 100.0 } else { 0.0 };
+            html! {
+                span class="share" {
+                    span class="track" aria-hidden="true" { span style=(format!("width:{width:.1}%")) {} }
+                    span { (text) }
+                }
+            }
+        }
+        _ => html! { (text) },
+    }
+}
+
+/// A figure in two layouts of which the style sheet shows the one that suits the room it has.
+fn figure(f: &Figure, wide: Size) -> Markup {
+    let narrow = Size { width: 350.0, height: 270.0 };
+    let square = Size { width: 430.0, height: 430.0 };
+    html! {
+        figure {
+            @match &f.drawing {
+                Drawing::Chart(c) => {
+                    @if !c.title.is_empty() { h3 { (c.title) } }
+                    (legend(c.series.iter().enumerate().map(|(i, s)| {
+                        let sign = match s.shape { Shape::Points => Sign::Dot, Shape::Band { .. } => Sign::Patch, _ => Sign::Line(s.dash) };
+                        (s.name.as_str(), s.colour.unwrap_or(Colour::nth(i)), sign)
+                    })))
+                    div class="wide" { (chart::svg(c, wide)) }
+                    div class="narrow" { (chart::svg(c, narrow)) }
+                }
+                Drawing::Polar(p) => {
+                    @if !p.title.is_empty() { h3 { (p.title) } }
+                    (legend(p.traces.iter().enumerate().map(|(i, t)| (t.name.as_str(), t.colour.unwrap_or(Colour::nth(i)), Sign::Line(t.dash)))))
+                    div class="square" { (polar::svg(p, square)) }
+                }
+                Drawing::Chain(c) => {
+                    @if !c.title.is_empty() { h3 { (c.title) } }
+                    div class="wide" { (chain::svg(c, wide)) }
+                    div class="narrow" { (chain::svg(c, narrow)) }
+                }
+            }
+            @if !f.caption.is_empty() { figcaption { (f.caption) } }
+        }
+    }
+}
+
+/// What stands before a name in the legend.
+enum Sign {
+    Line(Dash),
+    Dot,
+    Patch,
+}
+
+fn legend<'a>(entries: impl Iterator<Item = (&'a str, Colour, Sign)>) -> Markup {
+    let named: Vec<_> = entries.filter(|(name, ..)| !name.is_empty()).collect();
+    html! {
+        @if !named.is_empty() {
+            ul class="legend" {
+                @for (name, colour, sign) in &named {
+                    li {
+                        svg class=(colour.class()) viewBox="0 0 28 12" width="28" height="12" aria-hidden="true" {
+                            @match sign {
+                                Sign::Line(dash) => { path class="line" stroke-dasharray=[dash.pattern()] d="M1 6H27" {} }
+                                Sign::Dot => { path class="dots" d="M7 6h0M14 6h0M21 6h0" {} }
+                                Sign::Patch => { path class="band" d="M1 1H27V11H1Z" {} }
+                            }
+                        }
+                        (name)
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! The same report as text: verdict, paragraphs, values and tables. Figures stay in the page.
+
+use std::fmt::Write as _;
+
+use comfy_table::{CellAlignment, ContentArrangement, presets};
+
+use super::format::{self, Medium, printable};
+use super::{Block, Cell, Report, Table, Tone, Verdict};
+
+/// How the text is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Characters a line.
+    pub width: u16,
+    /// Whether escape sequences for bold and colour are wanted.
+    pub colour: bool,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self { width: 100, colour: false }
+    }
+}
+
+/// The whole report.
+#[must_use]
+pub fn render(report: &Report, layout: Layout) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "{}", bold(&printable(&report.title), layout));
+    if !report.subject.is_empty() {
+        let _ = writeln!(out, "{}", wrapped(&report.subject, layout.width, ""));
+    }
+    for section in &report.sections {
+        let mut text = blocks(&section.blocks, layout);
+        if text.trim().is_empty() {
+            continue;
+        }
+        out.push('\n');
+        if !section.heading.is_empty() {
+            text.insert_str(0, &format!("{}\n", bold(&printable(&section.heading), layout)));
+        }
+        out.push_str(&text);
+    }
+    out
+}
+
+/// Some blocks, each ending in a line end, an empty line between.
+#[must_use]
+pub fn blocks(blocks: &[Block], layout: Layout) -> String {
+    let mut parts = Vec::new();
+    for b in blocks {
+        let text = match b {
+            Block::Verdict(v) => verdict(v, layout),
+            Block::Paragraph(text) => wrapped(text, layout.width, ""),
+            Block::Warning(text) => {
+                format!("{} {}", painted("warning:", Tone::Finding, layout), wrapped(text, layout.width, "  "))
+            }
+            Block::Steps(steps) => steps
+                .iter()
+                .enumerate()
+                .map(|(i, s)| format!("{}. {}", i + 1, wrapped(s, layout.width.saturating_sub(3), "   ")))
+                .collect::<Vec<_>>()
+                .join("\n"),
+            Block::KeyValues(pairs) => key_values(pairs),
+            Block::Table(t) => table(t, layout),
+            Block::Figure(_) | Block::Figures(_) | Block::Details(..) => continue,
+        };
+        parts.push(text);
+    }
+    if parts.is_empty() { String::new() } else { parts.join("\n\n") + "\n" }
+}
+
+/// A table within the width of the layout.
+#[must_use]
+pub fn table(t: &Table, layout: Layout) -> String {
+    let mut out = comfy_table::Table::new();
+    out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(layout.width);
+    out.set_header(t.columns.iter().map(|c| printable(c).into_owned()).collect::<Vec<_>>());
+    for r in &t.rows {
+        let mark = |i: usize, text: String| {
+            if r.strong && i == 0 {
+                format!("> {text}")
+            } else if i == 0 {
+                format!("  {text}")
+            } else {
+                text
+            }
+        };
+        out.add_row(
+            r.cells
+                .iter()
+                .enumerate()
+                .map(|(i, c)| mark(i, printable(&format::cell(c, Medium::Terminal)).into_owned()))
+                .collect::<Vec<_>>(),
+        );
+    }
+    let marked = t.rows.iter().any(|r| r.strong);
+    for (i, column) in out.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        let mut cells = t.rows.iter().filter_map(|r| r.cells.get(i)).filter(|c| **c != Cell::Empty).peekable();
+        if cells.peek().is_some() && cells.all(Cell::is_numeric) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let mut text = String::new();
+    if !t.caption.is_empty() {
+        let _ = writeln!(text, "{}", wrapped(&t.caption, layout.width, ""));
+    }
+    for (i, line) in out.lines().enumerate() {
+        let line = line.trim_end();
+        // Without a marked row the room for the mark is not needed.
+        let line = if marked || i == 0 { line } else { line.strip_prefix("  ").unwrap_or(line) };
+        let _ = writeln!(text, "{}", if i == 0 { bold(line, layout) } else { line.to_owned() });
+    }
+    text.truncate(text.trim_end().len());
+    text
+}
+
+fn verdict(v: &Verdict, layout: Layout) -> String {
+    let sign = match v.tone {
+        Tone::Good => "✓",
+        Tone::Finding => "!",
+        Tone::Unsure => "?",
+        Tone::Neutral => "i",
+    };
+    let mut out = format!(
+        "{} {}",
+        painted(sign, v.tone, layout),
+        bold(&wrapped(&v.sentence, layout.width.saturating_sub(2), "  "), layout)
+    );
+    if !v.detail.is_empty() {
+        let _ = write!(out, "\n  {}", wrapped(&v.detail, layout.width.saturating_sub(2), "  "));
+    }
+    if !v.figures.is_empty() {
+        let _ = write!(out, "\n{}", key_values(&v.figures));
+    }
+    out
+}
+
+fn key_values(pairs: &[(String, Cell)]) -> String {
+    let names: Vec<_> = pairs.iter().map(|(k, _)| printable(k)).collect();
+    let widest = names.iter().map(|n| n.chars().count()).max().unwrap_or(0);
+    let lines = names.iter().zip(pairs).map(|(name, (_, c))| {
+        let value = format::cell(c, Medium::Terminal);
+        format!("  {name}{}  {}", " ".repeat(widest - name.chars().count()), printable(&value))
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Text broken at spaces to at most `width` characters a line; further lines begin with `indent`.
+fn wrapped(text: &str, width: u16, indent: &str) -> String {
+    let width = usize::from(width.max(20));
+    let mut lines: Vec<String> = Vec::new();
+    for paragraph in printable(text).lines() {
+        let mut line = String::new();
+        for word in paragraph.split_whitespace() {
+            if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > width {
+                lines.push(std::mem::take(&mut line));
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+        lines.push(line);
+    }
+    lines.join(&format!("\n{indent}"))
+}
+
+fn bold(text: &str, layout: Layout) -> String {
+    if layout.colour { format!("\u{1b}[1m{text}\u{1b}[0m") } else { text.to_owned() }
+}
+
+fn painted(text: &str, tone: Tone, layout: Layout) -> String {
+    let code = match tone {
+        Tone::Good => 32,
+        Tone::Finding => 33,
+        Tone::Unsure => 35,
+        Tone::Neutral => 36,
+    };
+    if layout.colour { format!("\u{1b}[1;{code}m{text}\u{1b}[0m") } else { text.to_owned() }
+}
