@@ -77,24 +77,12 @@ pub fn percent(share: f64, medium: Medium) -> String {
         return number(value, 3, medium);
     }
     let size = value.abs();
-    let text = if size < 100.0 && size >= 99.95 {
-        let sign = if value < 0.0 { "-" } else { "" };
-        if size >= 99.995 {
-            format!("{}99.99", if value < 0.0 { "<-" } else { ">" })
-        } else {
-            format!("{sign}{size:.2}")
-        }
-    } else if size >= 1e-3 && size < 1e5 {
-        let decimals = if size >= 100.0 {
-            0
-        } else if size >= 10.0 {
-            1
-        } else {
-            2
-        };
-        if size < 1.0 { number(value, 2, medium) } else { format!("{value:.decimals$}") }
-    } else {
-        number(value, 2, medium)
+    let text = match size {
+        _ if (99.995..100.0).contains(&size) => if value < 0.0 { "<-99.99" } else { ">99.99" }.to_owned(),
+        _ if (99.95..100.0).contains(&size) => format!("{value:.2}"),
+        _ if (100.0..1e5).contains(&size) => format!("{value:.0}"),
+        _ if (1.0..100.0).contains(&size) => number(value, 3, medium),
+        _ => number(value, 2, medium),
     };
     format!("{}{}%", minus(&text, medium), space(medium))
 }
