@@ -1,3 +1,4 @@
 //! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
 
+pub mod excitation;
 pub mod levenberg;

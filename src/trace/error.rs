@@ -10,20 +10,20 @@ use super::units::Unit;
 #[non_exhaustive]
 pub enum TraceError {
     /// The file could not be read.
-    #[error("{path}: cannot read: {source}")]
+    #[error("{path}: cannot read: {reason}")]
     Read {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// The file could not be written.
-    #[error("{path}: cannot write: {source}. Choose a folder that exists and that you may write to")]
+    #[error("{path}: cannot write: {reason}. Choose a folder that exists and that you may write to")]
     Write {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// There is no header row, or no data.
     #[error("{file}: {what}")]

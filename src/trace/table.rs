@@ -56,7 +56,7 @@ impl Table {
     /// # Errors
     /// When it cannot be read, has no header, or a row has too few or too many fields.
     pub fn read(path: &Path) -> Result<Self, TraceError> {
-        let bytes = std::fs::read(path).map_err(|source| TraceError::Read { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|reason| TraceError::Read { path: path.to_owned(), reason })?;
         Self::parse(&bytes, &path.display().to_string())
     }
 

@@ -59,7 +59,7 @@ pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), Trac
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
 pub fn write_text(path: &Path, bytes: &[u8]) -> Result<(), TraceError> {
-    let failed = |source| TraceError::Write { path: path.to_owned(), source };
+    let failed = |reason| TraceError::Write { path: path.to_owned(), reason };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
