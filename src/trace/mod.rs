@@ -6,6 +6,7 @@
 
 mod error;
 mod load;
+pub mod machine;
 mod sampling;
 mod signal;
 mod table;
@@ -14,10 +15,12 @@ mod write;
 
 use std::ops::Range;
 
+pub use crate::axis::Hold;
 pub use error::TraceError;
 pub use load::{Column, Loaded, Mapping, from_table, load};
+pub use machine::{Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
-pub use signal::{Hold, Motion, Quantity, Signal};
+pub use signal::{Motion, Quantity, Signal};
 pub use table::{Header, Table};
 pub use units::Unit;
 pub use write::{write_columns, write_csv, write_text};

@@ -13,16 +13,6 @@ pub enum Motion {
     Linear,
 }
 
-/// What the torque does between two samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Hold {
-    /// It keeps the value of the sample before.
-    #[default]
-    Zoh,
-    /// It runs straight from one sample to the next.
-    Linear,
-}
-
 /// A physical quantity, as far as a trace needs to tell one unit from another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
