@@ -306,8 +306,8 @@ def write_case(out: pathlib.Path, case, name: str, half: str, seed) -> None:
     (out / "seals" / f"{name}.json").write_text(json.dumps(plain(seal), indent=1) + "\n")
 
 
-def make(out: pathlib.Path, cls: str, r: int, seed: int) -> tuple[str, int]:
-    """Draw until visible and write replicate r of a class; returns its name and the attempts it took."""
+def make(out: pathlib.Path, cls: str, r: int, seed: int) -> tuple[str, str, int]:
+    """Draw until visible and write replicate r of a class; returns its name, its half and the attempts it took."""
     half = "tuning" if r % 2 == 0 else "scoring"
     kind = "seed" if (r // 2) % 2 == 0 else "ballscrew"
     name = "c" + hashlib.sha256(f"{seed}/{cls}/{r}".encode()).hexdigest()[:10]
@@ -316,7 +316,7 @@ def make(out: pathlib.Path, cls: str, r: int, seed: int) -> tuple[str, int]:
         case = draw_case(cls, kind, key)
         if case is not None:
             write_case(out, case, name, half, key)
-            return name, attempt + 1
+            return name, half, attempt + 1
     raise RuntimeError(f"class {cls}, replicate {r}, axis {kind}: not visible in {TRIES} draws")
 
 
@@ -334,13 +334,15 @@ def main(argv=None) -> int:
     for sub in ("cases", "seals"):
         if (args.out / sub).exists():
             shutil.rmtree(args.out / sub)
-    begun, count, tries = time.time(), 0, 0
+    begun, tries, index = time.time(), 0, {}
     for cls in wanted:
         for r in range(args.per_class):
-            _, attempts = make(args.out, cls, r, args.seed)
-            count, tries = count + 1, tries + attempts
+            name, half, attempts = make(args.out, cls, r, args.seed)
+            index[name] = {"class": cls, "half": half}
+            tries += attempts
         print(f"{cls}: {args.per_class} cases", file=sys.stderr)
-    spent = time.time() - begun
+    (args.out / "seals" / "index.json").write_text(json.dumps(index, indent=1) + "\n")
+    spent, count = time.time() - begun, len(index)
     print(f"{count} cases in {args.out} ({tries} draws, {spent:.1f} s, {spent / max(count, 1):.2f} s a case)")
     return 0
 
