@@ -1,1 +1,7 @@
 //! The gap between model and machine: where, which, how far.
+
+mod noise;
+mod record;
+
+pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
+pub use record::{CHANNELS, Record};

@@ -1,0 +1,55 @@
+//! The record that the diagnosis works on: torque, the measured channels and the noise of each.
+
+use crate::axis::Hold;
+
+/// Names of the channels, in the order of [`Record::channels`].
+pub const CHANNELS: [&str; 4] = ["theta1", "omega1", "theta2", "omega2"];
+
+/// One uniformly sampled record of the axis, SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// What the torque does between two samples.
+    pub hold: Hold,
+    /// Torque on the motor (or its command), N.m; one value a sample.
+    pub torque: Vec<f64>,
+    /// `[theta1, omega1, theta2, omega2]`, rad and rad/s, as long as the torque; what was not measured is `None`.
+    pub channels: [Option<Vec<f64>>; 4],
+    /// Standard deviation of the noise of each channel, in its unit; means nothing where the channel is `None`.
+    pub noise: [f64; 4],
+}
+
+impl Record {
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.torque.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.torque.is_empty()
+    }
+
+    /// Time of sample `k`, s.
+    #[must_use]
+    pub fn time(&self, k: usize) -> f64 {
+        self.start + k as f64 * self.dt
+    }
+
+    /// Whether anything of the motor is measured.
+    #[must_use]
+    pub const fn sees_motor(&self) -> bool {
+        self.channels[0].is_some() || self.channels[1].is_some()
+    }
+
+    /// Whether anything of the table is measured.
+    #[must_use]
+    pub const fn sees_table(&self) -> bool {
+        self.channels[2].is_some() || self.channels[3].is_some()
+    }
+}
