@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 
 use maud::{Markup, html};
 
-use super::chart::{Size, cut, px};
 use super::format::{self, Medium};
+use super::plot::{Size, cut, px};
 
 /// The chain as data: its places in order.
 #[derive(Debug, Clone, PartialEq, Default)]

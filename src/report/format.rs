@@ -103,7 +103,8 @@ pub fn count(value: u64) -> String {
 
 /// A value with its unit behind it.
 fn with_unit(value: String, unit: &str, medium: Medium) -> String {
-    if unit.is_empty() { value } else { format!("{value}{}{}", space(medium), self::unit(unit, medium)) }
+    let unit = self::unit(unit, medium);
+    if unit.is_empty() { value } else { format!("{value}{}{unit}", space(medium)) }
 }
 
 /// A value and its unit stay on one line.
@@ -123,13 +124,19 @@ pub fn cell(cell: &Cell, medium: Medium) -> String {
         Cell::Number(value, digits, unit) => with_unit(number(*value, *digits, medium), unit, medium),
         Cell::Count(value) => count(*value),
         Cell::Estimate(value, std, unit) => with_unit(estimate(*value, *std, medium), unit, medium),
-        Cell::Percent(share) | Cell::Bar(share) => percent(*share, medium),
+        Cell::Percent(share) => percent(*share, medium),
+        // A share beside a bar is read at a glance: how small a small one is does not matter.
+        Cell::Bar(share) if (f64::MIN_POSITIVE..1e-4).contains(share) => format!("<0.01{}%", space(medium)),
+        Cell::Bar(share) => percent(*share, medium),
     }
 }
 
-/// A unit as it is printed: `kg.m2` becomes `kg·m²`. The terminal keeps the ASCII form.
+/// A unit as it is printed: `kg.m2` becomes `kg·m²`, the unit `1` nothing. The terminal keeps the ASCII form.
 #[must_use]
 pub fn unit(unit: &str, medium: Medium) -> String {
+    if unit == "1" {
+        return String::new();
+    }
     if medium == Medium::Terminal {
         return unit.to_owned();
     }

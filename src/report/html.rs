@@ -5,9 +5,10 @@
 
 use maud::{DOCTYPE, Markup, html};
 
-use super::chart::{Colour, Dash, Shape, Size};
+use super::chart::{Colour, Dash, Shape};
 use super::format::{self, Medium};
-use super::{Block, Cell, Drawing, Figure, Report, Section, Table, Tone, Verdict, chain, chart, polar};
+use super::plot::{self, Size};
+use super::{Block, Cell, Drawing, Figure, Report, Section, Table, Tone, Verdict, chain, polar};
 
 const STYLE: &str = include_str!("style.css");
 const POLICY: &str =
@@ -167,8 +168,8 @@ fn figure(f: &Figure, wide: Size) -> Markup {
                         let sign = match s.shape { Shape::Points => Sign::Dot, Shape::Band { .. } => Sign::Patch, _ => Sign::Line(s.dash) };
                         (s.name.as_str(), s.colour.unwrap_or(Colour::nth(i)), sign)
                     })))
-                    div class="wide" { (chart::svg(c, wide)) }
-                    div class="narrow" { (chart::svg(c, narrow)) }
+                    div class="wide" { (plot::svg(c, wide)) }
+                    div class="narrow" { (plot::svg(c, narrow)) }
                 }
                 Drawing::Polar(p) => {
                     @if !p.title.is_empty() { h3 { (p.title) } }
@@ -202,7 +203,7 @@ fn legend<'a>(entries: impl Iterator<Item = (&'a str, Colour, Sign)>) -> Markup 
                     li {
                         svg class=(colour.class()) viewBox="0 0 28 12" width="28" height="12" aria-hidden="true" {
                             @match sign {
-                                Sign::Line(dash) => { path class="line" stroke-dasharray=[dash.pattern()] d="M1 6H27" {} }
+                                Sign::Line(dash) => { path class=(dash.class()) stroke-dasharray=[dash.pattern()] d="M1 6H27" {} }
                                 Sign::Dot => { path class="dots" d="M7 6h0M14 6h0M21 6h0" {} }
                                 Sign::Patch => { path class="band" d="M1 1H27V11H1Z" {} }
                             }

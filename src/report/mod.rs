@@ -6,12 +6,14 @@
 
 pub mod chain;
 pub mod chart;
+pub mod diagnose;
 pub mod format;
 pub mod html;
 pub mod polar;
 pub mod terminal;
 
 mod decimate;
+mod plot;
 mod scale;
 
 pub use chain::{ChainDiagram, Place, Symbol};

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use maud::{Markup, html};
 
-use super::chart::{Colour, Dash, Size, path, px};
+use super::chart::{Colour, Dash};
 use super::decimate;
 use super::format::{self, Medium};
+use super::plot::{Size, path, px};
 use super::scale;
 
 /// A polar plot as data.
@@ -77,7 +78,7 @@ pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
                     title { (t.name) }
                     @let points = t.angle.iter().zip(t.deviation.iter()).map(|(a, d)| at(*a, radius(*d)));
                     @for run in decimate::runs(points) {
-                        path class="line" stroke-dasharray=[t.dash.pattern()] d=(path(&decimate::line(&run, 1.0, 4000))) {}
+                        path class=(t.dash.class()) stroke-dasharray=[t.dash.pattern()] d=(path(&decimate::line(&run, 1.0, 4000))) {}
                     }
                 }
             }

@@ -75,28 +75,17 @@ pub fn blocks(blocks: &[Block], layout: Layout) -> String {
 pub fn table(t: &Table, layout: Layout) -> String {
     let mut out = comfy_table::Table::new();
     out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(layout.width);
-    out.set_header(t.columns.iter().map(|c| printable(c).into_owned()).collect::<Vec<_>>());
-    for r in &t.rows {
-        let mark = |i: usize, text: String| {
-            if r.strong && i == 0 {
-                format!("> {text}")
-            } else if i == 0 {
-                format!("  {text}")
-            } else {
-                text
-            }
-        };
-        out.add_row(
-            r.cells
-                .iter()
-                .enumerate()
-                .map(|(i, c)| mark(i, printable(&format::cell(c, Medium::Terminal)).into_owned()))
-                .collect::<Vec<_>>(),
-        );
-    }
+    // A column of its own for the mark of rows that stand out.
     let marked = t.rows.iter().any(|r| r.strong);
+    let lead = |mark: &str| marked.then(|| mark.to_owned());
+    out.set_header(lead("").into_iter().chain(t.columns.iter().map(|c| printable(c).into_owned())));
+    for r in &t.rows {
+        let cells = r.cells.iter().map(|c| printable(&format::cell(c, Medium::Terminal)).into_owned());
+        out.add_row(lead(if r.strong { ">" } else { "" }).into_iter().chain(cells));
+    }
     for (i, column) in out.column_iter_mut().enumerate() {
-        column.set_padding((0, 2));
+        column.set_padding((0, if marked && i == 0 { 1 } else { 2 }));
+        let Some(i) = i.checked_sub(usize::from(marked)) else { continue };
         let mut cells = t.rows.iter().filter_map(|r| r.cells.get(i)).filter(|c| **c != Cell::Empty).peekable();
         if cells.peek().is_some() && cells.all(Cell::is_numeric) {
             column.set_cell_alignment(CellAlignment::Right);
@@ -108,8 +97,6 @@ pub fn table(t: &Table, layout: Layout) -> String {
     }
     for (i, line) in out.lines().enumerate() {
         let line = line.trim_end();
-        // Without a marked row the room for the mark is not needed.
-        let line = if marked || i == 0 { line } else { line.strip_prefix("  ").unwrap_or(line) };
         let _ = writeln!(text, "{}", if i == 0 { bold(line, layout) } else { line.to_owned() });
     }
     text.truncate(text.trim_end().len());
