@@ -364,3 +364,49 @@ fn the_terminal_shows_verdict_and_tables_within_the_width() {
     let coloured = terminal::render(&example(200, "axis X"), Layout { width: 80, colour: true });
     assert!(coloured.contains("\u{1b}[1m"));
 }
+
+/// Relative luminance and contrast of WCAG 2.2.
+fn contrast(a: &str, b: &str) -> f64 {
+    let luminance = |hex: &str| {
+        let hex = hex.trim_start_matches('#');
+        let hex: String = if hex.len() == 3 { hex.chars().flat_map(|c| [c, c]).collect() } else { hex.to_owned() };
+        let channel = |k: usize| {
+            let v = f64::from(u8::from_str_radix(&hex[2 * k..2 * k + 2], 16).expect("a colour")) / 255.0;
+            if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * channel(0) + 0.7152 * channel(1) + 0.0722 * channel(2)
+    };
+    let (a, b) = (luminance(a), luminance(b));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+#[test]
+fn text_has_the_contrast_of_wcag_aa_in_both_schemes() {
+    let page = html::page(&Report::default());
+    let value = |block: &str, name: &str| -> String {
+        let at = block.find(&format!("--{name}:")).unwrap_or_else(|| panic!("--{name}"));
+        let rest = &block[at + name.len() + 3..];
+        rest[..rest.find([';', '}']).expect("an end")].to_owned()
+    };
+    let blocks: Vec<&str> = page.split(":root{").skip(1).map(|b| &b[..b.find('}').expect("a brace")]).collect();
+    assert_eq!(blocks.len(), 2, "light and dark");
+    for block in blocks.iter().map(|b| format!("{b}}}")) {
+        let block = block.as_str();
+        for back in ["page", "card"] {
+            for text in ["text", "muted", "neutral"] {
+                let c = contrast(&value(block, text), &value(block, back));
+                assert!(c >= 4.5, "{text} on {back}: {c:.2}");
+            }
+            for line in ["blue", "vermillion", "green", "ink"] {
+                let c = contrast(&value(block, line), &value(block, back));
+                assert!(c >= 3.0, "{line} on {back}: {c:.2}");
+            }
+        }
+        for tone in ["good", "finding", "unsure", "neutral"] {
+            let c = contrast(&value(block, tone), &value(block, "page"));
+            assert!(c >= 4.5, "the sign of {tone}: {c:.2}");
+            let c = contrast(&value(block, "text"), &value(block, &format!("{tone}-bg")));
+            assert!(c >= 4.5, "text on {tone}: {c:.2}");
+        }
+    }
+}

@@ -425,8 +425,6 @@ fn how_far(f: &Findings) -> Vec<Block> {
         )
         .with(Series::line(after_name, o.time.clone(), o.after.clone()).in_colour(Colour::Blue));
         let minus = |model: &[f64]| -> Arc<[f64]> { o.measured.iter().zip(model).map(|(y, m)| y - m).collect() };
-        let n = o.time.len().min(2);
-        let ends: Vec<f64> = if n == 2 { vec![o.time[0], o.time[o.time.len() - 1]] } else { Vec::new() };
         let error = |title: &str| {
             Chart::new(
                 format!("{title} of {}", o.signal),
@@ -438,10 +436,10 @@ fn how_far(f: &Findings) -> Vec<Block> {
         let both = error("Error")
             .with(Series::line("model as given", o.time.clone(), minus(&o.before)).in_colour(Colour::Vermillion))
             .with(left.clone());
-        let remainder = error("What is left").with(left).with(
-            Series::band("noise, ± 2 standard deviations", ends, vec![-2.0 * o.noise; n], vec![2.0 * o.noise; n])
-                .in_colour(Colour::Grey),
-        );
+        let remainder = error("What is left")
+            .with(left)
+            .mark(Mark::Y(2.0 * o.noise, "2 standard deviations of the noise".into()))
+            .mark(Mark::Y(-2.0 * o.noise, String::new()));
         blocks.push(Block::Figure(Figure::new(chart, "")));
         blocks.push(Block::Figures(vec![Figure::new(both, ""), Figure::new(remainder, "")]));
     }

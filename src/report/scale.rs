@@ -264,6 +264,28 @@ mod tests {
     }
 
     #[test]
+    fn a_tick_stands_at_the_value_its_label_says() {
+        // Ranges of every size and position, from a fixed sequence.
+        let mut u = (1..).map(|k| (f64::from(k) * 0.754_877_666_246_693).fract());
+        let mut next = || u.next().unwrap_or(0.5);
+        for _ in 0..2000 {
+            let size = 10f64.powf(6.0 * next() - 3.0);
+            let (low, width) = (size * (2.0 * next() - 1.0), size * (0.01 + next()));
+            let s = scale(&Axis::linear("a", ""), &[low, low + width]);
+            // Without a power of ten or an offset in the title the labels are the values themselves.
+            if s.title != "a" {
+                continue;
+            }
+            assert!((2..=11).contains(&s.ticks.len()), "{low} {width}: {:?}", labels(&s));
+            let step = s.ticks[1].share - s.ticks[0].share;
+            for t in &s.ticks {
+                let value: f64 = t.label.as_deref().unwrap_or("").replace('−', "-").parse().expect("a number");
+                assert!((s.share(value) - t.share).abs() < 1e-6 * step, "{low} {width}: {value}");
+            }
+        }
+    }
+
+    #[test]
     fn degenerate_data_still_give_an_axis() {
         for values in
             [&[][..], &[f64::NAN], &[0.0], &[3.5, 3.5], &[1.0, 1.0 + 1e-16], &[f64::INFINITY, -1.0], &[1e300, -1e300]]
