@@ -2,3 +2,5 @@
 
 pub mod excitation;
 pub mod levenberg;
+pub mod lsq;
+pub mod recursive;
