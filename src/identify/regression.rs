@@ -1,0 +1,365 @@
+//! The regressions that need no model run: LS, RLS and ELS on the rows of [`Record`] in the form F5.
+//!
+//! ```text
+//! F5   a1 = -(K/I1)*twist - (B/I1)*rate + (1/I1)*torque      motor
+//!      a2 =  (K/I2)*twist + (B/I2)*rate                      table
+//! ```
+//!
+//! The accelerations, which noise hurts most, stand on the left; the unknowns are reconciled to I1, I2, B, K by
+//! [`Rows::reconcile`].
+
+use nalgebra::{SMatrix, SVector};
+
+use super::lsq::{Deficient, Solution, triangularise};
+use super::parameters::{Estimated, Rows};
+use super::record::Record;
+use super::recursive::{Els, Rls};
+use super::result::History;
+
+/// Past residuals in the noise model of ELS.
+pub const NOISE_ORDER: usize = 2;
+/// Unknowns of the motor's and the table's row with a noise model.
+const MOTOR_ELS: usize = 3 + NOISE_ORDER;
+const TABLE_ELS: usize = 2 + NOISE_ORDER;
+/// Most rounds of batch ELS.
+const ROUNDS: usize = 50;
+/// Points of a parameter history.
+const HISTORY: usize = 400;
+
+/// A regression that the data cannot carry.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RegressionError {
+    /// Directions that the record does not excite.
+    #[error(
+        "the record does not determine {parameters} ({side} equation): {why}. Excite the axis around and above its \
+         natural frequency, with both sides moving"
+    )]
+    Unexcited {
+        /// `motor` or `table`.
+        side: &'static str,
+        /// The parameters.
+        parameters: String,
+        /// What the data show.
+        why: String,
+    },
+    /// Too few rows.
+    #[error("{rows} rows for {unknowns} unknowns; record longer")]
+    TooShort {
+        /// Rows there are.
+        rows: usize,
+        /// Unknowns.
+        unknowns: usize,
+    },
+    /// An iteration that did not settle.
+    #[error("{what} did not settle; use OE (--method oe), which needs no noise-free regressors")]
+    Diverged {
+        /// What.
+        what: &'static str,
+    },
+}
+
+fn unexcited(side: &'static str, names: &[&str], e: &Deficient) -> RegressionError {
+    let which: Vec<&str> = e.columns.iter().filter_map(|c| names.get(*c).copied()).collect();
+    let parameters = if which.is_empty() { names.join(", ") } else { which.join(", ") };
+    let why = if e.smallest == 0.0 {
+        "the signal that goes with it is zero throughout".to_owned()
+    } else {
+        format!("its signals are dependent to {:.0e}", e.smallest)
+    };
+    RegressionError::Unexcited { side, parameters, why }
+}
+
+const MOTOR: [&str; 3] = ["K", "B", "I1"];
+const TABLE: [&str; 2] = ["K/I2", "B/I2"];
+
+fn long_enough(record: &Record, unknowns: usize) -> Result<usize, RegressionError> {
+    let rows = record.rows();
+    if rows < 4 * unknowns { Err(RegressionError::TooShort { rows, unknowns }) } else { Ok(rows) }
+}
+
+/// Variance of a row's residual, kept above what rounding leaves of the left side.
+fn variance(solution: &Solution, left: f64) -> f64 {
+    solution.variance(0).max((1e-15 * left).powi(2)).max(f64::MIN_POSITIVE)
+}
+
+/// Least squares (paper, eq. 7; by QR).
+///
+/// # Errors
+/// When the record is too short or does not excite a direction.
+pub fn least_squares(record: &Record) -> Result<Estimated, RegressionError> {
+    Ok(rows(record)?.reconcile())
+}
+
+/// Least squares for both rows.
+pub(super) fn rows(record: &Record) -> Result<Rows, RegressionError> {
+    let n = long_enough(record, 5)?;
+    let motor = triangularise(n, 3, 1, |k, out| {
+        let r = record.row(k);
+        out.copy_from_slice(&[-r.twist, -r.rate, r.torque, r.a1]);
+    });
+    let table = triangularise(n, 2, 1, |k, out| {
+        let r = record.row(k);
+        out.copy_from_slice(&[r.twist, r.rate, r.a2]);
+    });
+    let m = motor.solve().map_err(|e| unexcited("motor", &MOTOR, &e))?;
+    let t = table.solve().map_err(|e| unexcited("table", &TABLE, &e))?;
+    if t.phi.iter().all(|v| *v == 0.0) {
+        let why = "the table does not move".to_owned();
+        return Err(RegressionError::Unexcited { side: "table", parameters: "I2".to_owned(), why });
+    }
+    let (vm, vt) = (variance(&m, motor.rms(3)), variance(&t, table.rms(2)));
+    Ok(Rows {
+        motor: SVector::from_fn(|i, _| m.phi[(i, 0)]),
+        motor_covariance: SMatrix::from_fn(|i, j| m.inverse[(i, j)] * vm),
+        table: SVector::from_fn(|i, _| t.phi[(i, 0)]),
+        table_covariance: SMatrix::from_fn(|i, j| t.inverse[(i, j)] * vt),
+    })
+}
+
+/// Scales that bring regressors and left sides to unit rms.
+struct Scales {
+    motor: [f64; 4],
+    table: [f64; 3],
+}
+
+impl Scales {
+    fn new(record: &Record) -> Result<Self, RegressionError> {
+        let n = long_enough(record, 5)?;
+        let mut sums = [0.0; 5];
+        for k in 0..n {
+            let r = record.row(k);
+            for (sum, v) in sums.iter_mut().zip([r.twist, r.rate, r.torque, r.a1, r.a2]) {
+                *sum += v * v;
+            }
+        }
+        let [twist, rate, torque, a1, a2] = sums.map(|s| (s / n as f64).sqrt());
+        for (value, name) in [(twist, "K"), (rate, "B"), (torque, "I1"), (a1, "I1"), (a2, "I2")] {
+            if value == 0.0 || !value.is_finite() {
+                let why = "the signal that goes with it is zero throughout".to_owned();
+                return Err(RegressionError::Unexcited { side: "motion", parameters: name.to_owned(), why });
+            }
+        }
+        Ok(Self { motor: [twist, rate, torque, a1], table: [twist, rate, a2] })
+    }
+
+    fn rows(
+        &self,
+        (motor, motor_covariance): (SVector<f64, 3>, SMatrix<f64, 3, 3>),
+        (table, table_covariance): (SVector<f64, 2>, SMatrix<f64, 2, 2>),
+    ) -> Rows {
+        let m = |i: usize| self.motor[3] / self.motor[i];
+        let t = |i: usize| self.table[2] / self.table[i];
+        Rows {
+            motor: SVector::from_fn(|i, _| motor[i] * m(i)),
+            motor_covariance: SMatrix::from_fn(|i, j| motor_covariance[(i, j)] * m(i) * m(j)),
+            table: SVector::from_fn(|i, _| table[i] * t(i)),
+            table_covariance: SMatrix::from_fn(|i, j| table_covariance[(i, j)] * t(i) * t(j)),
+        }
+    }
+}
+
+/// Running residual variance of a recursive method, with the method's forgetting.
+#[derive(Default)]
+struct Variance {
+    sum: f64,
+    weight: f64,
+}
+
+impl Variance {
+    fn add(&mut self, lambda: f64, square: f64) {
+        self.sum = lambda * self.sum + square;
+        self.weight = lambda * self.weight + 1.0;
+    }
+
+    fn value(&self) -> f64 {
+        (self.sum / self.weight.max(1.0)).max(1e-30)
+    }
+}
+
+/// Collects a history at some hundred rows.
+struct Recorder {
+    every: usize,
+    history: History,
+}
+
+impl Recorder {
+    fn new(rows: usize) -> Self {
+        let parameters = super::parameters::NAMES.iter().map(|n| (*n, Vec::new())).collect();
+        Self { every: rows.div_ceil(HISTORY).max(1), history: History { time: Vec::new(), parameters } }
+    }
+
+    fn wants(&self, k: usize, rows: usize) -> bool {
+        k.is_multiple_of(self.every) || k + 1 == rows
+    }
+
+    fn take(&mut self, time: f64, estimated: &Estimated) {
+        self.history.time.push(time);
+        let physical = estimated.is_physical();
+        for (i, (_, values)) in self.history.parameters.iter_mut().enumerate() {
+            values.push(if physical { estimated.values[i] } else { f64::NAN });
+        }
+    }
+}
+
+/// Recursive least squares with forgetting factor `lambda` and `P(0) = p0*I` on regressors of unit rms; the estimate at
+/// the end and its history.
+///
+/// # Errors
+/// When the record is too short or a signal is zero throughout.
+pub fn recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
+    let scales = Scales::new(record)?;
+    let n = record.rows();
+    let (mut motor, mut table) = (Rls::<3, 1>::new(lambda, p0), Rls::<2, 1>::new(lambda, p0));
+    let (mut vm, mut vt) = (Variance::default(), Variance::default());
+    let mut recorder = Recorder::new(n);
+    let mut last = None;
+    for k in 0..n {
+        let r = record.row(k);
+        let s = &scales.motor;
+        let f = SVector::from([-r.twist / s[0], -r.rate / s[1], r.torque / s[2]]);
+        let y = r.a1 / s[3];
+        motor.update(&f, &[y].into());
+        vm.add(lambda, (y - motor.theta.column(0).dot(&f)).powi(2));
+        let s = &scales.table;
+        let f = SVector::from([r.twist / s[0], r.rate / s[1]]);
+        let y = r.a2 / s[2];
+        table.update(&f, &[y].into());
+        vt.add(lambda, (y - table.theta.column(0).dot(&f)).powi(2));
+        if recorder.wants(k, n) {
+            let estimated = scales
+                .rows(
+                    (motor.theta.column(0).into(), motor.covariance * vm.value()),
+                    (table.theta.column(0).into(), table.covariance * vt.value()),
+                )
+                .reconcile();
+            recorder.take(record.time(k), &estimated);
+            last = Some(estimated);
+        }
+    }
+    last.map(|e| (e, recorder.history)).ok_or(RegressionError::Diverged { what: "RLS" })
+}
+
+/// Extended least squares, recursive: a moving-average noise model of order [`NOISE_ORDER`] in each row.
+///
+/// # Errors
+/// As [`recursive`].
+pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
+    let scales = Scales::new(record)?;
+    let n = record.rows();
+    // The past residuals are brought to the size of the other regressors by the level of the plain residuals.
+    let plain = rows(record)?;
+    let level = |sum: f64| if sum > 0.0 { 1.0 / (sum / n as f64).sqrt().max(1e-12) } else { 1e12 };
+    let (mut sm, mut st) = (0.0, 0.0);
+    for k in 0..n {
+        let r = record.row(k);
+        let motor = r.a1 + plain.motor[0] * r.twist + plain.motor[1] * r.rate - plain.motor[2] * r.torque;
+        let table = r.a2 - plain.table[0] * r.twist - plain.table[1] * r.rate;
+        sm += (motor / scales.motor[3]).powi(2);
+        st += (table / scales.table[2]).powi(2);
+    }
+    let mut motor = Els::<MOTOR_ELS>::new(3, lambda, p0, level(sm));
+    let mut table = Els::<TABLE_ELS>::new(2, lambda, p0, level(st));
+    let (mut vm, mut vt) = (Variance::default(), Variance::default());
+    let mut recorder = Recorder::new(n);
+    let mut last = None;
+    for k in 0..n {
+        let r = record.row(k);
+        let s = &scales.motor;
+        let e = motor.update(&[-r.twist / s[0], -r.rate / s[1], r.torque / s[2]], r.a1 / s[3]);
+        vm.add(lambda, e * e);
+        let s = &scales.table;
+        let e = table.update(&[r.twist / s[0], r.rate / s[1]], r.a2 / s[2]);
+        vt.add(lambda, e * e);
+        if recorder.wants(k, n) {
+            let (m, t) = (&motor.rls, &table.rls);
+            let estimated = scales
+                .rows(
+                    (m.theta.fixed_view::<3, 1>(0, 0).into(), m.covariance.fixed_view::<3, 3>(0, 0) * vm.value()),
+                    (t.theta.fixed_view::<2, 1>(0, 0).into(), t.covariance.fixed_view::<2, 2>(0, 0) * vt.value()),
+                )
+                .reconcile();
+            recorder.take(record.time(k), &estimated);
+            last = Some(estimated);
+        }
+    }
+    last.map(|e| (e, recorder.history)).ok_or(RegressionError::Diverged { what: "ELS" })
+}
+
+/// Extended least squares in batches: LS, its residuals, LS with the past residuals as regressors, repeated until the
+/// estimates rest.
+///
+/// # Errors
+/// When the record is too short, does not excite a direction, or the rounds do not settle.
+pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
+    let n = long_enough(record, MOTOR_ELS)?;
+    let plain = rows(record)?;
+    let motor_row = |k: usize| {
+        let r = record.row(k);
+        ([-r.twist, -r.rate, r.torque], r.a1)
+    };
+    let table_row = |k: usize| {
+        let r = record.row(k);
+        ([r.twist, r.rate], r.a2)
+    };
+    let motor = batch::<3>(n, plain.motor, plain.motor_covariance, motor_row)?;
+    let table = batch::<2>(n, plain.table, plain.table_covariance, table_row)?;
+    Ok(Rows { motor: motor.0, motor_covariance: motor.1, table: table.0, table_covariance: table.1 }.reconcile())
+}
+
+type Fitted<const P: usize> = (SVector<f64, P>, SMatrix<f64, P, P>);
+
+fn batch<const P: usize>(
+    n: usize,
+    plain: SVector<f64, P>,
+    plain_covariance: SMatrix<f64, P, P>,
+    row: impl Fn(usize) -> ([f64; P], f64) + Sync,
+) -> Result<Fitted<P>, RegressionError> {
+    let mut residual: Vec<f64> = (0..n)
+        .map(|k| {
+            let (x, y) = row(k);
+            y - plain.dot(&SVector::from(x))
+        })
+        .collect();
+    let (mut phi, mut covariance) = (plain, plain_covariance);
+    let left = super::statistics::rms(&(0..n).map(|k| row(k).1).collect::<Vec<_>>());
+    for round in 1..=ROUNDS {
+        // Without a residual beyond rounding there is no noise to model.
+        if super::statistics::rms(&residual) <= 1e-11 * left {
+            return Ok((phi, covariance));
+        }
+        let past = |k: usize, lag: usize| if k >= lag { residual[k - lag] } else { 0.0 };
+        let triangle = triangularise(n, P + NOISE_ORDER, 1, |k, out| {
+            let (x, y) = row(k);
+            out[..P].copy_from_slice(&x);
+            for lag in 1..=NOISE_ORDER {
+                out[P + lag - 1] = past(k, lag);
+            }
+            out[P + NOISE_ORDER] = y;
+        });
+        let solution = triangle.solve().map_err(|_| RegressionError::Diverged { what: "batch ELS" })?;
+        let next = SVector::<f64, P>::from_fn(|i, _| solution.phi[(i, 0)]);
+        let v = variance(&solution, triangle.rms(P + NOISE_ORDER));
+        let moved = (0..P).map(|i| ((next[i] - phi[i]).powi(2) / covariance[(i, i)]).sqrt()).fold(0.0, f64::max);
+        phi = next;
+        covariance = SMatrix::from_fn(|i, j| solution.inverse[(i, j)] * v);
+        let coefficients: Vec<f64> = (0..NOISE_ORDER).map(|l| solution.phi[(P + l, 0)]).collect();
+        let mut fresh = vec![0.0; n];
+        for (k, fresh) in fresh.iter_mut().enumerate() {
+            let (x, y) = row(k);
+            let mut e = y - phi.dot(&SVector::from(x));
+            for (l, c) in coefficients.iter().enumerate() {
+                // The residuals of the round before, so that a noise model at the edge of stability cannot run away.
+                e -= c * past(k, l + 1);
+            }
+            *fresh = e;
+        }
+        residual = fresh;
+        // Noise at the edge of invertibility (differences of white noise) makes the rounds hover instead of settle: what
+        // stays within half a standard error is no different estimate.
+        if moved < if round == ROUNDS { 0.5 } else { 1e-3 } {
+            return Ok((phi, covariance));
+        }
+    }
+    Err(RegressionError::Diverged { what: "batch ELS" })
+}

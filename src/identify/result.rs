@@ -1,0 +1,292 @@
+//! The result of an identification as plain data: what the terminal, the JSON file and the HTML report show.
+
+use serde::Serialize;
+
+use super::levenberg::Termination;
+use crate::trace::Signal;
+
+/// Version of the JSON form.
+pub const SCHEMA: &str = "eixo.identification/1";
+
+/// Everything an identification found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Identification {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// Name of the machine.
+    pub machine: String,
+    /// `two_inertia` or `rigid`.
+    pub structure: &'static str,
+    /// What was identified from.
+    pub trace: TraceSummary,
+    /// One a method, in the order asked for.
+    pub methods: Vec<MethodResult>,
+    /// Index of the method to trust, and why.
+    pub recommended: Option<Recommendation>,
+    /// The measured torque, for plotting, and its spectrum.
+    pub torque: Series,
+    /// Amplitude spectrum of the measured torque.
+    pub torque_spectrum: Series,
+    /// For periodic records: measured against modelled frequency response.
+    pub frequency_response: Option<FrequencyResponse>,
+    /// What the user should know, each with what to do.
+    pub warnings: Vec<String>,
+}
+
+/// The method to trust.
+#[derive(Debug, Clone, Serialize)]
+pub struct Recommendation {
+    /// Index into [`Identification::methods`].
+    pub method: usize,
+    /// Why.
+    pub why: String,
+}
+
+/// What the record was.
+#[derive(Debug, Clone, Serialize)]
+pub struct TraceSummary {
+    /// The file.
+    pub file: String,
+    /// Number of samples.
+    pub samples: usize,
+    /// Interval, s.
+    pub dt: f64,
+    /// First sample, s.
+    pub start: f64,
+    /// Length, s.
+    pub duration: f64,
+    /// `zoh` or `linear`.
+    pub hold: &'static str,
+    /// The signals it has.
+    pub signals: Vec<Signal>,
+    /// Samples of a period, where the record is periodic.
+    pub period: Option<usize>,
+}
+
+/// A parameter as estimated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Its name: I1, I2, B, K, wn, wd, zeta, ...
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// The estimate.
+    pub value: f64,
+    /// Standard error by the estimator's own account; None where it gives none.
+    pub std: Option<f64>,
+    /// The reference, where one is given.
+    pub reference: Option<f64>,
+    /// `100*(value - reference)/reference`.
+    pub error_percent: Option<f64>,
+}
+
+/// How well a simulation with the estimates follows a measured output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputFit {
+    /// The output.
+    pub signal: Signal,
+    /// Root mean square of the measured output about its mean.
+    pub rms: f64,
+    /// Root mean square of measured minus simulated.
+    pub rms_error: f64,
+    /// `100*(1 - rms_error/rms)`.
+    pub fit_percent: f64,
+    /// Whiteness of measured minus simulated.
+    pub whiteness: Whiteness,
+    /// Measured minus simulated, for plotting.
+    pub residual: Series,
+}
+
+/// Ljung-Box test of a residual.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Whiteness {
+    /// The statistic.
+    pub q: f64,
+    /// Lags it sums over.
+    pub lags: usize,
+    /// Probability of a larger one if the residual were white.
+    pub p_value: f64,
+    /// Whether it passes at the 1 % level.
+    pub white: bool,
+}
+
+/// A curve, thinned for plotting.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Series {
+    /// What it shows.
+    pub name: String,
+    /// Unit of x.
+    pub x_unit: &'static str,
+    /// Unit of y.
+    pub y_unit: &'static str,
+    /// Abscissa.
+    pub x: Vec<f64>,
+    /// Ordinate.
+    pub y: Vec<f64>,
+}
+
+/// How the estimates of a recursive method went (the paper's Figures 6 to 9).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct History {
+    /// Time, s, at most some thousand points.
+    pub time: Vec<f64>,
+    /// One curve a parameter: name and values, NaN (null) while undetermined.
+    pub parameters: Vec<(&'static str, Vec<f64>)>,
+}
+
+/// The torque estimated from the motion (Inverse Problem 2).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExcitationEstimate {
+    /// How: the equation used.
+    pub formulation: &'static str,
+    /// `100*rms(estimate - T)/rms(T)`.
+    pub error_percent: f64,
+    /// Estimate, for plotting.
+    pub estimate: Series,
+    /// Estimate minus measured, for plotting (the paper's Figures 11 to 13).
+    pub error: Series,
+    /// Amplitude spectrum of the estimate (the paper's Figure 10).
+    pub spectrum: Series,
+}
+
+/// What one method found.
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodResult {
+    /// `ls`, `rls`, `els`, `iv`, `oe`, `frequency`.
+    pub method: &'static str,
+    /// In words.
+    pub title: String,
+    /// The regression or the model behind it, in words.
+    pub formulation: String,
+    /// Estimates of the parameters.
+    pub parameters: Vec<Estimate>,
+    /// Modal parameters, standard errors propagated.
+    pub modal: Vec<Estimate>,
+    /// Fit of a simulation with the estimates, one an output.
+    pub outputs: Vec<OutputFit>,
+    /// Parameter histories of a recursive method.
+    pub history: Option<History>,
+    /// Excitation estimate with these parameters.
+    pub excitation: Option<ExcitationEstimate>,
+    /// How an iterative method ended.
+    pub termination: Option<Termination>,
+    /// Iterations of an iterative method.
+    pub iterations: Option<usize>,
+    /// Remarks.
+    pub notes: Vec<String>,
+    /// Why there is no estimate; the lists are then empty.
+    pub failure: Option<String>,
+}
+
+/// Measured frequency response against the model's, at the excited lines.
+#[derive(Debug, Clone, Serialize)]
+pub struct FrequencyResponse {
+    /// Frequencies of the lines, Hz.
+    pub frequency: Vec<f64>,
+    /// One a measured output.
+    pub outputs: Vec<ResponseOf>,
+    /// Periods averaged.
+    pub periods: usize,
+    /// Samples of a period.
+    pub period: usize,
+}
+
+/// Frequency response from the torque to one output.
+#[derive(Debug, Clone, Serialize)]
+pub struct ResponseOf {
+    /// The output.
+    pub signal: Signal,
+    /// Measured magnitude (output's unit over torque's).
+    pub magnitude: Vec<f64>,
+    /// Measured phase, rad.
+    pub phase: Vec<f64>,
+    /// Standard deviation of the measured response from the scatter between periods, magnitude.
+    pub std: Vec<f64>,
+    /// Modelled magnitude.
+    pub model_magnitude: Vec<f64>,
+    /// Modelled phase, rad.
+    pub model_phase: Vec<f64>,
+    /// `100*|G_model - G|/|G|` over all lines, root mean square with each line's own size.
+    pub error_percent: f64,
+    /// Frequency of the smallest magnitude inside the band, Hz, where it is a minimum (antiresonance).
+    pub antiresonance: Option<f64>,
+    /// Frequency of the largest inertia-normalised magnitude inside the band, Hz (resonance).
+    pub resonance: Option<f64>,
+}
+
+impl Estimate {
+    /// An estimate against a reference.
+    #[must_use]
+    pub fn new(name: &'static str, unit: &'static str, value: f64, std: Option<f64>, reference: Option<f64>) -> Self {
+        let error_percent = reference.filter(|r| *r != 0.0).map(|r| 100.0 * (value - r) / r);
+        Self { name, unit, value, std, reference, error_percent }
+    }
+}
+
+/// Most points of a plotted curve.
+const POINTS: usize = 4096;
+
+impl Series {
+    /// A curve over time `start + k*dt`, thinned so that every bucket keeps its extremes.
+    #[must_use]
+    pub fn over_time(name: impl Into<String>, y_unit: &'static str, start: f64, dt: f64, values: &[f64]) -> Self {
+        let kept = thin(values);
+        Self {
+            name: name.into(),
+            x_unit: "s",
+            y_unit,
+            x: kept.iter().map(|k| start + *k as f64 * dt).collect(),
+            y: kept.iter().map(|k| values[*k]).collect(),
+        }
+    }
+}
+
+/// Indices to plot: all, or the smallest and the largest of each bucket.
+fn thin(values: &[f64]) -> Vec<usize> {
+    if values.len() <= POINTS {
+        return (0..values.len()).collect();
+    }
+    let buckets = POINTS / 2;
+    let mut kept = Vec::with_capacity(POINTS);
+    for b in 0..buckets {
+        let range = b * values.len() / buckets..(b + 1) * values.len() / buckets;
+        let (mut low, mut high) = (range.start, range.start);
+        for k in range {
+            if values[k] < values[low] {
+                low = k;
+            }
+            if values[k] > values[high] {
+                high = k;
+            }
+        }
+        kept.push(low.min(high));
+        if low != high {
+            kept.push(low.max(high));
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_curve_keeps_its_extremes() {
+        let mut values: Vec<f64> = (0..100_000).map(|k| (f64::from(k) * 1e-3).sin()).collect();
+        values[54_321] = 9.0;
+        values[12_345] = -9.0;
+        let series = Series::over_time("a", "rad", 0.0, 0.5, &values);
+        assert!(series.x.len() <= POINTS);
+        assert!(series.y.contains(&9.0) && series.y.contains(&-9.0));
+        assert!(series.x.contains(&(54_321.0 * 0.5)));
+        assert!(series.x.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn an_error_is_relative_to_its_reference() {
+        let error = Estimate::new("K", "N.m/rad", 1.1, None, Some(2.0)).error_percent.unwrap();
+        assert!((error + 45.0).abs() < 1e-12);
+        assert_eq!(Estimate::new("K", "N.m/rad", 1.1, None, Some(0.0)).error_percent, None);
+    }
+}
