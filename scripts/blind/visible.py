@@ -33,11 +33,16 @@ def discrete(base: dict, dt: float):
 def _march(f, g0, g1, u, x0):
     n = u.shape[0]
     out = np.empty((n, 4))
-    x = x0.copy()
-    for k in range(n):
-        out[k] = x
-        if k < n - 1:
-            x = f @ x + g0 @ u[k] + g1 @ (u[k + 1] - u[k])
+    for i in range(4):
+        out[0, i] = x0[i]
+    for k in range(n - 1):
+        for i in range(4):
+            v = 0.0
+            for j in range(4):
+                v += f[i, j] * out[k, j]
+            for j in range(2):
+                v += g0[i, j] * u[k, j] + g1[i, j] * (u[k + 1, j] - u[k, j])
+            out[k + 1, i] = v
     return out
 
 
@@ -47,24 +52,41 @@ def linear_response(base, dt, u, x0):
     return _march(f, g0, g1, np.ascontiguousarray(u), np.ascontiguousarray(x0, dtype=float))
 
 
-def refit_residual(base: dict, dt: float, states: np.ndarray, error: np.ndarray, outputs) -> np.ndarray:
-    """What stays of `error` (n x 4, effect minus no effect) in the columns `outputs` after the windowed linear re-fit.
+class Windows:
+    """Windows of a record with their initial states projected out, seen through the columns `outputs` of the state."""
 
-    `states` (n x 4) is the trajectory about which the base parameters vary. Rows beyond the last whole window are dropped.
-    """
-    th1, w1, th2, w2 = states.T
-    a1, a2, twist, rate = np.gradient(w1, dt), np.gradient(w2, dt), th1 - th2, w1 - w2
-    zero = np.zeros_like(a1)
-    forces = [np.stack(x, axis=1) for x in ((-a1, zero), (zero, -a2), (-rate, rate), (-twist, twist))]
-    columns = [error] + [linear_response(base, dt, f * s, np.zeros(4)) for f, s in
-                         zip(forces, (base["I1"], base["I2"], base["B"], base["K"]))]
-    free = np.stack([linear_response(base, dt, np.zeros((WINDOW, 2)), e)[:, outputs].ravel() for e in np.eye(4)], axis=1)
-    q, _ = np.linalg.qr(free / np.linalg.norm(free, axis=0))
-    windows = states.shape[0] // WINDOW
-    flat = np.stack([c[: windows * WINDOW, outputs].reshape(windows, -1) for c in columns], axis=2)
-    flat = flat - np.einsum("ij,wjc->wic", q, np.einsum("ij,wic->wjc", q, flat))
-    flat = flat.reshape(-1, len(columns))
-    scale = np.linalg.norm(flat[:, 1:], axis=0)
-    sens = flat[:, 1:] / np.where(scale > 0, scale, 1.0)
-    fit, *_ = np.linalg.lstsq(sens, flat[:, 0], rcond=1e-12)
-    return flat[:, 0] - sens @ fit
+    def __init__(self, base: dict, dt: float, samples: int, outputs):
+        self.base, self.dt, self.outputs, self.count = base, dt, outputs, samples // WINDOW
+        free = [linear_response(base, dt, np.zeros((WINDOW, 2)), e)[:, outputs].ravel() for e in np.eye(4)]
+        free = np.stack(free, axis=1)
+        self.q, _ = np.linalg.qr(free / np.linalg.norm(free, axis=0))
+
+    def flat(self, trace: np.ndarray) -> np.ndarray:
+        """A trace (n x 4) as one vector, less what initial states explain; rows beyond the last whole window are dropped."""
+        w = trace[: self.count * WINDOW, self.outputs].reshape(self.count, -1)
+        return (w - (w @ self.q) @ self.q.T).ravel()
+
+    def forced(self, motor, table) -> np.ndarray:
+        """Flat response to torques on motor and table (n each)."""
+        return self.flat(linear_response(self.base, self.dt, np.stack([motor, table], axis=1), np.zeros(4)))
+
+    def parameters(self, states: np.ndarray) -> list:
+        """Flat sensitivities to I1, I2, B, K about the trajectory `states`."""
+        th1, w1, th2, w2 = states.T
+        a1, a2, twist, rate = np.gradient(w1, self.dt), np.gradient(w2, self.dt), th1 - th2, w1 - w2
+        zero = np.zeros_like(a1)
+        return [self.forced(*f) for f in ((-a1, zero), (zero, -a2), (-rate, rate), (-twist, twist))]
+
+
+def unit(columns) -> np.ndarray:
+    """Columns (list of vectors) as a matrix, each scaled to unit length."""
+    m = np.stack(columns, axis=1)
+    return m / np.maximum(np.linalg.norm(m, axis=0), 1e-300)
+
+
+def refit_residual(base: dict, dt: float, states: np.ndarray, error: np.ndarray, outputs) -> np.ndarray:
+    """What stays of `error` (n x 4, effect minus no effect) after the windowed linear re-fit about the trajectory `states`."""
+    windows = Windows(base, dt, states.shape[0], outputs)
+    target, sens = windows.flat(error), unit(windows.parameters(states))
+    fit, *_ = np.linalg.lstsq(sens, target, rcond=1e-12)
+    return target - sens @ fit
