@@ -98,7 +98,7 @@ def _share_root(shares, target, low, high):
 
 def _dry(ref, rng, size, place):
     key, w = ("fm", ref.w1_rms) if place == "motor" else ("ft", ref.w2_rms)
-    p = {f"{key}_c": size * ref.torque_rms} | plant.stiff_bristle(ref.base, place, ref.dt)
+    p = {f"{key}_c": size * ref.torque_rms} | plant.stiff_bristle(ref.base, place, size * ref.torque_rms, ref.dt)
     variant = rng.choice(["plain", "stribeck", "asymmetric"], p=[0.5, 0.25, 0.25])
     if variant == "stribeck":
         p[f"{key}_s"] = p[f"{key}_c"] * rng.uniform(1.3, 2.0)
@@ -132,11 +132,6 @@ def _cubic(ref, rng, size):
     return "softening", {"k3": -min(k3, 0.7 / (3.0 * np.max(np.abs(ref.twist)) ** 2))}
 
 
-def _drift(ref, rng, size, end):
-    """Rate [1/s or N.m/s] that reaches `end` over the record."""
-    return end / ref.duration
-
-
 def _stiffness_drift(ref, rng, size):
     size *= _sign(rng)
     if rng.random() < 2 / 3:
@@ -149,7 +144,7 @@ def _friction_drift(ref, rng, size):
     end = math.sqrt(3.0) * size * ref.torque_rms  # the rms of a ramp is its end over sqrt(3)
     if rng.random() < 0.5:
         return "viscous", {"vm_rate": end / ref.w1_rms / ref.duration}
-    return "coulomb", {"fm_rate": end / ref.duration} | plant.stiff_bristle(ref.base, "motor", ref.dt)
+    return "coulomb", {"fm_rate": end / ref.duration} | plant.stiff_bristle(ref.base, "motor", 0.5 * end, ref.dt)
 
 
 def _flexible(ref, rng, size):
@@ -275,9 +270,7 @@ def draw(effect: str, ref: Reference, rng: np.random.Generator, size: float) -> 
     elif effect == "torque_gain":
         p = {"gain": 1.0 + _sign(rng) * size}
     elif effect == "encoder_quantisation":
-        variant = str(rng.choice(["both", "table"], p=[0.6, 0.4]))
-        step = size * ref.twist_rms
-        sensor = {"step2": step} | ({"step1": step} if variant == "both" else {})
+        sensor = {"step1": size * ref.twist_rms, "step2": size * ref.twist_rms}
     elif effect == "sensor_delay":
         sensor = {"delay2": size * ref.twist_rms / ref.w2_rms}
     elif effect == "lead_error":

@@ -1,7 +1,7 @@
 """An independent simulator of the drive axis, for the withheld-effect check.
 
 It shares no line, no formula table and no integrator with the Rust crate: classical Runge-Kutta of order 4 on fine fixed
-sub-steps (40 a sample by default), where the crate steps Newmark implicitly once a sample.
+sub-steps (40 a sample and more), where the crate steps Newmark implicitly once a sample.
 
     I1*w1' = u - friction_motor + load + ripple(th1) - c            motor and screw
     I2*w2' = c - friction_table - ... - m                           table
@@ -11,12 +11,13 @@ sub-steps (40 a sample by default), where the crate steps Newmark implicitly onc
 
 Formulations (each differs from the crate on purpose):
 
-- dry friction: LuGre bristles (Canudas de Wit et al. 1995), z' = w - s0*|w|*z/g(w), F = s0*z + s1*z', stiff for Coulomb and
-  soft for presliding; z is advanced by its exact exponential for the frozen speed (Strang split, half a sub-step on either side);
+- dry friction: LuGre bristles (Canudas de Wit et al. 1995), z' = w - s0*|w|*z/g(w), F = s0*z + s1(w)*z', stiff for Coulomb and
+  soft for presliding; z is advanced by its exact exponential for the frozen speed (Strang split, half a sub-step on either side).
+  Stiff bristles damp only while stuck, s1(w) = s1*exp(-(w/wd)^2) (Olsson 1996, section 3.4), and get twice the sub-steps;
 - backlash: contact on either flank with spring and damper, the sum clipped so that a flank never pulls; no torque in the gap;
 - delay: the held torque shifted in continuous time, sub-steps broken at the shifted jumps;
 - lag: tau*u' = r - u integrated beside the mechanics;
-- coupling hysteresis: Bouc-Wen, x_y*z' = d'*(1 - |z|^n*(1 + sign(d'*z))/2), torque F*z in parallel with the spring;
+- coupling hysteresis: Bouc-Wen with beta = gamma, x_y*z' = d'*(1 - |z|^n*(1 + sign(d'*z))/2), torque F*z in parallel with the spring;
 - end stop: Kelvin-Voigt contact, clipped at zero.
 """
 from __future__ import annotations
@@ -27,12 +28,13 @@ import numpy as np
 from numba import njit
 
 SUBSTEPS = 40
+SUBSTEPS_STIFF = 80  # with stiff bristles
 
 # Every scalar the kernel reads, in order; all default to 0 = absent.
 NAMES = (
     "I1", "I2", "B", "K",
-    "fm_c", "fm_s", "fm_ws", "fm_asym", "fm_s0", "fm_s1", "fm_rate",
-    "ft_c", "ft_s", "ft_ws", "ft_asym", "ft_s0", "ft_s1", "ft_rate",
+    "fm_c", "fm_s", "fm_ws", "fm_asym", "fm_s0", "fm_s1", "fm_wd", "fm_rate",
+    "ft_c", "ft_s", "ft_ws", "ft_asym", "ft_s0", "ft_s1", "ft_wd", "ft_rate",
     "vm", "vm_asym", "vm_rate", "vt", "vt_asym",
     "load_m", "load_t",
     "ripple", "ripple_order", "ripple_phase",
@@ -47,8 +49,8 @@ NAMES = (
 INDEX = {name: i for i, name in enumerate(NAMES)}
 (
     I1, I2, B, K,
-    FM_C, FM_S, FM_WS, FM_ASYM, FM_S0, FM_S1, FM_RATE,
-    FT_C, FT_S, FT_WS, FT_ASYM, FT_S0, FT_S1, FT_RATE,
+    FM_C, FM_S, FM_WS, FM_ASYM, FM_S0, FM_S1, FM_WD, FM_RATE,
+    FT_C, FT_S, FT_WS, FT_ASYM, FT_S0, FT_S1, FT_WD, FT_RATE,
     VM, VM_ASYM, VM_RATE, VT, VT_ASYM,
     LOAD_M, LOAD_T,
     RIPPLE, RIPPLE_ORDER, RIPPLE_PHASE,
@@ -78,7 +80,7 @@ def pack(params: dict) -> np.ndarray:
 @njit(cache=True, inline="always")
 def _level(p, c, w, t):
     """Sliding friction level g(w) >= 0 of the friction whose parameters start at index c: Coulomb, Stribeck, side, drift."""
-    base = p[c] + p[c + 6] * max(t, 0.0)
+    base = p[c] + p[c + 7] * max(t, 0.0)
     g = base
     if p[c + 2] > 0.0:
         g += (p[c + 1] - p[c]) * math.exp(-((w / p[c + 2]) ** 2))
@@ -106,7 +108,10 @@ def _friction(p, c, z, w, t):
     """Torque of the bristles on the body that moves with speed w."""
     g = _level(p, c, w, t)
     zdot = w - p[c + 4] * abs(w) * z / g if g > 0.0 else 0.0
-    return p[c + 4] * z + p[c + 5] * zdot
+    s1 = p[c + 5]
+    if p[c + 6] > 0.0:
+        s1 *= math.exp(-((w / p[c + 6]) ** 2))
+    return p[c + 4] * z + s1 * zdot
 
 
 @njit(cache=True, inline="always")
@@ -259,17 +264,21 @@ def _run(p, torque, dt, t0, linear, x0, ns, out):
                     zt = _bristle(p, FT_C, zt, y[3], t + h, 0.5 * h)
 
 
-def stiff_bristle(params: dict, place: str, dt: float, substeps: int = SUBSTEPS) -> dict:
-    """Bristle stiffness and damping that make LuGre a Coulomb law for this step: the bristle's own frequency is 0.25 rad a
-    sub-step (so the split stays accurate), damping ratio 0.7; the breakaway deflection is then of the order of 1e-6 rad."""
+def stiff_bristle(params: dict, place: str, level: float, dt: float) -> dict:
+    """Bristle stiffness and damping that make LuGre a Coulomb law of about `level` for this step: the bristle's own frequency is
+    0.5 rad a sub-step (so the split stays accurate), damping ratio 0.7 while stuck; it breaks away within 1e-6 rad."""
     key, inertia = ("fm", params["I1"]) if place == "motor" else ("ft", params["I2"])
-    s0 = inertia * (0.25 * substeps / dt) ** 2
-    return {f"{key}_s0": s0, f"{key}_s1": 2.0 * 0.7 * math.sqrt(s0 * inertia)}
+    frequency = 0.5 * SUBSTEPS_STIFF / dt
+    s0 = inertia * frequency**2
+    # Damping ends well before the speed at which a bristle of this size slides steadily.
+    return {f"{key}_s0": s0, f"{key}_s1": 2.0 * 0.7 * math.sqrt(s0 * inertia), f"{key}_wd": level / s0 * frequency}
 
 
 def simulate(params: dict, torque, dt: float, *, x0=(0.0, 0.0, 0.0, 0.0), t0: float = 0.0, hold: str = "zoh",
-             substeps: int = SUBSTEPS) -> np.ndarray:
+             substeps: int | None = None) -> np.ndarray:
     """States at the samples, n x 4 (th1 [rad], w1 [rad/s], th2, w2), under the sampled torque [N.m]."""
+    if substeps is None:
+        substeps = SUBSTEPS_STIFF if "fm_wd" in params or "ft_wd" in params else SUBSTEPS
     torque = np.ascontiguousarray(torque, dtype=float)
     out = np.empty((torque.size, 4))
     _run(pack(params), torque, dt, t0, hold == "linear", np.asarray(x0, dtype=float), substeps, out)

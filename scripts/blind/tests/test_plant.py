@@ -62,7 +62,7 @@ def test_the_periodic_state_returns_after_one_period():
 
 def test_a_stiff_bristle_sticks_below_its_level_and_slides_at_it_above():
     level = 0.01
-    p = BASE | {"fm_c": level} | plant.stiff_bristle(BASE, "motor", DT)
+    p = BASE | {"fm_c": level} | plant.stiff_bristle(BASE, "motor", level, DT)
     stuck = plant.simulate(p, np.full(2000, 0.99 * level), DT)
     assert np.abs(stuck[:, 0]).max() < 1e-5  # the finest encoder noise of the check
     torque = 3.0 * level
@@ -73,7 +73,7 @@ def test_a_stiff_bristle_sticks_below_its_level_and_slides_at_it_above():
 
 def test_friction_brings_a_coasting_axis_to_rest_where_the_formula_says():
     level, w0, total = 0.002, 20.0, BASE["I1"] + BASE["I2"]
-    p = BASE | {"fm_c": level} | plant.stiff_bristle(BASE, "motor", DT)
+    p = BASE | {"fm_c": level} | plant.stiff_bristle(BASE, "motor", level, DT)
     y = plant.simulate(p, np.zeros(8000), DT, x0=(0.0, w0, 0.0, w0))
     # Both inertias decelerate together; the twist's start-up transient costs B*twist' work of second order only.
     assert y[-1, 0] == pytest.approx(total * w0**2 / (2 * level), rel=2e-3)
@@ -154,7 +154,7 @@ def test_half_the_sub_step_changes_less_than_the_finest_encoder_noise_over_a_win
     axis, exp, ref = reference(kind)
     draw = effects.draw(effect, ref, np.random.default_rng(5), 0.2)
     command = exp.torque[: visible.WINDOW] + draw.bias
-    runs = [plant.simulate(axis.base | draw.plant, command, axis.dt, x0=exp.x0, substeps=n) for n in (40, 80)]
+    runs = [plant.simulate(axis.base | draw.plant, command, axis.dt, x0=exp.x0, substeps=n) for n in (80, 160)]
     assert np.abs(runs[0] - runs[1])[:, [0, 2]].max() < 1e-5
 
 
@@ -164,7 +164,8 @@ def test_a_wrong_base_parameter_vanishes_in_the_refit_and_friction_does_not():
     off = exp.run(axis.base | {"K": axis.base["K"] * 1.001, "I1": axis.base["I1"] * 0.999})
     left = visible.refit_residual(axis.base, axis.dt, states, off - states, [0, 2])
     assert effects.rms(left) < 0.02 * effects.rms((off - states)[:, [0, 2]])
-    rub = exp.run(axis.base | {"fm_c": 0.1 * ref.torque_rms} | plant.stiff_bristle(axis.base, "motor", axis.dt))
+    level = 0.1 * ref.torque_rms
+    rub = exp.run(axis.base | {"fm_c": level} | plant.stiff_bristle(axis.base, "motor", level, axis.dt))
     left = visible.refit_residual(axis.base, axis.dt, rub, rub - states, [0, 2])
     assert effects.rms(left) > 1e-3
 
