@@ -111,11 +111,11 @@ impl<S: Scalar> Axis<S> {
         self.effects.of(Effect::Backlash)[0]
     }
 
-    /// The side of contact that belongs to the twist.
+    /// The side of contact that belongs to the twist: the one beyond whose end it is, if that side pushes.
     pub(super) fn settle_contact(&self, s: &mut State<S>) {
         if self.has_backlash() {
-            let d = s.linear[2].re();
-            s.contact = if d.abs() <= self.gap().re() { 0 } else { d.signum() as i8 };
+            let side = s.linear[2].re().signum() as i8;
+            s.contact = if self.clearance(side, s).re() < 0.0 { side } else { 0 };
         }
     }
 
@@ -188,16 +188,15 @@ impl<S: Scalar> Axis<S> {
             }
         }
         if self.has_backlash() {
-            let gap = self.gap().re();
             if from.contact == 0 {
-                let (d0, d1) = (from.linear[2].re(), to.linear[2].re());
-                if d1.abs() > gap {
-                    let side = d1.signum();
-                    let (e0, e1) = (d0 * side - gap, d1 * side - gap);
-                    propose(if e0 < 0.0 { -e0 / (e1 - e0) } else { 0.0 }, Event::Closes(side as i8));
+                let side = to.linear[2].re().signum() as i8;
+                let (c0, c1) = (self.clearance(side, from).re(), self.clearance(side, to).re());
+                if c1 < 0.0 {
+                    propose(if c0 > 0.0 { c0 / (c0 - c1) } else { 0.0 }, Event::Closes(side));
                 }
             } else {
-                let (p0, p1) = (self.pressure(from).re(), self.pressure(to).re());
+                let pressure = |s| self.pressure(from.contact, s).re();
+                let (p0, p1) = (pressure(from), pressure(to));
                 if p1 < 0.0 {
                     propose(if p0 > 0.0 { p0 / (p0 - p1) } else { 0.0 }, Event::Opens);
                 }
@@ -206,18 +205,26 @@ impl<S: Scalar> Axis<S> {
         first.map(|(_, e)| e)
     }
 
-    /// Contact torque towards its side, N.m: positive while it pushes.
-    fn pressure(&self, s: &State<S>) -> S {
-        let side = f64::from(s.contact);
+    /// Contact torque of a side, N.m: positive while it pushes.
+    fn pressure(&self, side: i8, s: &State<S>) -> S {
+        let side = f64::from(side);
         ((s.linear[2] - self.gap() * side) * self.base.k + s.linear[3] * self.base.b) * side
     }
 
-    /// The quantity whose zero is the event; it is falling, or rising for a closing gap, along the step.
+    /// What is missing for a side to push, rad: negative where the twist is beyond the gap's end and the contact would
+    /// not pull. A contact that has opened while compressed closes again only when both hold.
+    fn clearance(&self, side: i8, s: &State<S>) -> S {
+        let gap = self.gap() - s.linear[2] * f64::from(side);
+        let pull = -(self.pressure(side, s) / self.base.k);
+        if pull.re() > gap.re() { pull } else { gap }
+    }
+
+    /// The quantity whose zero is the event; it falls along the step.
     fn indicator(&self, event: Event, from: &State<S>, s: &State<S>) -> S {
         match event {
             Event::Rest(i) => velocity(s, i) * f64::from(from.dry[i]),
-            Event::Closes(side) => self.gap() - s.linear[2] * f64::from(side),
-            Event::Opens => self.pressure(s),
+            Event::Closes(side) => self.clearance(side, s),
+            Event::Opens => self.pressure(from.contact, s),
         }
     }
 
