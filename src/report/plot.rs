@@ -260,7 +260,7 @@ fn mark_labels(
         let (x, y, label) = match m {
             Mark::X(at, label) => (sx(*at) + 4.0, 13.0, label),
             Mark::Span(a, b, label) => (sx(a.min(*b)).max(0.0) + 4.0, 13.0, label),
-            Mark::Y(at, label) => (6.0, sy(*at) - 5.0, label),
+            Mark::Y(at, label) => ((w - text_width(label) - 4.0).max(0.0), sy(*at) - 5.0, label),
         };
         if label.is_empty() || !x.is_finite() || !y.is_finite() || x < 0.0 || x > w || y < 0.0 || y > h {
             continue;
