@@ -11,6 +11,8 @@ pub mod scalar;
 pub mod variables;
 
 #[cfg(feature = "cli")]
+pub mod circle;
+#[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "cli")]
 pub mod diagnose;

@@ -1,0 +1,145 @@
+//! What a followed circle says: circular and radial deviation (ISO 230-4), reversal peaks, ellipses.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Path;
+
+/// The figures of a circular test, in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roundness {
+    /// Circular deviation G: the width of the ring about the least-squares centre that holds the path.
+    pub deviation: f64,
+    /// Largest radial deviation F about the programmed centre.
+    pub largest: f64,
+    /// Smallest radial deviation.
+    pub smallest: f64,
+    /// Mean radial deviation.
+    pub mean: f64,
+    /// Centre of the least-squares circle.
+    pub centre: (f64, f64),
+    /// Height of the peak at +X, +Y, -X, -Y, outward positive, over what stands before and behind it.
+    pub reversals: [f64; 4],
+    /// Amplitude of the ellipse along the axes: unequal scales.
+    pub ellipse_axes: f64,
+    /// Amplitude of the ellipse at 45 degrees: unequal loop gains (its sign turns with the direction) or axes that are not
+    /// square (its sign does not).
+    pub ellipse_diagonal: f64,
+}
+
+/// Half width of the stretch in which a reversal's peak is looked for, rad: ten degrees.
+const NEAR: f64 = PI / 18.0;
+/// Half width of the stretch it is compared with: twenty-five degrees.
+const AROUND: f64 = 25.0 * PI / 180.0;
+
+/// Angle (rad, -pi..pi) and radial deviation (m) about the programmed centre, in the order of the path.
+#[must_use]
+pub fn deviations(path: &Path, radius: f64) -> (Vec<f64>, Vec<f64>) {
+    path.x.iter().zip(&path.y).map(|(x, y)| (y.atan2(*x), x.hypot(*y) - radius)).unzip()
+}
+
+impl Roundness {
+    /// The figures of a path about the programmed circle of this radius; none without a circle to be seen.
+    #[must_use]
+    pub fn of(path: &Path, radius: f64) -> Option<Self> {
+        let (angle, deviation) = deviations(path, radius);
+        let n = deviation.len() as f64;
+        let centre = least_squares_centre(path)?;
+        let from_centre = path.x.iter().zip(&path.y).map(|(x, y)| (x - centre.0).hypot(y - centre.1));
+        let (low, high) = extremes(from_centre);
+        let (smallest, largest) = extremes(deviation.iter().copied());
+        let second =
+            |f: fn(f64) -> f64| 2.0 / n * angle.iter().zip(&deviation).map(|(a, d)| d * f(2.0 * a)).sum::<f64>();
+        let reversals = [0.0, 0.25, 0.5, 0.75].map(|turn| reversal(&angle, &deviation, TAU * turn));
+        Some(Self {
+            deviation: high - low,
+            largest,
+            smallest,
+            mean: deviation.iter().sum::<f64>() / n,
+            centre,
+            reversals,
+            ellipse_axes: second(f64::cos),
+            ellipse_diagonal: second(f64::sin),
+        })
+    }
+}
+
+fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+}
+
+/// Centre of the circle `x^2 + y^2 = 2*a*x + 2*b*y + c` that fits best (Kasa, IEEE Trans. Instrum. Meas. 25, 1976).
+fn least_squares_centre(path: &Path) -> Option<(f64, f64)> {
+    let scale = path.x.iter().chain(&path.y).fold(0.0_f64, |m, v| m.max(v.abs()));
+    if path.x.len() < 3 || scale <= 0.0 || !scale.is_finite() {
+        return None;
+    }
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (x, y) in path.x.iter().zip(&path.y) {
+        let (x, y) = (x / scale, y / scale);
+        let row = Vector3::new(2.0 * x, 2.0 * y, 1.0);
+        normal += row * row.transpose();
+        right += row * (x * x + y * y);
+    }
+    let fit = normal.cholesky()?.solve(&right);
+    Some((fit[0] * scale, fit[1] * scale))
+}
+
+/// The extreme deviation near `at` over the mean of what stands around it.
+fn reversal(angle: &[f64], deviation: &[f64], at: f64) -> f64 {
+    let distance = |a: f64| ((a - at + PI).rem_euclid(TAU) - PI).abs();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (a, d) in angle.iter().zip(deviation) {
+        if (NEAR..AROUND).contains(&distance(*a)) {
+            sum += d;
+            count += 1.0;
+        }
+    }
+    let base = if count > 0.0 { sum / count } else { 0.0 };
+    let near = angle.iter().zip(deviation).filter(|(a, _)| distance(**a) < NEAR).map(|(_, d)| d - base);
+    near.fold(0.0, |peak: f64, d| if d.abs() > peak.abs() { d } else { peak })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(f: impl Fn(f64) -> (f64, f64)) -> Path {
+        let (x, y) = (0..3600).map(|k| f(TAU * f64::from(k) / 3600.0)).unzip();
+        Path { x, y }
+    }
+
+    #[test]
+    fn a_shifted_circle_is_round_but_off_centre() {
+        let r = Roundness::of(&path(|a| (0.05 * a.cos() + 2e-5, 0.05 * a.sin() - 1e-5)), 0.05).expect("a circle");
+        assert!(r.deviation < 1e-14, "{r:?}");
+        assert!((r.centre.0 - 2e-5).abs() < 1e-14 && (r.centre.1 + 1e-5).abs() < 1e-14);
+        assert!((r.largest - 5f64.sqrt() * 1e-5).abs() < 1e-8, "{r:?}");
+    }
+
+    #[test]
+    fn an_ellipse_is_told_by_its_direction() {
+        let r = Roundness::of(&path(|a| ((0.05 + 1e-5) * a.cos(), (0.05 - 1e-5) * a.sin())), 0.05).expect("a circle");
+        assert!((r.ellipse_axes - 1e-5).abs() < 1e-8 && r.ellipse_diagonal.abs() < 1e-12, "{r:?}");
+        assert!((r.deviation - 2e-5).abs() < 1e-8);
+        // Y ahead by an angle d: a diagonal ellipse of amplitude radius*d/2.
+        let r = Roundness::of(&path(|a| (0.05 * a.cos(), 0.05 * (a + 4e-4).sin())), 0.05).expect("a circle");
+        assert!((r.ellipse_diagonal - 1e-5).abs() < 2e-8 && r.ellipse_axes.abs() < 2e-8, "{r:?}");
+    }
+
+    #[test]
+    fn a_peak_at_a_reversal_has_its_height() {
+        let bump = |a: f64| 6e-6 * (-((a - TAU / 4.0) / 0.03).powi(2)).exp();
+        let r =
+            Roundness::of(&path(|a| ((0.05 + bump(a)) * a.cos(), (0.05 + bump(a)) * a.sin())), 0.05).expect("a circle");
+        assert!((r.reversals[1] - 6e-6).abs() < 1e-8, "{r:?}");
+        assert!(r.reversals[0].abs() < 1e-8 && r.reversals[2].abs() < 1e-8);
+    }
+
+    #[test]
+    fn no_path_has_no_circle() {
+        assert_eq!(Roundness::of(&Path::default(), 0.05), None);
+        assert_eq!(Roundness::of(&path(|_| (0.0, 0.0)), 0.05), None);
+    }
+}
