@@ -9,6 +9,7 @@ pub mod chart;
 pub mod diagnose;
 pub mod format;
 pub mod html;
+pub mod identify;
 pub mod polar;
 pub mod terminal;
 

@@ -1,0 +1,426 @@
+//! The report of an identification: estimates with their errors, how well they fit, how they were reached.
+
+use std::sync::Arc;
+
+use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, Shape};
+use super::format::{self, Medium};
+use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
+use crate::identify::result::{Estimate, FrequencyResponse, Identification, MethodResult, ResponseOf, Series as Curve};
+use crate::trace::{Motion, Signal};
+
+/// Dashes of series that may lie on one another.
+const DASHES: [Dash; 3] = [Dash::Solid, Dash::Dashed, Dash::Dotted];
+
+/// The whole report.
+#[must_use]
+pub fn report(found: &Identification) -> Report {
+    let mut top = vec![Block::Verdict(verdict(found))];
+    top.extend(found.warnings.iter().cloned().map(Block::Warning));
+    if let Some(best) = recommended(found) {
+        top.push(Block::Table(estimates(best)));
+    }
+    let mut sections = vec![Section::new("", top)];
+    sections.push(Section::new("How well the model follows the machine", fit(found)));
+    if let Some(frf) = &found.frequency_response {
+        sections.push(Section::new("Frequency response", frequency_response(frf)));
+    }
+    if found.methods.len() > 1 {
+        sections.push(Section::new("The methods side by side", side_by_side(found)));
+    }
+    if found.methods.iter().any(|m| m.history.is_some()) {
+        sections.push(Section::new("How the estimates were reached", histories(found)));
+    }
+    sections.push(Section::new("The excitation, and what the model makes of it", excitation(found)));
+    Report {
+        title: format!("Identification of {}", found.machine),
+        subject: subject(found),
+        sections,
+        footer: format!("eixo {}", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// The short form for the terminal.
+#[must_use]
+pub fn short(found: &Identification) -> Vec<Block> {
+    let mut blocks = vec![Block::Verdict(verdict(found))];
+    blocks.extend(found.warnings.iter().cloned().map(Block::Warning));
+    if let Some(best) = recommended(found) {
+        blocks.push(Block::Table(estimates(best)));
+    }
+    if found.methods.len() > 1 {
+        blocks.push(Block::Table(compare(found)));
+    }
+    if has_reference(found) {
+        blocks.push(Block::Table(errors(found)));
+    }
+    blocks.push(Block::Table(fits(found)));
+    if let Some(frf) = &found.frequency_response {
+        blocks.push(Block::Table(resonances(frf)));
+    }
+    blocks
+}
+
+fn subject(found: &Identification) -> String {
+    let t = &found.trace;
+    let rate = if t.dt > 0.0 { format::number(1.0 / t.dt, 4, Medium::Page) } else { "?".to_owned() };
+    let mut out = format!(
+        "{}: {} samples at {rate} Hz, {} s",
+        t.file,
+        format::count(t.samples as u64),
+        format::number(t.duration, 4, Medium::Page)
+    );
+    if let Some(period) = t.period {
+        out.push_str(&format!(", period {} samples", format::count(period as u64)));
+    }
+    out
+}
+
+/// The method to trust, else the first that has an estimate.
+fn recommended(found: &Identification) -> Option<&MethodResult> {
+    match &found.recommended {
+        Some(r) => found.methods.get(r.method),
+        None => found.methods.iter().find(|m| m.failure.is_none()),
+    }
+}
+
+fn verdict(found: &Identification) -> Verdict {
+    let Some(best) = recommended(found) else {
+        return Verdict {
+            tone: Tone::Unsure,
+            sentence: "No method could identify the axis from this trace.".to_owned(),
+            detail: found
+                .methods
+                .iter()
+                .filter_map(|m| m.failure.as_ref().map(|f| format!("{}: {f}.", m.title)))
+                .collect::<Vec<_>>()
+                .join(" "),
+            figures: Vec::new(),
+        };
+    };
+    let worst = best.outputs.iter().min_by(|a, b| a.fit_percent.total_cmp(&b.fit_percent));
+    let sentence = match worst {
+        Some(o) if best.outputs.len() == 1 => {
+            format!(
+                "{} identifies the axis: its simulation follows {} to {}.",
+                best.title,
+                o.signal.name(),
+                fit_percent(o.fit_percent)
+            )
+        }
+        Some(o) => format!(
+            "{} identifies the axis: its simulation follows every output to {} or better ({} the least).",
+            best.title,
+            fit_percent(o.fit_percent),
+            o.signal.name()
+        ),
+        None => format!("{} identifies the axis.", best.title),
+    };
+    let poor = worst.filter(|o| o.fit_percent < 50.0);
+    let tone = if poor.is_some() { Tone::Unsure } else { Tone::Neutral };
+    let sentence = poor.map_or(sentence, |o| {
+        format!(
+            "The model does not follow the machine: with the estimates of {} its simulation follows {} to {} only.",
+            best.title,
+            o.signal.name(),
+            fit_percent(o.fit_percent)
+        )
+    });
+    let figures =
+        best.modal.iter().chain(best.parameters.iter()).take(4).map(|e| (e.name.to_owned(), value(e))).collect();
+    let detail = found.recommended.as_ref().map_or_else(String::new, |r| r.why.clone());
+    Verdict { tone, sentence, detail, figures }
+}
+
+fn fit_percent(fit: f64) -> String {
+    format::percent(fit / 100.0, Medium::Page)
+}
+
+fn value(e: &Estimate) -> Cell {
+    match e.std {
+        Some(std) => Cell::Estimate(e.value, std, e.unit.to_owned()),
+        None => Cell::Number(e.value, 5, e.unit.to_owned()),
+    }
+}
+
+/// Parameters and modal parameters of one method.
+fn estimates(m: &MethodResult) -> Table {
+    let all: Vec<&Estimate> = m.parameters.iter().chain(&m.modal).collect();
+    let reference = all.iter().any(|e| e.reference.is_some());
+    let mut columns = vec!["parameter", "estimate", "standard error"];
+    if reference {
+        columns.extend(["reference", "error"]);
+    }
+    let mut table = Table::new(format!("Estimates of {} ({})", m.title, m.formulation), columns);
+    for e in all {
+        let mut cells =
+            vec![Cell::text(e.name), value(e), e.std.map_or(Cell::Empty, |s| Cell::Percent((s / e.value).abs()))];
+        if reference {
+            cells.push(e.reference.map_or(Cell::Empty, |r| Cell::Number(r, 5, e.unit.to_owned())));
+            cells.push(e.error_percent.map_or(Cell::Empty, |p| Cell::Percent(p / 100.0)));
+        }
+        table.row(cells);
+    }
+    table
+}
+
+fn fits(found: &Identification) -> Table {
+    let mut table = Table::new(
+        "A simulation with the estimates against the measured outputs",
+        ["method", "output", "fit", "rms error", "residual white", "p value"],
+    );
+    let motion = Motion::Rotary;
+    for m in &found.methods {
+        for o in &m.outputs {
+            table.row(vec![
+                Cell::text(m.method),
+                Cell::text(o.signal.name()),
+                Cell::Percent(o.fit_percent / 100.0),
+                Cell::Number(o.rms_error, 3, unit_of(&o.residual, o.signal, motion).to_owned()),
+                Cell::text(if o.whiteness.white { "yes" } else { "no" }),
+                Cell::Number(o.whiteness.p_value, 2, String::new()),
+            ]);
+        }
+    }
+    table
+}
+
+/// The curve's own unit where it has one.
+fn unit_of(curve: &Curve, signal: Signal, motion: Motion) -> &'static str {
+    if curve.y_unit.is_empty() { signal.unit(motion) } else { curve.y_unit }
+}
+
+fn fit(found: &Identification) -> Vec<Block> {
+    let mut blocks = vec![Block::Table(fits(found))];
+    if let Some(best) = recommended(found) {
+        let figures = best
+            .outputs
+            .iter()
+            .map(|o| {
+                let chart = Chart::new(
+                    format!("What {} leaves of {}", best.title, o.signal.name()),
+                    Axis::linear("time", o.residual.x_unit),
+                    Axis::linear(format!("measured minus simulated, {}", o.signal.name()), o.residual.y_unit),
+                )
+                .with(line("", &o.residual));
+                let w = &o.whiteness;
+                let caption = format!(
+                    "{}: Ljung-Box over {} lags, p = {}.",
+                    if w.white {
+                        "White, as noise is"
+                    } else {
+                        "Not white: the model leaves something out, or the noise is coloured"
+                    },
+                    w.lags,
+                    format::number(w.p_value, 2, Medium::Page)
+                );
+                Figure::new(chart, caption)
+            })
+            .collect::<Vec<_>>();
+        if !figures.is_empty() {
+            blocks.push(Block::Figures(figures));
+        }
+    }
+    blocks
+}
+
+fn line(name: &str, curve: &Curve) -> Series {
+    Series::line(name, curve.x.as_slice(), curve.y.as_slice())
+}
+
+fn resonances(frf: &FrequencyResponse) -> Table {
+    let mut table = Table::new(
+        format!("Measured frequency response, {} periods of {} samples", frf.periods, frf.period),
+        ["output", "antiresonance", "resonance", "error of the model"],
+    );
+    let hertz = |f: Option<f64>| f.map_or(Cell::Empty, |f| Cell::quantity(f, "Hz"));
+    for o in &frf.outputs {
+        table.row(vec![
+            Cell::text(o.signal.name()),
+            hertz(o.antiresonance),
+            hertz(o.resonance),
+            Cell::Percent(o.error_percent / 100.0),
+        ]);
+    }
+    table
+}
+
+fn frequency_response(frf: &FrequencyResponse) -> Vec<Block> {
+    let f: Arc<[f64]> = frf.frequency.as_slice().into();
+    let mut figures = Vec::new();
+    for o in &frf.outputs {
+        figures.push(Figure::new(magnitude(&f, o), "Grey: two standard deviations from the scatter between periods."));
+        figures.push(Figure::new(phase(&f, o), ""));
+    }
+    vec![Block::Table(resonances(frf)), Block::Figures(figures)]
+}
+
+fn magnitude(f: &Arc<[f64]>, o: &ResponseOf) -> Chart {
+    let name = o.signal.name();
+    let low: Vec<f64> = o.magnitude.iter().zip(&o.std).map(|(m, s)| (m - 2.0 * s).max(0.05 * m)).collect();
+    let high: Vec<f64> = o.magnitude.iter().zip(&o.std).map(|(m, s)| m + 2.0 * s).collect();
+    let mut chart = Chart::new(
+        format!("From torque to {name}"),
+        Axis::log("frequency", "Hz"),
+        Axis::log(format!("gain, {name}/T"), ""),
+    )
+    .with(Series::band("", f.clone(), low, high).in_colour(Colour::Grey))
+    .with(Series::points("measured", f.clone(), o.magnitude.as_slice()).in_colour(Colour::Ink))
+    .with(Series::line("model", f.clone(), o.model_magnitude.as_slice()).in_colour(Colour::Blue));
+    for (at, what) in [(o.antiresonance, "antiresonance"), (o.resonance, "resonance")] {
+        if let Some(at) = at {
+            chart.marks.push(Mark::X(at, format!("{what} {} Hz", format::number(at, 3, Medium::Page))));
+        }
+    }
+    chart
+}
+
+fn phase(f: &Arc<[f64]>, o: &ResponseOf) -> Chart {
+    let degrees = |p: &[f64]| -> Vec<f64> { p.iter().map(|p| p.to_degrees()).collect() };
+    Chart::new(
+        format!("Phase from torque to {}", o.signal.name()),
+        Axis::log("frequency", "Hz"),
+        Axis::linear("phase", "°"),
+    )
+    .with(Series::points("measured", f.clone(), degrees(&o.phase)).in_colour(Colour::Ink))
+    .with(Series::line("model", f.clone(), degrees(&o.model_phase)).in_colour(Colour::Blue))
+}
+
+fn has_reference(found: &Identification) -> bool {
+    found.methods.iter().flat_map(|m| m.parameters.iter().chain(&m.modal)).any(|e| e.reference.is_some())
+}
+
+/// Names of all that was estimated, in the order of first appearance.
+fn names(found: &Identification) -> Vec<(&'static str, &'static str)> {
+    let mut out: Vec<(&str, &str)> = Vec::new();
+    for e in
+        found.methods.iter().flat_map(|m| m.parameters.iter()).chain(found.methods.iter().flat_map(|m| m.modal.iter()))
+    {
+        if !out.iter().any(|(n, _)| *n == e.name) {
+            out.push((e.name, e.unit));
+        }
+    }
+    out
+}
+
+/// One row a parameter, one column a method; `cell` of the method's estimate.
+fn matrix(found: &Identification, caption: &str, units: bool, cell: impl Fn(&Estimate) -> Cell) -> Table {
+    let methods: Vec<&MethodResult> = found.methods.iter().filter(|m| m.failure.is_none()).collect();
+    let mut table = Table::new(caption, std::iter::once("parameter").chain(methods.iter().map(|m| m.method)));
+    for (name, unit) in names(found) {
+        let label = if units && !unit.is_empty() && unit != "1" { format!("{name} [{unit}]") } else { name.to_owned() };
+        let mut cells = vec![Cell::Text(label)];
+        cells.extend(
+            methods
+                .iter()
+                .map(|m| m.parameters.iter().chain(&m.modal).find(|e| e.name == name).map_or(Cell::Empty, &cell)),
+        );
+        table.row(cells);
+    }
+    table
+}
+
+fn compare(found: &Identification) -> Table {
+    matrix(found, "Estimates by method", true, |e| match e.std {
+        Some(std) => Cell::Estimate(e.value, std, String::new()),
+        None => Cell::Number(e.value, 5, String::new()),
+    })
+}
+
+fn errors(found: &Identification) -> Table {
+    matrix(found, "Error against the reference", false, |e| {
+        e.error_percent.map_or(Cell::Empty, |p| Cell::Percent(p / 100.0))
+    })
+}
+
+fn side_by_side(found: &Identification) -> Vec<Block> {
+    let mut blocks = vec![Block::Table(compare(found))];
+    if has_reference(found) {
+        blocks.push(Block::Table(errors(found)));
+    }
+    let mut table = Table::new("What each method is", ["method", "in words", "regression or model", "remarks"]);
+    for m in &found.methods {
+        let mut remarks = m.notes.clone();
+        if let Some(failure) = &m.failure {
+            remarks.insert(0, format!("no estimate: {failure}"));
+        }
+        if let Some(n) = m.iterations {
+            remarks.push(format!("{n} iterations"));
+        }
+        table.row(vec![
+            Cell::text(m.method),
+            Cell::text(&*m.title),
+            Cell::text(&*m.formulation),
+            Cell::text(remarks.join("; ")),
+        ]);
+    }
+    blocks.push(Block::Table(table));
+    blocks
+}
+
+/// Histories of every parameter, the recursive methods in one chart each (the paper's Figures 6 to 9).
+pub(super) fn histories(found: &Identification) -> Vec<Block> {
+    let mut figures = Vec::new();
+    for (name, unit) in names(found) {
+        let mut chart = Chart::new(
+            format!("{name} as it is estimated"),
+            Axis::linear("time", "s"),
+            Axis::linear(name, unit).over(Range::Robust),
+        );
+        for (k, m) in found.methods.iter().filter(|m| m.history.is_some()).enumerate() {
+            let Some(history) = &m.history else { continue };
+            if let Some((_, values)) = history.parameters.iter().find(|(n, _)| *n == name) {
+                let dash = DASHES[k % 3];
+                chart.series.push(Series::line(&*m.title, history.time.as_slice(), values.as_slice()).with_dash(dash));
+            }
+        }
+        let estimates = found.methods.iter().flat_map(|m| m.parameters.iter()).filter(|e| e.name == name);
+        if let Some(reference) = estimates.filter_map(|e| e.reference).next() {
+            chart.marks.push(Mark::Y(reference, "reference".into()));
+        }
+        if !chart.series.is_empty() {
+            figures.push(Figure::new(chart, ""));
+        }
+    }
+    vec![Block::Figures(figures)]
+}
+
+/// Excitation, its spectrum, and what each method's parameters make of it (the paper's Figures 4, 5 and 10 to 13).
+fn excitation(found: &Identification) -> Vec<Block> {
+    let torque =
+        Chart::new("Excitation", Axis::linear("time", found.torque.x_unit), Axis::linear("T", found.torque.y_unit))
+            .with(line("", &found.torque).in_colour(Colour::Ink));
+    let mut blocks = vec![Block::Figure(Figure::new(torque, ""))];
+    let mut table =
+        Table::new("The torque estimated from the motion", ["method", "equation", "rms error over rms torque"]);
+    let measured = line("measured", &found.torque_spectrum).in_colour(Colour::Ink);
+    let spectrum = |title: &str| {
+        let unit = found.torque_spectrum.y_unit;
+        Chart::new(title, Axis::linear("frequency", "Hz"), Axis::linear("amplitude", unit).over(Range::WithZero))
+    };
+    let own = Series { shape: Shape::Stem, name: String::new(), ..measured.clone() };
+    let mut estimated = spectrum("Spectra of the estimated torque").with(measured.with_dash(Dash::Broad));
+    let mut errors = Vec::new();
+    for (k, m) in found.methods.iter().enumerate() {
+        let Some(e) = &m.excitation else { continue };
+        table.row(vec![Cell::text(&*m.title), Cell::text(e.formulation), Cell::Percent(e.error_percent / 100.0)]);
+        let colour = Colour::nth(k);
+        estimated.series.push(line(&m.title, &e.spectrum).in_colour(colour).with_dash(DASHES[k % 3]));
+        let error = Chart::new(
+            format!("Error of the torque estimated by {}", m.title),
+            Axis::linear("time", e.error.x_unit),
+            Axis::linear("estimate minus measured", e.error.y_unit),
+        )
+        .with(line("", &e.error).in_colour(colour));
+        errors.push(Figure::new(error, ""));
+    }
+    let mut figures = vec![Figure::new(spectrum("Spectrum of the excitation").with(own), "")];
+    if !errors.is_empty() {
+        figures.push(Figure::new(estimated, ""));
+    }
+    figures.extend(errors);
+    if !table.rows.is_empty() {
+        blocks.push(Block::Table(table));
+    }
+    blocks.push(Block::Figures(figures));
+    blocks
+}
