@@ -197,7 +197,8 @@ pub fn run(x: &ServoAxis, y: &ServoAxis, test: &CircleTest) -> Result<Path, Circ
         }
         for ((axis, goal), name) in axes.iter_mut().zip(goals).zip(["X", "Y"]) {
             axis.step(goal, time);
-            if !((axis.position() - goal[0]).abs() <= r) {
+            let off = (axis.position() - goal[0]).abs();
+            if off.is_nan() || off > r {
                 return Err(CircleError::Unstable { axis: name, time });
             }
         }
@@ -343,9 +344,6 @@ mod tests {
         let path = run(&loose, &axis(Settings::default()), &TEST).expect("a path");
         let play = 2.0 * half_gap * Parameters::PAPER.rho;
         // The table stays behind by half the play on either side: moving towards -X it lies at +play/2.
-        let upper: Vec<f64> =
-            path.x.iter().zip(&path.y).filter(|(x, y)| x.abs() < 1e-3 && **y > 0.0).map(|(x, y)| x.hypot(*y)).collect();
-        assert!(!upper.is_empty());
         let offset = |above: bool| {
             let mut sum = (0.0, 0.0);
             for (x, y) in path.x.iter().zip(&path.y).filter(|(x, y)| x.abs() < 5e-3 && (**y > 0.0) == above) {
