@@ -1,6 +1,11 @@
 //! FMU archives from the outside: packaging, import host, validation rules, simulation.
 
 pub mod archive;
+pub(crate) mod behaviour;
 pub mod description;
 pub mod host;
+pub mod isolation;
+pub mod output;
+pub mod rules;
+pub mod validation;
 pub mod xml;

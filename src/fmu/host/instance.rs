@@ -3,6 +3,7 @@
 use std::ffi::{CString, c_void};
 use std::sync::Arc;
 use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use tempfile::TempDir;
 
@@ -38,12 +39,12 @@ pub struct StateHandle(pub(crate) State);
 /// One instance. Freed when dropped.
 pub struct Instance {
     pub(crate) component: Component,
-    _callbacks: Box<Callbacks>,
-    binary: Arc<Binary>,
+    pub(super) callbacks: Box<Callbacks>,
+    pub(super) binary: Arc<Binary>,
     log: Box<LogSink>,
     freed: bool,
     // Kept for FMUs that go on using the pointers handed to them.
-    _texts: [CString; 3],
+    pub(super) texts: [Vec<u8>; 3],
     _folder: Option<Arc<TempDir>>,
 }
 
@@ -56,7 +57,13 @@ impl std::fmt::Debug for Instance {
 // SAFETY: FMI 2.0 allows an instance to be used from any thread, one at a time; the log sink is locked.
 unsafe impl Send for Instance {}
 
+/// Makes every allocation callback fail, to see how an FMU takes it.
+pub(super) static ALLOCATION_FAILS: AtomicBool = AtomicBool::new(false);
+
 unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
+    if ALLOCATION_FAILS.load(Ordering::Relaxed) {
+        return std::ptr::null_mut();
+    }
     // SAFETY: `calloc` takes any numbers.
     unsafe { abi::calloc(count.max(1), size.max(1)) }
 }
@@ -108,7 +115,10 @@ impl Instance {
         folder: Option<Arc<TempDir>>,
         options: &InstanceOptions,
     ) -> Result<Self, HostError> {
-        let texts = [c_string(&options.name)?, c_string(&options.guid)?, c_string(&options.resources)?];
+        let texts =
+            [&options.name, &options.guid, &options.resources].map(|t| c_string(t).map(CString::into_bytes_with_nul));
+        let [name, guid, resources] = texts;
+        let texts = [name?, guid?, resources?];
         let log = Box::new(LogSink::default());
         let callbacks = Box::new(Callbacks {
             logger: logger::logger(),
@@ -123,11 +133,18 @@ impl Instance {
         let component = unsafe {
             let [name, guid, resources] = &texts;
             let flags = (i32::from(options.visible), i32::from(options.logging));
-            function(name.as_ptr(), 1, guid.as_ptr(), resources.as_ptr(), &raw const *callbacks, flags.0, flags.1)
+            function(
+                name.as_ptr().cast(),
+                1,
+                guid.as_ptr().cast(),
+                resources.as_ptr().cast(),
+                &raw const *callbacks,
+                flags.0,
+                flags.1,
+            )
         };
         note(Call::None);
-        let instance =
-            Self { component, _callbacks: callbacks, binary, log, freed: false, _texts: texts, _folder: folder };
+        let instance = Self { component, callbacks, binary, log, freed: false, texts, _folder: folder };
         if component.is_null() {
             let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
             return Err(HostError::Refused(said.join("; ")));
@@ -465,7 +482,7 @@ impl Instance {
         self.free_once();
     }
 
-    fn free_once(&mut self) {
+    pub(super) fn free_once(&mut self) {
         if !self.freed && !self.component.is_null() {
             self.freed = true;
             if let Some(function) = self.binary.functions.free_instance {

@@ -6,6 +6,7 @@
 #![allow(unsafe_code)]
 
 pub(crate) mod abi;
+pub(crate) mod abuse;
 mod instance;
 pub(crate) mod logger;
 
@@ -19,6 +20,7 @@ use tempfile::TempDir;
 use super::archive::{Archive, ArchiveError};
 use super::description::{Description, DescriptionError, Interface};
 use abi::{Call, Functions};
+pub(crate) use instance::static_text;
 pub use instance::{Instance, InstanceOptions, StateHandle};
 pub use logger::LogMessage;
 

@@ -1,0 +1,165 @@
+//! What an FMU does beside computing: to the process, to its host's memory, to the log.
+
+use std::collections::BTreeSet;
+
+use super::super::host::abuse;
+use super::super::host::{HostError, InstanceOptions, LogMessage};
+use super::measure;
+use super::probe::{Probe, Tested, not_applicable};
+use super::{Instance, Setup};
+use std::sync::Arc;
+
+/// A whole life of the FMU, from loading to freeing.
+fn life(setup: &Setup) -> Result<(), HostError> {
+    let p = setup.probe()?;
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 5)?;
+    instance.terminate()?;
+    instance.free();
+    // Freed, but not unloaded: what its handlers point to must stay.
+    std::mem::forget(p);
+    Ok(())
+}
+
+pub(super) fn directory(setup: &Setup) -> Tested {
+    let before = std::env::current_dir().ok();
+    life(setup)?;
+    let after = std::env::current_dir().ok();
+    let show = |d: Option<std::path::PathBuf>| d.map_or("one that is gone".to_owned(), |d| d.display().to_string());
+    Ok(if before == after { vec![] } else { vec![format!("the working directory is now {}", show(after))] })
+}
+
+pub(super) fn rounding(setup: &Setup) -> Tested {
+    let before = measure::floating_point();
+    life(setup)?;
+    let after = measure::floating_point();
+    if before == after {
+        return Ok(vec![]);
+    }
+    Ok(vec![format!(
+        "the floating-point environment is changed: rounding {:#x} to {:#x}, control register {:#06x} to {:#06x}",
+        before.0, after.0, before.1, after.1
+    )])
+}
+
+/// The rule is tested by the parent process, which holds this one's standard output.
+pub(super) fn stdout(setup: &Setup) -> Tested {
+    life(setup)?;
+    Ok(vec![])
+}
+
+pub(super) fn signals(setup: &Setup) -> Tested {
+    let before = measure::signal_handlers();
+    life(setup)?;
+    let changed: Vec<String> = before
+        .iter()
+        .zip(measure::signal_handlers())
+        .filter(|(a, b)| **a != *b)
+        .map(|((signal, _), _)| signal.to_string())
+        .collect();
+    Ok(if changed.is_empty() {
+        vec![]
+    } else {
+        vec![format!("handlers of the signals {} are changed", changed.join(", "))]
+    })
+}
+
+pub(super) fn environment(setup: &Setup) -> Tested {
+    let read = || -> BTreeSet<_> { std::env::vars_os().collect() };
+    let before = read();
+    life(setup)?;
+    let after = read();
+    let names: BTreeSet<String> =
+        before.symmetric_difference(&after).map(|(name, _)| name.to_string_lossy().into_owned()).collect();
+    let names: Vec<String> = names.into_iter().collect();
+    Ok(if names.is_empty() { vec![] } else { vec![format!("changed environment variables: {}", names.join(", "))] })
+}
+
+pub(super) fn locale(setup: &Setup) -> Tested {
+    let before = measure::numeric_locale();
+    life(setup)?;
+    let after = measure::numeric_locale();
+    Ok(if before == after {
+        vec![]
+    } else {
+        vec![format!("the locale of numbers is now {after:?} instead of {before:?}")]
+    })
+}
+
+pub(super) fn files(setup: &Setup) -> Tested {
+    let list = || -> BTreeSet<String> {
+        let entries = std::fs::read_dir(&setup.workplace).into_iter().flatten().flatten();
+        entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
+    };
+    let before = list();
+    life(setup)?;
+    let new: Vec<String> = list().difference(&before).cloned().collect();
+    Ok(if new.is_empty() { vec![] } else { vec![format!("written to the working directory: {}", new.join(", "))] })
+}
+
+fn logging(p: &Probe) -> Result<Instance, HostError> {
+    let options = InstanceOptions { logging: true, ..p.options() };
+    Instance::new(Arc::clone(&p.binary), None, &options)
+}
+
+pub(super) fn callbacks(p: &Probe) -> Tested {
+    let mut instance = logging(p)?;
+    instance.poison();
+    let before = abuse::poison_hits();
+    p.enter(&mut instance)?;
+    instance.exit_initialization()?;
+    p.run(&mut instance, 0, 5)?;
+    instance.terminate()?;
+    let mut problems = Vec::new();
+    let rubbish = |m: &&LogMessage| m.instance.starts_with('#');
+    if instance.take_log().iter().any(|m| rubbish(&m)) {
+        problems.push("the FMU keeps the pointer to the instance name instead of a copy".into());
+    }
+    instance.free();
+    let hits = abuse::poison_hits() - before;
+    if hits > 0 {
+        problems.push(format!(
+            "the FMU keeps the pointer to the callbacks structure: {hits} calls went through it after it was overwritten"
+        ));
+    }
+    Ok(problems)
+}
+
+pub(super) fn allocation(p: &Probe) -> Tested {
+    abuse::fail_allocations(true);
+    let instance = p.instantiate();
+    if let Ok(mut instance) = instance
+        && instance.initialize(p.start, p.stop).is_ok()
+    {
+        let _ = instance.do_step(p.start, p.step);
+    }
+    abuse::fail_allocations(false);
+    Ok(vec![])
+}
+
+pub(super) fn debug_logging(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    let categories: Vec<&str> = p.d.log_categories.iter().map(|c| c.0.as_str()).collect();
+    let mut problems = Vec::new();
+    if let Err(error) = instance.set_debug_logging(true, &categories) {
+        problems.push(format!("switching the declared log categories on: {error}"));
+    } else if let Err(error) = instance.set_debug_logging(false, &[]) {
+        problems.push(format!("switching logging off: {error}"));
+    }
+    Ok(problems)
+}
+
+pub(super) fn log_categories(p: &Probe) -> Tested {
+    let declared: BTreeSet<&str> = p.d.log_categories.iter().map(|c| c.0.as_str()).collect();
+    if declared.is_empty() {
+        return not_applicable("no log categories are declared");
+    }
+    let mut instance = logging(p)?;
+    p.enter(&mut instance)?;
+    instance.exit_initialization()?;
+    p.run(&mut instance, 0, 5)?;
+    instance.terminate()?;
+    let used: BTreeSet<String> = instance.take_log().into_iter().map(|m| m.category).collect();
+    let unknown: Vec<&String> = used.iter().filter(|c| !c.is_empty() && !declared.contains(c.as_str())).collect();
+    Ok(if unknown.is_empty() { vec![] } else { vec![format!("log categories in use but not declared: {unknown:?}")] })
+}

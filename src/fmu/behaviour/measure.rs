@@ -1,0 +1,108 @@
+//! What of this process an FMU may have changed or used up, as far as the system tells.
+
+#![allow(unsafe_code)]
+
+/// Bytes that the C library has handed out and not got back.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(super) fn heap() -> Option<i64> {
+    // SAFETY: the call only reads the allocator's counters.
+    let info = unsafe { libc::mallinfo2() };
+    Some(info.uordblks as i64 + info.hblkhd as i64)
+}
+
+/// Bytes that the C library has handed out and not got back.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(super) fn heap() -> Option<i64> {
+    None
+}
+
+/// Lets free memory, and what `malloc` hands out anew, hold a byte; 0 for no more.
+pub(super) fn perturb_memory(byte: u8) {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: the option takes any byte; each block is written within its size and freed once.
+    unsafe {
+        libc::mallopt(libc::M_PERTURB, i32::from(byte));
+        if byte == 0 {
+            return;
+        }
+        // Small blocks come back from a cache as they were freed.
+        for size in (16..=4096).step_by(16) {
+            let blocks = [(); 8].map(|()| libc::malloc(size));
+            for block in blocks.into_iter().filter(|block| !block.is_null()) {
+                libc::memset(block, i32::from(byte), size);
+                // The compiler must not drop writes to memory about to be freed.
+                libc::free(std::hint::black_box(block));
+            }
+        }
+    }
+    #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+    let _ = byte;
+}
+
+fn count(folder: &str) -> usize {
+    std::fs::read_dir(folder).map_or(0, Iterator::count)
+}
+
+/// Open files of this process.
+pub(super) fn open_files() -> usize {
+    count("/proc/self/fd")
+}
+
+/// Threads of this process.
+pub(super) fn threads() -> usize {
+    count("/proc/self/task")
+}
+
+unsafe extern "C" {
+    fn fegetround() -> i32;
+}
+
+/// Rounding direction, exception masks and treatment of denormals.
+pub(super) fn floating_point() -> (i32, u32) {
+    // SAFETY: the call only reads the floating-point environment.
+    let rounding = unsafe { fegetround() };
+    #[cfg(target_arch = "x86_64")]
+    let control = {
+        let mut mxcsr = 0_u32;
+        // SAFETY: the instruction stores the control register into the variable.
+        unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut mxcsr, options(nostack, preserves_flags)) };
+        // Without the sticky exception flags, bits 0 to 5 (Intel SDM, volume 1, section 10.2.3).
+        mxcsr & 0xFFC0
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    let control = 0;
+    (rounding, control)
+}
+
+/// Handlers of the signals 1 to 31.
+#[cfg(unix)]
+pub(super) fn signal_handlers() -> Vec<(i32, usize)> {
+    (1..32)
+        .map(|signal| {
+            // SAFETY: all-zero bytes are a valid `sigaction`, which the call only fills in.
+            let action = unsafe {
+                let mut action: libc::sigaction = std::mem::zeroed();
+                libc::sigaction(signal, std::ptr::null(), &raw mut action);
+                action
+            };
+            (signal, action.sa_sigaction)
+        })
+        .collect()
+}
+
+/// Handlers of the signals 1 to 31.
+#[cfg(not(unix))]
+pub(super) fn signal_handlers() -> Vec<(i32, usize)> {
+    Vec::new()
+}
+
+/// The locale of numbers.
+pub(super) fn numeric_locale() -> String {
+    #[cfg(unix)]
+    // SAFETY: asking with a null pointer changes nothing; the text is valid until the locale changes, and read at once.
+    unsafe {
+        super::super::host::logger::lossy(libc::setlocale(libc::LC_NUMERIC, std::ptr::null()))
+    }
+    #[cfg(not(unix))]
+    String::new()
+}

@@ -1,0 +1,321 @@
+//! What the behavioural rules share: an FMU under test, how it is driven, and what is observed of it.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::super::description::{BaseType, Causality, Description, Initial, Interface, Value, Variability, Variable};
+use super::super::host::{Binary, HostError, Instance, InstanceOptions, resource_uri};
+
+/// Largest number of variables of a type that are observed beside the outputs.
+const MOST_OBSERVED: usize = 2000;
+/// Communication steps of a comparison.
+pub(super) const STEPS: usize = 20;
+
+/// What the first rules learn about an FMU for the later ones.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Learned {
+    /// Whether the FMU takes varying inputs; constant ones otherwise.
+    pub stimulus: bool,
+    /// Whether every variable can be read; outputs alone otherwise.
+    pub observe_all: bool,
+    /// Variables that differ between equal runs, by type and value reference: compared no more.
+    pub masked: Vec<(u8, u32)>,
+    /// Communication steps that fit into a comparison of a slow FMU.
+    pub steps: usize,
+}
+
+/// Why a rule ended without a result.
+#[derive(Debug)]
+pub(crate) enum Stop {
+    /// The FMU has nothing for the rule to test.
+    NotApplicable(String),
+    /// It could not be tested.
+    NotTested(String),
+    /// A call failed, which is a finding.
+    Host(HostError),
+}
+
+impl From<HostError> for Stop {
+    fn from(error: HostError) -> Self {
+        Self::Host(error)
+    }
+}
+
+/// A rule's findings; empty is a pass.
+pub(crate) type Tested = Result<Vec<String>, Stop>;
+
+pub(super) fn not_applicable<T>(why: impl Into<String>) -> Result<T, Stop> {
+    Err(Stop::NotApplicable(why.into()))
+}
+
+pub(super) fn not_tested<T>(why: impl Into<String>) -> Result<T, Stop> {
+    Err(Stop::NotTested(why.into()))
+}
+
+/// An observed variable.
+#[derive(Debug, Clone)]
+pub(crate) struct Observed {
+    pub name: String,
+    pub reference: u32,
+}
+
+/// Values of the observed variables, by type.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Snapshot {
+    pub reals: Vec<f64>,
+    pub integers: Vec<i32>,
+    pub booleans: Vec<i32>,
+    pub strings: Vec<String>,
+}
+
+/// The FMU under test.
+pub(crate) struct Probe {
+    pub d: Description,
+    pub folder: PathBuf,
+    pub library: PathBuf,
+    pub binary: Arc<Binary>,
+    pub start: f64,
+    pub stop: Option<f64>,
+    pub step: f64,
+    pub learned: Learned,
+    /// Observed variables: Real, Integer and Enumeration, Boolean, String.
+    pub(super) observed: [Vec<Observed>; 4],
+}
+
+pub(super) fn type_index(base: BaseType) -> usize {
+    match base {
+        BaseType::Real => 0,
+        BaseType::Integer | BaseType::Enumeration => 1,
+        BaseType::Boolean => 2,
+        BaseType::String => 3,
+    }
+}
+
+impl Probe {
+    pub fn new(d: Description, folder: &Path, library: &Path, now: bool, learned: Learned) -> Result<Self, HostError> {
+        let binary = Arc::new(Binary::load(library, now)?);
+        Ok(Self::with(d, folder.to_owned(), library.to_owned(), binary, learned))
+    }
+
+    pub(super) fn with(
+        d: Description,
+        folder: PathBuf,
+        library: PathBuf,
+        binary: Arc<Binary>,
+        learned: Learned,
+    ) -> Self {
+        let e = d.default_experiment.unwrap_or_default();
+        let start = e.start_time.unwrap_or(0.0);
+        let stop = e.stop_time.filter(|&stop| stop > start);
+        let step = e.step_size.filter(|&h| h > 0.0).or_else(|| stop.map(|stop| (stop - start) / 500.0)).unwrap_or(0.01);
+        let mut probe = Self { observed: Default::default(), folder, library, d, binary, start, stop, step, learned };
+        probe.choose_observed();
+        probe
+    }
+
+    pub fn interface(&self) -> &Interface {
+        self.d.co_simulation.as_ref().expect("only co-simulation FMUs are probed")
+    }
+
+    fn choose_observed(&mut self) {
+        let masked: HashSet<(u8, u32)> = self.learned.masked.iter().copied().collect();
+        let mut seen = HashSet::new();
+        let mut chosen: [Vec<Observed>; 4] = Default::default();
+        for outputs in [true, false] {
+            for v in &self.d.variables {
+                let index = type_index(v.base());
+                let wanted = (v.causality == Causality::Output) == outputs && (outputs || self.learned.observe_all);
+                if wanted
+                    && (outputs || chosen[index].len() < MOST_OBSERVED)
+                    && !masked.contains(&(index as u8, v.value_reference))
+                    && seen.insert((index, v.value_reference))
+                {
+                    chosen[index].push(Observed { name: v.name.clone(), reference: v.value_reference });
+                }
+            }
+        }
+        self.observed = chosen;
+    }
+
+    pub fn options(&self) -> InstanceOptions {
+        InstanceOptions {
+            name: "instance".into(),
+            guid: self.d.guid.clone(),
+            resources: resource_uri(&self.folder),
+            ..InstanceOptions::default()
+        }
+    }
+
+    pub fn instantiate(&self) -> Result<Instance, HostError> {
+        Instance::new(Arc::clone(&self.binary), None, &self.options())
+    }
+
+    /// An instance in initialisation mode, its inputs driven.
+    pub fn initializing(&self) -> Result<Instance, HostError> {
+        let mut instance = self.instantiate()?;
+        self.enter(&mut instance)?;
+        Ok(instance)
+    }
+
+    pub fn enter(&self, instance: &mut Instance) -> Result<(), HostError> {
+        instance.setup_experiment(None, self.start, self.stop)?;
+        instance.enter_initialization()?;
+        self.drive(instance, self.start)
+    }
+
+    /// An instance ready to step.
+    pub fn ready(&self) -> Result<Instance, HostError> {
+        let mut instance = self.initializing()?;
+        instance.exit_initialization()?;
+        Ok(instance)
+    }
+
+    pub fn time(&self, k: usize) -> f64 {
+        self.start + k as f64 * self.step
+    }
+
+    pub fn steps(&self) -> usize {
+        if self.learned.steps == 0 { STEPS } else { self.learned.steps.min(STEPS) }
+    }
+
+    pub fn inputs(&self) -> impl Iterator<Item = &Variable> {
+        self.d.variables.iter().filter(|v| v.causality == Causality::Input)
+    }
+
+    /// Value of a Real input at a time: a sine around the start value, within min and max.
+    pub fn input(&self, v: &Variable, order: usize, time: f64) -> f64 {
+        let start = match v.start {
+            Some(Value::Real(x)) if x.is_finite() => x,
+            _ => 0.0,
+        };
+        let r = self.d.resolved(v);
+        let scale = r.nominal.filter(|n| n.is_finite() && *n > 0.0).unwrap_or(1.0).max(start.abs());
+        let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
+        let room = (high - low).min(scale);
+        let phase = 0.7 + 1.3 * order as f64;
+        let turns = (time - self.start) / (STEPS as f64 * self.step);
+        let value = start + 0.1 * room * (std::f64::consts::TAU * 1.7 * turns + phase).sin();
+        value.clamp(low.min(high), high)
+    }
+
+    /// Sets the inputs for a time.
+    pub fn drive(&self, instance: &mut Instance, time: f64) -> Result<(), HostError> {
+        if !self.learned.stimulus {
+            return Ok(());
+        }
+        let (mut references, mut values) = (Vec::new(), Vec::new());
+        for (order, v) in self.inputs().enumerate() {
+            match v.base() {
+                BaseType::Real => {
+                    references.push(v.value_reference);
+                    values.push(self.input(v, order, time));
+                }
+                BaseType::Boolean => {
+                    let turns = (time - self.start) / (5.0 * self.step);
+                    instance
+                        .set_boolean(&[v.value_reference], &[(turns + order as f64 * 0.3).rem_euclid(2.0) >= 1.0])?;
+                }
+                _ => {}
+            }
+        }
+        if references.is_empty() { Ok(()) } else { instance.set_real(&references, &values) }
+    }
+
+    pub fn observe(&self, instance: &mut Instance) -> Result<Snapshot, HostError> {
+        let references = |index: usize| -> Vec<u32> { self.observed[index].iter().map(|o| o.reference).collect() };
+        let [reals, integers, booleans, strings] = [0, 1, 2, 3].map(references);
+        Ok(Snapshot {
+            reals: if reals.is_empty() { vec![] } else { instance.get_real(&reals)? },
+            integers: if integers.is_empty() { vec![] } else { instance.get_integer(&integers)? },
+            booleans: if booleans.is_empty() { vec![] } else { instance.get_boolean_raw(&booleans)? },
+            strings: if strings.is_empty() { vec![] } else { instance.get_string(&strings)? },
+        })
+    }
+
+    /// Drives, steps and observes from step `from` to step `to`; the snapshot after each step.
+    pub fn run(&self, instance: &mut Instance, from: usize, to: usize) -> Result<Vec<Snapshot>, HostError> {
+        (from..to)
+            .map(|k| {
+                self.drive(instance, self.time(k))?;
+                instance.do_step(self.time(k), self.step)?;
+                self.observe(instance)
+            })
+            .collect()
+    }
+
+    /// The first difference between two snapshots, bit for bit (NaN equals NaN), as a sentence.
+    pub fn difference(&self, a: &Snapshot, b: &Snapshot) -> Option<String> {
+        let same = |x: f64, y: f64| x == y || x.is_nan() && y.is_nan();
+        let say = |name: &str, a: String, b: String| Some(format!("\"{name}\" is {a} instead of {b}"));
+        for ((o, &x), &y) in self.observed[0].iter().zip(&a.reals).zip(&b.reals) {
+            if !same(x, y) {
+                return say(&o.name, y.to_string(), x.to_string());
+            }
+        }
+        for (index, (x, y)) in [(1, (&a.integers, &b.integers)), (2, (&a.booleans, &b.booleans))] {
+            for ((o, x), y) in self.observed[index].iter().zip(x).zip(y) {
+                if x != y {
+                    return say(&o.name, y.to_string(), x.to_string());
+                }
+            }
+        }
+        for ((o, x), y) in self.observed[3].iter().zip(&a.strings).zip(&b.strings) {
+            if x != y {
+                return say(&o.name, format!("{y:?}"), format!("{x:?}"));
+            }
+        }
+        None
+    }
+
+    /// The first difference between two records, with its time.
+    pub fn difference_of_runs(&self, a: &[Snapshot], b: &[Snapshot], from: usize) -> Option<String> {
+        a.iter().zip(b).enumerate().find_map(|(k, (x, y))| {
+            self.difference(x, y).map(|what| format!("{what} at t = {}", self.time(from + k + 1)))
+        })
+    }
+
+    /// Every type and value reference that differs between two records.
+    pub fn differing(&self, a: &[Snapshot], b: &[Snapshot]) -> Vec<(u8, u32)> {
+        let mut found = HashSet::new();
+        for (x, y) in a.iter().zip(b) {
+            let mut note = |index: usize, differs: &mut dyn FnMut(usize) -> bool| {
+                for (at, o) in self.observed[index].iter().enumerate() {
+                    if differs(at) {
+                        found.insert((index as u8, o.reference));
+                    }
+                }
+            };
+            note(0, &mut |i| x.reals[i].to_bits() != y.reals[i].to_bits() && x.reals[i] != y.reals[i]);
+            note(1, &mut |i| x.integers[i] != y.integers[i]);
+            note(2, &mut |i| x.booleans[i] != y.booleans[i]);
+            note(3, &mut |i| x.strings[i] != y.strings[i]);
+        }
+        let mut found: Vec<_> = found.into_iter().collect();
+        found.sort_unstable();
+        found
+    }
+
+    /// A value reference that no variable of a type uses, or none when all are taken.
+    pub fn unused_reference(&self, base: BaseType) -> u32 {
+        let used: HashSet<u32> = self
+            .d
+            .variables
+            .iter()
+            .filter(|v| type_index(v.base()) == type_index(base))
+            .map(|v| v.value_reference)
+            .collect();
+        [4_242_424_242, 987_654_321, u32::MAX]
+            .into_iter()
+            .find(|r| !used.contains(r))
+            .unwrap_or_else(|| (0..=u32::MAX).rev().find(|r| !used.contains(r)).unwrap_or(0))
+    }
+}
+
+/// Whether the environment may set a variable before initialisation.
+pub(super) fn settable(v: &Variable) -> bool {
+    v.variability != Variability::Constant
+        && (v.causality == Causality::Input || matches!(v.initial(), Some(Initial::Exact | Initial::Approx)))
+}

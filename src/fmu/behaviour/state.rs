@@ -1,0 +1,121 @@
+//! Getting, setting and serialising the FMU state (FMI 2.0.4, section 2.1.8).
+
+use super::super::description::{Causality, Variability};
+use super::super::host::{HostError, Instance};
+use super::probe::{Probe, Tested, not_applicable, not_tested};
+use super::settable_real;
+use super::values::get_consistent;
+
+fn needs_state(p: &Probe) -> Result<(), super::Stop> {
+    if !p.interface().can_get_and_set_state {
+        return not_applicable("canGetAndSetFMUstate is false");
+    }
+    p.comparable()
+}
+
+/// Changes what the environment may change during a run, so that a restored state must bring it back.
+fn disturb(p: &Probe, instance: &mut Instance) {
+    for v in &p.d.variables {
+        if v.causality == Causality::Parameter
+            && v.variability == Variability::Tunable
+            && let Some(value) = settable_real(p, v)
+        {
+            let _ = instance.set_real(&[v.value_reference], &[value]);
+        }
+    }
+}
+
+/// Whether the FMU takes such changes at all.
+fn takes_disturbance(p: &Probe) -> bool {
+    let attempt = || -> Result<(), HostError> {
+        let mut instance = p.ready()?;
+        p.run(&mut instance, 0, 2)?;
+        disturb(p, &mut instance);
+        p.run(&mut instance, 2, 4).map(|_| ())
+    };
+    attempt().is_ok()
+}
+
+pub(super) fn restore(p: &Probe) -> Tested {
+    needs_state(p)?;
+    if !get_consistent(p)?.is_empty() {
+        return not_tested("reading changes values");
+    }
+    let (n, cut) = (p.steps(), p.steps() / 3);
+    let disturbed = takes_disturbance(p);
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, cut)?;
+    let early = instance.get_state()?;
+    let then = p.observe(&mut instance)?;
+    let expected = p.run(&mut instance, cut, n)?;
+    let late = instance.get_state()?;
+    if disturbed {
+        disturb(p, &mut instance);
+    }
+    p.drive(&mut instance, p.time(n + 5))?;
+    instance.do_step(p.time(n), p.step)?;
+    instance.set_state(&early)?;
+    let mut problems = Vec::new();
+    if let Some(what) = p.difference(&then, &p.observe(&mut instance)?) {
+        problems.push(format!("fmi2SetFMUstate does not restore: {what} right after it"));
+        return Ok(problems);
+    }
+    let found = p.run(&mut instance, cut, n)?;
+    if let Some(what) = p.difference_of_runs(&expected, &found, cut) {
+        problems.push(format!("a run from a restored state is not the one before: {what}"));
+        return Ok(problems);
+    }
+    instance.set_state(&late)?;
+    if let Some(what) = p.difference(expected.last().unwrap_or(&then), &p.observe(&mut instance)?) {
+        problems.push(format!("of two states kept, the second is not restored: {what}"));
+    }
+    instance.free_state(early)?;
+    instance.free_state(late)?;
+    Ok(problems)
+}
+
+pub(super) fn handles(p: &Probe) -> Tested {
+    needs_state(p)?;
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 1)?;
+    let problems = instance.state_handles()?;
+    p.run(&mut instance, 1, 2)?;
+    Ok(problems)
+}
+
+pub(super) fn serialise(p: &Probe) -> Tested {
+    needs_state(p)?;
+    if !p.interface().can_serialize_state {
+        return not_applicable("canSerializeFMUstate is false");
+    }
+    let (n, cut) = (p.steps(), p.steps() / 3);
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, cut)?;
+    let state = instance.get_state()?;
+    let bytes = instance.serialize_state(&state)?;
+    // What the unserialised state gives is the measure; whether that is right is another rule's.
+    instance.set_state(&state)?;
+    let expected = p.run(&mut instance, cut, n)?;
+    instance.set_state(&state)?;
+    if p.difference_of_runs(&expected, &p.run(&mut instance, cut, n)?, cut).is_some() {
+        return not_tested("fmi2SetFMUstate does not restore");
+    }
+    let copy = instance.deserialize_state(&bytes)?;
+    instance.set_state(&copy)?;
+    let found = p.run(&mut instance, cut, n)?;
+    if let Some(what) = p.difference_of_runs(&expected, &found, cut) {
+        return Ok(vec![format!("a state serialised and read back is another one: {what}")]);
+    }
+    if p.interface().only_once {
+        return Ok(vec![]);
+    }
+    let mut other = p.ready()?;
+    let copy = other.deserialize_state(&bytes)?;
+    other.set_state(&copy)?;
+    let found = p.run(&mut other, cut, n)?;
+    let what = p.difference_of_runs(&expected, &found, cut);
+    Ok(what
+        .map(|what| format!("a serialised state read into a new instance is another one: {what}"))
+        .into_iter()
+        .collect())
+}

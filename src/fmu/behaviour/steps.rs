@@ -1,0 +1,362 @@
+//! Stepping through time (FMI 2.0.4, sections 4.2.1, 4.2.2 and 4.2.4).
+
+use super::super::description::{BaseType, Causality, Variability, Variable};
+use super::super::host::{HostError, Instance};
+use super::probe::{Probe, Tested, not_applicable, not_tested};
+
+/// Real variables whose course is compared between step sizes, at most.
+const MOST: usize = 500;
+
+fn courses(p: &Probe) -> Vec<(&str, u32)> {
+    let masked = |v: &Variable| p.learned.masked.contains(&(0, v.value_reference));
+    let kept = |v: &&Variable| {
+        v.base() == BaseType::Real
+            && v.variability == Variability::Continuous
+            && (v.causality == Causality::Output || p.learned.observe_all && v.causality == Causality::Local)
+            && !masked(v)
+    };
+    p.d.variables.iter().filter(kept).take(MOST).map(|v| (v.name.as_str(), v.value_reference)).collect()
+}
+
+/// The course of variables with constant inputs: steps of the sizes given by turns, values after each step.
+fn course(p: &Probe, references: &[u32], sizes: &[f64], count: usize) -> Result<Vec<Vec<f64>>, HostError> {
+    let mut instance = p.instantiate()?;
+    instance.initialize(p.start, p.stop)?;
+    let mut rows = vec![instance.get_real(references)?];
+    let whole: f64 = sizes.iter().sum();
+    for k in 0..count {
+        let turn = k % sizes.len();
+        let passed: f64 = sizes[..turn].iter().sum();
+        let time = p.start + ((k / sizes.len()) as f64 * whole + passed) * p.step;
+        instance.do_step(time, sizes[turn] * p.step)?;
+        rows.push(instance.get_real(references)?);
+    }
+    Ok(rows)
+}
+
+/// The variables, and their courses at `h` and `h/2`, when both can be run.
+type Courses<'a> = (Vec<(&'a str, u32)>, Vec<Vec<f64>>, Vec<Vec<f64>>);
+
+fn two_sizes(p: &Probe, count: usize) -> Result<Courses<'_>, super::Stop> {
+    let variables = courses(p);
+    if variables.is_empty() {
+        return not_applicable("there is no continuous Real output");
+    }
+    let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
+    let whole = course(p, &references, &[1.0], count)?;
+    match course(p, &references, &[0.5], 2 * count) {
+        Ok(half) => Ok((variables, whole, half)),
+        Err(error) => not_tested(format!("the FMU refuses half the step size: {error}")),
+    }
+}
+
+/// Whether every moving variable moves by the call instead of by the time; the name of the first.
+fn ignores_size<'a>((variables, whole, half): &Courses<'a>) -> Option<&'a str> {
+    let mut first = None;
+    for (at, (name, _)) in variables.iter().enumerate() {
+        let mut values: Vec<u64> = whole.iter().map(|row| row[at].to_bits()).collect();
+        let same = whole.iter().zip(half).all(|(a, b)| a[at].to_bits() == b[at].to_bits());
+        values.sort_unstable();
+        values.dedup();
+        if values.len() >= 4 {
+            if !same {
+                return None;
+            }
+            first = first.or(Some(*name));
+        }
+    }
+    first
+}
+
+/// Stops a rule that makes no sense when the step size is ignored.
+pub(super) fn size_counts(p: &Probe) -> Result<(), super::Stop> {
+    match two_sizes(p, 10) {
+        Ok(courses) if ignores_size(&courses).is_some() => not_tested("the step size is ignored"),
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn ignored(p: &Probe) -> Tested {
+    let courses = two_sizes(p, 10)?;
+    Ok(match ignores_size(&courses) {
+        Some(name) => {
+            let (h, half) = (p.step, p.step / 2.0);
+            vec![format!(
+                "fmi2DoStep ignores communicationStepSize: \"{name}\" takes the same values in steps of {half} as in steps of {h}"
+            )]
+        }
+        None => vec![],
+    })
+}
+
+pub(super) fn convergence(p: &Probe) -> Tested {
+    let count = 8;
+    let courses = two_sizes(p, count)?;
+    if ignores_size(&courses).is_some() {
+        return not_tested("the step size is ignored");
+    }
+    let (variables, whole, half) = courses;
+    let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
+    let quarter = course(p, &references, &[0.25], 4 * count)?;
+    let eighth = course(p, &references, &[0.125], 8 * count)?;
+    let mut problems = Vec::new();
+    for (at, (name, _)) in variables.iter().enumerate() {
+        let ends = [&whole, &half, &quarter, &eighth].map(|rows| rows[rows.len() - 1][at]);
+        let errors = [ends[1] - ends[0], ends[2] - ends[1], ends[3] - ends[2]].map(f64::abs);
+        // A rate of any order halves the difference at least; a jump that happens at other steps does not count twice.
+        let stuck = errors[1] > 0.9 * errors[0] && errors[2] > 0.9 * errors[1];
+        if stuck && errors[2] > 0.02 * range(&eighth, at).max(f64::MIN_POSITIVE) && errors[2] > 1e-12 {
+            problems.push(format!(
+                "\"{name}\" does not converge as the step shrinks: at t = {} it is {}, {}, {}, {} for steps of {}, 1/2, 1/4 and 1/8 of it",
+                p.time(count), ends[0], ends[1], ends[2], ends[3], p.step
+            ));
+        }
+    }
+    Ok(problems)
+}
+
+fn range(rows: &[Vec<f64>], at: usize) -> f64 {
+    let low = rows.iter().map(|row| row[at]).fold(f64::INFINITY, f64::min);
+    let high = rows.iter().map(|row| row[at]).fold(f64::NEG_INFINITY, f64::max);
+    high - low
+}
+
+pub(super) fn variable(p: &Probe) -> Tested {
+    if !p.interface().can_handle_variable_step_size {
+        return not_applicable("canHandleVariableCommunicationStepSize is false");
+    }
+    let count = 8;
+    let courses = two_sizes(p, count)?;
+    if ignores_size(&courses).is_some() {
+        return not_tested("the step size is ignored");
+    }
+    let (variables, whole, half) = courses;
+    let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
+    let quarter = course(p, &references, &[0.25], 4 * count)?;
+    let mixed = course(p, &references, &[1.0, 0.5, 0.25, 0.25, 2.0, 0.75, 1.25, 2.0], 8)?;
+    let mut problems = Vec::new();
+    for (at, (name, _)) in variables.iter().enumerate() {
+        let ends = [&whole, &half, &quarter, &mixed].map(|rows| rows[rows.len() - 1][at]);
+        let scatter = (ends[0] - ends[1]).abs().max((ends[1] - ends[2]).abs());
+        let allowed = 20.0 * scatter + 0.01 * range(&quarter, at) + 1e-9 * ends[1].abs();
+        if (ends[3] - ends[1]).abs() > allowed {
+            problems.push(format!(
+                "\"{name}\" is {} at t = {} after steps of varying size, but {} after equal ones",
+                ends[3],
+                p.time(count),
+                ends[1]
+            ));
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn time(p: &Probe) -> Tested {
+    let Some(v) = p.d.variables.iter().find(|v| v.causality == Causality::Independent && v.base() == BaseType::Real)
+    else {
+        return not_applicable("there is no independent variable");
+    };
+    let mut instance = p.ready()?;
+    for k in 0..=5 {
+        let (expected, found) = (p.time(k), instance.get_real(&[v.value_reference])?[0]);
+        let error = (found - expected).abs();
+        if error.is_nan() || error > 1e-6 * p.step + 1e-9 * expected.abs() {
+            return Ok(vec![format!("the independent variable \"{}\" is {found} at t = {expected}", v.name)]);
+        }
+        p.run(&mut instance, k, k + 1)?;
+    }
+    Ok(vec![])
+}
+
+pub(super) fn derivative(p: &Probe) -> Tested {
+    let pairs: Vec<(&Variable, &Variable)> =
+        p.d.variables
+            .iter()
+            .filter_map(|v| Some((v, p.d.by_index(v.derivative?)?)))
+            .filter(|(v, x)| v.base() == BaseType::Real && x.base() == BaseType::Real)
+            .take(200)
+            .collect();
+    if pairs.is_empty() {
+        return not_applicable("no variable is declared as the derivative of another");
+    }
+    size_counts(p)?;
+    let references: Vec<u32> = pairs.iter().flat_map(|(v, x)| [v.value_reference, x.value_reference]).collect();
+    let fraction = 0.125;
+    let h = fraction * p.step;
+    let rows = match course(p, &references, &[fraction], 16) {
+        Ok(rows) => rows,
+        Err(error) => return not_tested(format!("the FMU refuses an eighth of the step size: {error}")),
+    };
+    let mut problems = Vec::new();
+    for (at, (v, x)) in pairs.iter().enumerate() {
+        let (mut clear, mut wrong, mut example) = (0, 0, String::new());
+        for pair in rows.windows(2) {
+            let (d0, d1) = (pair[0][2 * at], pair[1][2 * at]);
+            let moved = pair[1][2 * at + 1] - pair[0][2 * at + 1];
+            let mean = 0.5 * (d0 + d1);
+            // Only where the derivative is steady over the step, and what it moves is more than rounding.
+            let steady = (d1 - d0).abs() <= 0.2 * mean.abs();
+            if steady && (mean * h).abs() > 1e-9 * pair[1][2 * at + 1].abs().max(1e-12) {
+                clear += 1;
+                if (moved - mean * h).abs() > 0.3 * (mean * h).abs() {
+                    wrong += 1;
+                    example = format!("\"{}\" moves at {} while \"{}\" is {mean}", x.name, moved / h, v.name);
+                }
+            }
+        }
+        if clear >= 5 && wrong == clear {
+            problems.push(format!("\"{}\" is not the derivative of \"{}\": {example}", v.name, x.name));
+        }
+    }
+    Ok(problems)
+}
+
+fn accepted(instance: &mut Instance, time: f64, step: f64) -> Result<bool, HostError> {
+    instance.do_step_status(time, step, true).map(super::super::host::Status::is_ok)
+}
+
+pub(super) fn negative(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 3)?;
+    let taken = accepted(&mut instance, p.time(3), -p.step)?;
+    Ok(if taken { vec![format!("fmi2DoStep by {} returned fmi2OK", -p.step)] } else { vec![] })
+}
+
+pub(super) fn zero(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 3)?;
+    let before = p.observe(&mut instance)?;
+    if accepted(&mut instance, p.time(3), 0.0)? {
+        let after = p.observe(&mut instance)?;
+        let spoilt = before.reals.iter().zip(&after.reals).position(|(x, y)| x.is_finite() && !y.is_finite());
+        if let Some(at) = spoilt {
+            return Ok(vec![format!("\"{}\" is {} after a step of size 0", p.observed[0][at].name, after.reals[at])]);
+        }
+    }
+    Ok(vec![])
+}
+
+pub(super) fn wrong_point(p: &Probe) -> Tested {
+    let mut problems = Vec::new();
+    for (what, at) in [("ahead of", 8), ("behind", 1)] {
+        let mut instance = p.ready()?;
+        p.run(&mut instance, 0, 3)?;
+        if accepted(&mut instance, p.time(at), p.step)? {
+            problems.push(format!(
+                "fmi2DoStep from t = {} returned fmi2OK, which is {what} the communication point t = {}",
+                p.time(at),
+                p.time(3)
+            ));
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn nan_input(p: &Probe) -> Tested {
+    let references: Vec<u32> = p.inputs().filter(|v| v.base() == BaseType::Real).map(|v| v.value_reference).collect();
+    if references.is_empty() {
+        return not_applicable("there is no Real input");
+    }
+    for value in [f64::NAN, f64::INFINITY, 1e300] {
+        let mut instance = p.ready()?;
+        p.run(&mut instance, 0, 2)?;
+        // Any status will do; coming back is what counts.
+        let _ = instance.set_real(&references, &vec![value; references.len()]);
+        for k in 2..4 {
+            let _ = instance.do_step_status(p.time(k), p.step, true)?;
+        }
+    }
+    Ok(vec![])
+}
+
+pub(super) fn early(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    let mut problems = Vec::new();
+    if accepted(&mut instance, p.start, p.step)? {
+        problems.push("fmi2DoStep before initialisation returned fmi2OK".into());
+    }
+    let mut instance = p.initializing()?;
+    if accepted(&mut instance, p.start, p.step)? {
+        problems.push("fmi2DoStep in initialisation mode returned fmi2OK".into());
+    }
+    Ok(problems)
+}
+
+pub(super) fn late(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 3)?;
+    instance.terminate()?;
+    let taken = accepted(&mut instance, p.time(3), p.step)?;
+    Ok(if taken { vec!["fmi2DoStep after fmi2Terminate returned fmi2OK".into()] } else { vec![] })
+}
+
+pub(super) fn initialisation_order(p: &Probe) -> Tested {
+    let mut problems = Vec::new();
+    let mut instance = p.instantiate()?;
+    if instance.exit_initialization().is_ok() {
+        problems.push("fmi2ExitInitializationMode returned fmi2OK outside initialisation mode".into());
+    }
+    let mut instance = p.ready()?;
+    if instance.enter_initialization().is_ok() {
+        problems.push("fmi2EnterInitializationMode returned fmi2OK after initialisation".into());
+    }
+    let mut instance = p.ready()?;
+    if instance.setup_experiment(None, p.start, p.stop).is_ok() {
+        problems.push("fmi2SetupExperiment returned fmi2OK after initialisation".into());
+    }
+    Ok(problems)
+}
+
+pub(super) fn status_functions(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 1)?;
+    instance.status_calls();
+    // There is no step to cancel; the call must come back all the same.
+    let _ = instance.cancel_step();
+    Ok(vec![])
+}
+
+pub(super) fn input_derivatives(p: &Probe) -> Tested {
+    if !p.interface().can_interpolate_inputs {
+        return not_applicable("canInterpolateInputs is false");
+    }
+    let inputs: Vec<u32> = p
+        .inputs()
+        .filter(|v| v.base() == BaseType::Real && v.variability == Variability::Continuous)
+        .map(|v| v.value_reference)
+        .collect();
+    if inputs.is_empty() {
+        return not_applicable("there is no continuous Real input");
+    }
+    let mut instance = p.ready()?;
+    p.drive(&mut instance, p.start)?;
+    instance.set_input_derivatives(&inputs, &vec![1; inputs.len()], &vec![0.0; inputs.len()])?;
+    instance.do_step(p.start, p.step)?;
+    let flat = p.observe(&mut instance)?;
+    // A slope of zero is what happens without derivatives.
+    let mut plain = p.ready()?;
+    p.drive(&mut plain, p.start)?;
+    plain.do_step(p.start, p.step)?;
+    let what = p.difference(&p.observe(&mut plain)?, &flat);
+    Ok(what.map(|what| format!("input derivatives of 0 change the step: {what}")).into_iter().collect())
+}
+
+pub(super) fn output_derivatives(p: &Probe) -> Tested {
+    let order = p.interface().max_output_derivative_order;
+    if order == 0 {
+        return not_applicable("maxOutputDerivativeOrder is 0");
+    }
+    let kept = |v: &&Variable| {
+        v.base() == BaseType::Real && v.causality == Causality::Output && v.variability == Variability::Continuous
+    };
+    let outputs: Vec<&Variable> = p.d.variables.iter().filter(kept).collect();
+    if outputs.is_empty() {
+        return not_applicable("there is no continuous Real output");
+    }
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 3)?;
+    let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
+    let values = instance.get_output_derivatives(&references, &vec![1; references.len()])?;
+    let bad = outputs.iter().zip(values).filter(|(_, value)| !value.is_finite());
+    Ok(bad.map(|(v, value)| format!("the first derivative of \"{}\" is {value}", v.name)).collect())
+}

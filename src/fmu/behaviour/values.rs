@@ -1,0 +1,405 @@
+//! Getting and setting values (FMI 2.0.4, section 2.1.7).
+
+use super::super::description::{BaseType, Causality, Initial, Value, Variability, Variable};
+use super::super::host::{HostError, Instance};
+use super::probe::{Probe, Tested, not_applicable, settable, type_index};
+use super::settable_real;
+
+/// Relative tolerance between a start value as printed in the XML and as compiled: tools print six digits and more.
+const PRINTED: f64 = 1e-5;
+
+fn get(instance: &mut Instance, v: &Variable) -> Result<Value, HostError> {
+    let r = [v.value_reference];
+    Ok(match v.base() {
+        BaseType::Real => Value::Real(instance.get_real(&r)?[0]),
+        BaseType::Integer | BaseType::Enumeration => Value::Integer(instance.get_integer(&r)?[0]),
+        BaseType::Boolean => Value::Boolean(instance.get_boolean(&r)?[0]),
+        BaseType::String => Value::String(instance.get_string(&r)?.swap_remove(0)),
+    })
+}
+
+fn set(instance: &mut Instance, v: &Variable, value: &Value) -> Result<(), HostError> {
+    let r = [v.value_reference];
+    match value {
+        Value::Real(x) => instance.set_real(&r, &[*x]),
+        Value::Integer(x) => instance.set_integer(&r, &[*x]),
+        Value::Boolean(x) => instance.set_boolean(&r, &[*x]),
+        Value::String(x) => instance.set_string(&r, &[x]),
+    }
+}
+
+fn show(value: &Value) -> String {
+    match value {
+        Value::Real(x) => x.to_string(),
+        Value::Integer(x) => x.to_string(),
+        Value::Boolean(x) => x.to_string(),
+        Value::String(x) => format!("{x:?}"),
+    }
+}
+
+fn same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Real(x), Value::Real(y)) => {
+            x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= PRINTED * x.abs().max(y.abs())
+        }
+        _ => a == b,
+    }
+}
+
+pub(super) fn start_values(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    instance.initialize(p.start, p.stop)?;
+    let mut problems = Vec::new();
+    for v in &p.d.variables {
+        let Some(start) = &v.start else { continue };
+        // Discrete variables may have changed at an event at the start.
+        let kept = matches!(v.causality, Causality::Parameter | Causality::Input)
+            || v.variability == Variability::Constant
+            || v.initial() == Some(Initial::Exact) && v.variability == Variability::Continuous;
+        if kept {
+            let value = get(&mut instance, v)?;
+            if !same(start, &value) {
+                problems.push(format!(
+                    "\"{}\" starts at {} in the binary, at {} in modelDescription.xml",
+                    v.name,
+                    show(&value),
+                    show(start)
+                ));
+            }
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn start_settable(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    let mut problems = Vec::new();
+    for v in p.d.variables.iter().filter(|v| settable(v)) {
+        if let Some(start) = &v.start
+            && let Err(error) = set(&mut instance, v, start)
+        {
+            problems
+                .push(format!("\"{}\" cannot be set to its own start value before initialisation: {error}", v.name));
+        }
+    }
+    if problems.is_empty() {
+        instance.initialize(p.start, p.stop)?;
+    }
+    Ok(problems)
+}
+
+pub(super) fn set_get(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    let mut written = Vec::new();
+    for v in p.d.variables.iter().filter(|v| v.causality == Causality::Parameter) {
+        if let Some(value) = settable_real(p, v)
+            && instance.set_real(&[v.value_reference], &[value]).is_ok()
+        {
+            written.push((v, value));
+        }
+    }
+    // Other parameters may not go together; then only inputs are tested.
+    if instance.initialize(p.start, p.stop).is_err() {
+        instance.free();
+        instance = p.instantiate()?;
+        instance.initialize(p.start, p.stop)?;
+        written.clear();
+    }
+    let mut problems = Vec::new();
+    for (v, value) in written {
+        let found = instance.get_real(&[v.value_reference])?[0];
+        if found != value {
+            problems.push(format!("the parameter \"{}\" was set to {value} and reads {found}", v.name));
+        }
+    }
+    for (order, v) in p.inputs().filter(|v| v.base() == BaseType::Real).enumerate() {
+        let value = p.input(v, order, p.start);
+        if instance.set_real(&[v.value_reference], &[value]).is_ok() {
+            let found = instance.get_real(&[v.value_reference])?[0];
+            if found != value {
+                problems.push(format!("the input \"{}\" was set to {value} and reads {found}", v.name));
+            }
+        }
+    }
+    for v in p.inputs() {
+        let Some(value) = &v.start else { continue };
+        if v.base() != BaseType::Real && set(&mut instance, v, value).is_ok() {
+            let found = get(&mut instance, v)?;
+            if found != *value {
+                problems.push(format!(
+                    "the input \"{}\" was set to {} and reads {}",
+                    v.name,
+                    show(value),
+                    show(&found)
+                ));
+            }
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn get_consistent(p: &Probe) -> Tested {
+    p.comparable()?;
+    let n = p.steps();
+    let mut instance = p.ready()?;
+    for k in 0..n {
+        let read = p.run(&mut instance, k, k + 1)?.swap_remove(0);
+        let again = p.observe(&mut instance)?;
+        if let Some(what) = p.difference(&read, &again) {
+            return Ok(vec![format!("reading twice gives two values: {what} at t = {}", p.time(k + 1))]);
+        }
+        // One by one, backwards.
+        for (o, &expected) in p.observed[0].iter().zip(&read.reals).rev().take(50) {
+            let value = instance.get_real(&[o.reference])?[0];
+            if value != expected && !(value.is_nan() && expected.is_nan()) {
+                return Ok(vec![format!("\"{}\" reads {value} alone, but {expected} among others", o.name)]);
+            }
+        }
+    }
+    let end = p.observe(&mut instance)?;
+    instance.free();
+    let mut quiet = p.ready()?;
+    for k in 0..n {
+        p.drive(&mut quiet, p.time(k))?;
+        quiet.do_step(p.time(k), p.step)?;
+    }
+    let what = p.difference(&p.observe(&mut quiet)?, &end);
+    Ok(what
+        .map(|what| format!("reading values changes the run: {what} when values were read at every step"))
+        .into_iter()
+        .collect())
+}
+
+const TYPES: [BaseType; 4] = [BaseType::Real, BaseType::Integer, BaseType::Boolean, BaseType::String];
+
+pub(super) fn bad_reference_get(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    let mut problems = Vec::new();
+    for base in TYPES {
+        let r = [p.unused_reference(base)];
+        let accepted = match base {
+            BaseType::Real => instance.get_real(&r).is_ok(),
+            BaseType::Boolean => instance.get_boolean_raw(&r).is_ok(),
+            BaseType::String => instance.get_string_raw(&r).is_ok(),
+            _ => instance.get_integer(&r).is_ok(),
+        };
+        if accepted {
+            problems
+                .push(format!("fmi2Get{base} of the value reference {}, which no variable has, returned fmi2OK", r[0]));
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn bad_reference_set(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    let mut problems = Vec::new();
+    for base in TYPES {
+        let r = [p.unused_reference(base)];
+        let accepted = match base {
+            BaseType::Real => instance.set_real(&r, &[0.0]),
+            BaseType::Boolean => instance.set_boolean(&r, &[false]),
+            BaseType::String => instance.set_string(&r, &[""]),
+            _ => instance.set_integer(&r, &[0]),
+        };
+        if accepted.is_ok() {
+            problems
+                .push(format!("fmi2Set{base} of the value reference {}, which no variable has, returned fmi2OK", r[0]));
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn boolean_values(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    let booleans: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::Boolean).collect();
+    if booleans.is_empty() {
+        return not_applicable("there is no Boolean variable");
+    }
+    p.run(&mut instance, 0, 3)?;
+    let references: Vec<u32> = booleans.iter().map(|v| v.value_reference).collect();
+    let values = instance.get_boolean_raw(&references)?;
+    let wrong = booleans.iter().zip(values).filter(|(_, value)| !matches!(value, 0 | 1));
+    Ok(wrong.map(|(v, value)| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name)).collect())
+}
+
+pub(super) fn string_values(p: &Probe) -> Tested {
+    let strings: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::String).collect();
+    if strings.is_empty() {
+        return not_applicable("there is no String variable");
+    }
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 3)?;
+    let references: Vec<u32> = strings.iter().map(|v| v.value_reference).collect();
+    let values = instance.get_string_raw(&references)?;
+    let wrong = strings.iter().zip(values).filter_map(|(v, value)| Some((v, value.err()?)));
+    Ok(wrong.map(|(v, what)| format!("\"{}\" is {what}", v.name)).collect())
+}
+
+pub(super) fn unchanging(p: &Probe) -> Tested {
+    let kept: Vec<&Variable> = p
+        .d
+        .variables
+        .iter()
+        .filter(|v| {
+            matches!(v.variability, Variability::Constant | Variability::Fixed) || v.causality == Causality::Parameter
+        })
+        .take(5000)
+        .collect();
+    if kept.is_empty() {
+        return not_applicable("there is no constant or fixed variable");
+    }
+    let mut instance = p.ready()?;
+    let mut before = Vec::new();
+    for v in &kept {
+        before.push(get(&mut instance, v)?);
+    }
+    p.run(&mut instance, 0, p.steps())?;
+    let mut problems = Vec::new();
+    for (v, before) in kept.iter().zip(before) {
+        let after = get(&mut instance, v)?;
+        let nan = matches!((&before, &after), (Value::Real(x), Value::Real(y)) if x.is_nan() && y.is_nan());
+        if before != after && !nan {
+            problems.push(format!(
+                "the {} variable \"{}\" went from {} to {} during the run",
+                v.variability,
+                v.name,
+                show(&before),
+                show(&after)
+            ));
+        }
+    }
+    Ok(problems)
+}
+
+pub(super) fn finite(p: &Probe) -> Tested {
+    let outputs: Vec<&Variable> =
+        p.d.variables.iter().filter(|v| v.causality == Causality::Output && v.base() == BaseType::Real).collect();
+    if outputs.is_empty() {
+        return not_applicable("there is no Real output");
+    }
+    let mut instance = p.ready()?;
+    let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
+    for k in 0..=p.steps() {
+        let values = instance.get_real(&references)?;
+        if let Some((v, value)) = outputs.iter().zip(values).find(|(_, value)| !value.is_finite()) {
+            return Ok(vec![format!("the output \"{}\" is {value} at t = {}", v.name, p.time(k))]);
+        }
+        p.run(&mut instance, k, k + 1)?;
+    }
+    Ok(vec![])
+}
+
+pub(super) fn range(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    instance.initialize(p.start, p.stop)?;
+    let watched: Vec<(&Variable, f64, f64, Vec<i32>)> =
+        p.d.variables
+            .iter()
+            .filter(|v| matches!(v.causality, Causality::Output | Causality::Local))
+            .filter_map(|v| {
+                let r = p.d.resolved(v);
+                let items: Vec<i32> = r.items.iter().map(|i| i.1).collect();
+                let bounded = r.min.is_some() || r.max.is_some() || !items.is_empty();
+                bounded.then(|| (v, r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY), items))
+            })
+            .take(2000)
+            .collect();
+    if watched.is_empty() {
+        return not_applicable("no calculated variable has a min, a max or items");
+    }
+    for k in 0..=p.steps() {
+        for (v, low, high, items) in &watched {
+            let value = match get(&mut instance, v)? {
+                Value::Real(x) => x,
+                Value::Integer(i) if !items.is_empty() && !items.contains(&i) => {
+                    return Ok(vec![format!("\"{}\" is {i} at t = {}, no item of its enumeration", v.name, p.time(k))]);
+                }
+                Value::Integer(i) => f64::from(i),
+                _ => continue,
+            };
+            // A rounding error beyond the limit is none of the user's concern.
+            let slack = 1e-9 * value.abs().max(1.0);
+            if value < low - slack || value > high + slack {
+                return Ok(vec![format!("\"{}\" is {value} at t = {}, outside {low} to {high}", v.name, p.time(k))]);
+            }
+        }
+        instance.do_step(p.time(k), p.step)?;
+    }
+    Ok(vec![])
+}
+
+fn other(p: &Probe, v: &Variable) -> Option<Value> {
+    match &v.start {
+        Some(Value::Real(_)) => settable_real(p, v).map(Value::Real),
+        Some(Value::Boolean(b)) => Some(Value::Boolean(!b)),
+        other => other.clone(),
+    }
+}
+
+pub(super) fn fixed_set(p: &Probe) -> Tested {
+    let fixed = |v: &&Variable| {
+        v.causality == Causality::Parameter && v.variability == Variability::Fixed
+            || v.variability == Variability::Constant
+    };
+    let mut any = false;
+    let mut accepted = Vec::new();
+    for v in p.d.variables.iter().filter(fixed).take(20) {
+        let Some(value) = other(p, v) else { continue };
+        any = true;
+        // A refusal may leave the instance in its error state: a fresh one each time.
+        let mut instance = p.ready()?;
+        p.run(&mut instance, 0, 1)?;
+        if set(&mut instance, v, &value).is_ok() {
+            accepted.push(format!("\"{}\"", v.name));
+        }
+    }
+    if !any {
+        return not_applicable("there is no fixed or constant variable with a start value");
+    }
+    let list = accepted.join(", ");
+    Ok(if accepted.is_empty() {
+        vec![]
+    } else {
+        vec![format!("accepted during the run, though fixed or constant: {list}")]
+    })
+}
+
+pub(super) fn tunable_set(p: &Probe) -> Tested {
+    let tunable = |v: &&Variable| v.causality == Causality::Parameter && v.variability == Variability::Tunable;
+    let mut any = false;
+    let mut problems = Vec::new();
+    for v in p.d.variables.iter().filter(tunable).take(50) {
+        let Some(value) = &v.start else { continue };
+        any = true;
+        let mut instance = p.ready()?;
+        p.run(&mut instance, 0, 1)?;
+        if let Err(error) = set(&mut instance, v, value) {
+            problems.push(format!("the tunable parameter \"{}\" cannot be set during the run: {error}", v.name));
+        }
+    }
+    if any { Ok(problems) } else { not_applicable("there is no tunable parameter") }
+}
+
+pub(super) fn empty(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    let failed = instance.empty_calls().into_iter().filter(|(_, status)| !status.is_ok());
+    Ok(failed.map(|(name, status)| format!("{name} of no variables at all returned {status}")).collect())
+}
+
+/// Every variable of the description is one of the binary.
+pub(super) fn readable(p: &Probe) -> Tested {
+    let mut instance = p.ready()?;
+    let mut problems = Vec::new();
+    for v in &p.d.variables {
+        if type_index(v.base()) < 4
+            && let Err(error) = get(&mut instance, v)
+        {
+            problems.push(format!("\"{}\" cannot be read: {error}", v.name));
+            if problems.len() >= 20 {
+                break;
+            }
+        }
+    }
+    Ok(problems)
+}

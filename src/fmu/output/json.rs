@@ -1,0 +1,74 @@
+//! For programs.
+
+use serde_json::{Value, json};
+
+use super::super::rules::{Report, Severity, Verdict, rule};
+
+/// The report as JSON, `eixo.validation/1`.
+#[must_use]
+pub fn json(report: &Report, strict: bool) -> Value {
+    let findings: Vec<Value> = report
+        .findings
+        .iter()
+        .map(|f| {
+            let rule = rule(&f.rule);
+            let mut value = json!({
+                "rule": f.rule,
+                "severity": rule.map(|r| r.severity),
+                "kind": rule.map(|r| r.kind),
+                "section": rule.map(|r| r.section),
+                "message": f.message,
+            });
+            if let Some(place) = &f.place {
+                value["file"] = json!(place.file);
+                if let Some(position) = place.position {
+                    value["line"] = json!(position.line);
+                    value["column"] = json!(position.column);
+                }
+            }
+            if let Some(call) = &f.call {
+                value["call"] = json!(call);
+            }
+            value["advice"] = json!(rule.map(|r| r.advice));
+            value
+        })
+        .collect();
+    let rules: Vec<Value> = report
+        .rules
+        .iter()
+        .map(|(rule, verdict)| {
+            let (word, why) = words(verdict);
+            let mut value = json!({ "id": rule.id, "verdict": word });
+            if let Some(why) = why {
+                value["why"] = json!(why);
+            }
+            value
+        })
+        .collect();
+    json!({
+        "schema": "eixo.validation/1",
+        "file": report.file,
+        "model": report.model,
+        "passes": report.passes(strict),
+        "strict": strict,
+        "counts": {
+            "error": report.count(Severity::Error),
+            "warning": report.count(Severity::Warning),
+            "note": report.count(Severity::Note),
+        },
+        "findings": findings,
+        "rules": rules,
+        "remarks": report.remarks,
+    })
+}
+
+/// A verdict as a word, with its reason.
+pub(super) fn words(verdict: &Verdict) -> (&'static str, Option<&str>) {
+    match verdict {
+        Verdict::Passed => ("passed", None),
+        Verdict::Failed => ("failed", None),
+        Verdict::NotTested(why) => ("not_tested", Some(why)),
+        Verdict::NotApplicable(why) => ("not_applicable", Some(why)),
+        Verdict::Skipped => ("skipped", None),
+    }
+}

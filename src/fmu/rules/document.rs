@@ -1,0 +1,107 @@
+//! Rules on the root element, the interfaces, the default experiment and the lists beside the variables.
+
+use std::collections::HashSet;
+
+use super::super::description::{Description, Interface};
+use super::super::xml::{Element, Position};
+use super::finding::Findings;
+use super::names::is_c_identifier;
+
+/// Checks the root and its version; whether the rest is worth reading.
+pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
+    if root.name != "fmiModelDescription" {
+        let message = format!("the root element is {}, not fmiModelDescription", root.name);
+        findings.at("schema-element", root.position, message);
+        return false;
+    }
+    match root.get("fmiVersion") {
+        Some("2.0") => true,
+        other => {
+            let message = match other {
+                Some(other) => format!("fmiVersion is \"{other}\"; it is \"2.0\" for every FMI 2.0.x"),
+                None => "fmiVersion is missing; it is \"2.0\" for every FMI 2.0.x".into(),
+            };
+            findings.at("fmi-version", root.position_of("fmiVersion"), message);
+            // Versions of FMI other than 2 have other rules.
+            other.is_none_or(|v| v.starts_with('2'))
+        }
+    }
+}
+
+/// Checks what the description says of itself.
+pub(super) fn check(d: &Description, root: &Element, findings: &mut Findings) {
+    if d.guid.trim().is_empty() {
+        findings.at("guid", root.position_of("guid"), "the guid is empty, so that it ties no binary to this file");
+    }
+    if d.model_name.trim().is_empty() {
+        findings.at("model-name", root.position_of("modelName"), "the modelName is empty");
+    }
+    for (name, interface) in [("ModelExchange", &d.model_exchange), ("CoSimulation", &d.co_simulation)] {
+        if let Some(interface) = interface {
+            check_interface(name, interface, findings);
+        }
+    }
+    experiment(d, findings);
+    unique("log-category", "log category", d.log_categories.iter().map(|c| (c.0.as_str(), c.2)), findings);
+    let tools = root.child("VendorAnnotations");
+    let tools =
+        tools.into_iter().flat_map(|v| v.children_named("Tool")).map(|t| (t.get("name").unwrap_or(""), t.position));
+    unique("vendor-tool", "vendor annotation of tool", tools, findings);
+}
+
+fn unique<'a>(
+    rule: &'static str,
+    what: &str,
+    names: impl Iterator<Item = (&'a str, Position)>,
+    findings: &mut Findings,
+) {
+    let mut seen = HashSet::new();
+    for (name, position) in names {
+        if !seen.insert(name) {
+            findings.at(rule, position, format!("a second {what} \"{name}\""));
+        }
+    }
+}
+
+fn check_interface(name: &str, interface: &Interface, findings: &mut Findings) {
+    if !is_c_identifier(&interface.model_identifier) {
+        let message = format!("{name}: modelIdentifier \"{}\" is no identifier of C", interface.model_identifier);
+        findings.at("model-identifier", interface.position, message);
+    }
+    if interface.can_serialize_state && !interface.can_get_and_set_state {
+        let message = format!("{name}: canSerializeFMUstate without canGetAndSetFMUstate");
+        findings.at("capability-serialize", interface.position, message);
+    }
+}
+
+fn experiment(d: &Description, findings: &mut Findings) {
+    let Some(e) = &d.default_experiment else { return };
+    let mut complain = |message: String| findings.at("default-experiment", e.position, message);
+    let start = e.start_time.unwrap_or(0.0);
+    for (name, value) in
+        [("startTime", e.start_time), ("stopTime", e.stop_time), ("tolerance", e.tolerance), ("stepSize", e.step_size)]
+    {
+        if value.is_some_and(|v| !v.is_finite()) {
+            complain(format!("{name} is not finite"));
+            return;
+        }
+    }
+    if let Some(stop) = e.stop_time
+        && stop <= start
+    {
+        complain(format!("stopTime {stop} is not after startTime {start}"));
+    }
+    if e.tolerance.is_some_and(|t| t <= 0.0) {
+        complain(format!("tolerance {} is not positive", e.tolerance.unwrap_or(0.0)));
+    }
+    if let Some(step) = e.step_size {
+        if step <= 0.0 {
+            complain(format!("stepSize {step} is not positive"));
+        } else if let Some(stop) = e.stop_time
+            && stop > start
+            && step > (stop - start) * (1.0 + 1e-9)
+        {
+            complain(format!("stepSize {step} is longer than the whole experiment"));
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! What a validation finds, as data; see [`super::super::output`] for how it is written.
+
+use serde::{Deserialize, Serialize};
+
+use super::super::xml::Position;
+use super::{Rule, Severity};
+
+/// Where a finding is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    /// Entry of the archive.
+    pub file: String,
+    /// Line and column, for text.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub position: Option<Position>,
+}
+
+/// One thing found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Id of the rule.
+    pub rule: String,
+    /// What is wrong, with the names and numbers.
+    pub message: String,
+    /// Where, for static rules.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub place: Option<Place>,
+    /// The FMI function at fault, for behavioural rules.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub call: Option<String>,
+}
+
+/// What became of a rule.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// Tested, nothing found.
+    Passed,
+    /// Tested, with findings.
+    Failed,
+    /// Not tested, and why. Not tested is not passed.
+    NotTested(String),
+    /// Has nothing to say about this FMU, and why: it lacks what the rule is about.
+    NotApplicable(String),
+    /// Left out by `--only` or `--skip`.
+    Skipped,
+}
+
+/// The result of a validation.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// The file validated, as given.
+    pub file: String,
+    /// Model name, where one could be read.
+    pub model: Option<String>,
+    /// Every rule and what became of it, in the order of the list.
+    pub rules: Vec<(&'static Rule, Verdict)>,
+    /// The findings, in the order of the rules.
+    pub findings: Vec<Finding>,
+    /// Sentences about the whole, such as that a model exchange FMU's behaviour was not tested.
+    pub remarks: Vec<String>,
+    /// The lines of `modelDescription.xml`, for quoting.
+    pub source: Vec<String>,
+}
+
+impl Report {
+    /// The number of findings of a severity.
+    #[must_use]
+    pub fn count(&self, severity: Severity) -> usize {
+        self.findings.iter().filter(|f| super::rule(&f.rule).is_some_and(|r| r.severity == severity)).count()
+    }
+
+    /// Whether the FMU passes: no finding of error severity; `strict`, no finding at all.
+    #[must_use]
+    pub fn passes(&self, strict: bool) -> bool {
+        if strict { self.findings.is_empty() } else { self.count(Severity::Error) == 0 }
+    }
+}
+
+/// Collects findings.
+#[derive(Debug, Default)]
+pub(crate) struct Findings {
+    pub list: Vec<Finding>,
+}
+
+impl Findings {
+    /// A finding at a place of `modelDescription.xml`.
+    pub fn at(&mut self, rule: &'static str, position: Position, message: impl Into<String>) {
+        self.push(rule, Some(Place { file: "modelDescription.xml".into(), position: Some(position) }), message.into());
+    }
+
+    /// A finding on an entry of the archive.
+    pub fn entry(&mut self, rule: &'static str, file: &str, message: impl Into<String>) {
+        self.push(rule, Some(Place { file: file.to_owned(), position: None }), message.into());
+    }
+
+    /// A finding on the whole.
+    pub fn whole(&mut self, rule: &'static str, message: impl Into<String>) {
+        self.push(rule, None, message.into());
+    }
+
+    fn push(&mut self, rule: &'static str, place: Option<Place>, message: String) {
+        debug_assert!(super::rule(rule).is_some(), "{rule} is not in the list of rules");
+        self.list.push(Finding { rule: rule.into(), message, place, call: None });
+    }
+
+    /// Whether a rule has a finding.
+    pub fn has(&self, rule: &str) -> bool {
+        self.list.iter().any(|f| f.rule == rule)
+    }
+}

@@ -1,0 +1,186 @@
+//! Validation rules: what each is ([`list`]), the static ones, and running them.
+
+mod document;
+pub mod finding;
+pub mod list;
+mod names;
+mod package;
+mod schema;
+mod structure;
+mod units;
+mod variables;
+
+use std::path::Path;
+
+use super::archive::Archive;
+use super::description::Description;
+use super::xml::Document;
+use finding::Findings;
+pub use finding::{Finding, Place, Report, Verdict};
+pub use list::RULES;
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing.
+    Note,
+    /// Some importers or uses fail.
+    Warning,
+    /// The FMU is wrong, or does harm.
+    Error,
+}
+
+/// What a rule rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// The standard asks for it.
+    Conformance,
+    /// The standard leaves it open; hosts and users suffer all the same.
+    Robustness,
+    /// Makes the FMU better to use.
+    Quality,
+}
+
+/// How a rule is tested.
+#[derive(Debug, Clone, Copy)]
+pub enum Check {
+    /// On the archive and the XML.
+    Static,
+    /// On the loaded binary, in a process of its own.
+    Behaviour,
+}
+
+/// A rule.
+#[derive(Debug, Clone, Copy)]
+pub struct Rule {
+    /// Name for `--only`, `--skip` and reports.
+    pub id: &'static str,
+    /// What holds when it passes.
+    pub title: &'static str,
+    /// How bad a finding is.
+    pub severity: Severity,
+    /// What it rests on.
+    pub kind: Kind,
+    /// Section of FMI 2.0.4.
+    pub section: &'static str,
+    /// What to do about a finding.
+    pub advice: &'static str,
+    /// How it is tested.
+    pub check: Check,
+}
+
+macro_rules! display {
+    ($name:ident { $($variant:ident = $text:literal),* }) => {
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(match self { $(Self::$variant => $text),* })
+            }
+        }
+    };
+}
+display!(Severity { Note = "note", Warning = "warning", Error = "error" });
+display!(Kind { Conformance = "conformance", Robustness = "robustness", Quality = "quality" });
+
+/// A rule by its id.
+#[must_use]
+pub fn rule(id: &str) -> Option<&'static Rule> {
+    RULES.iter().find(|r| r.id == id)
+}
+
+/// What the static rules leave behind for the behavioural ones.
+pub(crate) struct Static {
+    /// The findings.
+    pub findings: Findings,
+    /// The archive, when it is safe to extract.
+    pub archive: Option<Archive>,
+    /// The description, when it is fit to be relied on.
+    pub description: Option<Description>,
+    /// The lines of the description.
+    pub source: Vec<String>,
+    /// Static rules that were not tested, and why.
+    pub untested: Vec<(&'static str, String)>,
+}
+
+/// Runs every static rule on a file.
+pub(crate) fn check_file(path: &Path) -> Result<Static, super::archive::ArchiveError> {
+    match Archive::open(path) {
+        Ok(archive) => Ok(check_archive(archive)),
+        Err(error @ super::archive::ArchiveError::Io { .. }) => Err(error),
+        Err(error) => {
+            let mut result = Static::empty();
+            result.findings.whole("archive-readable", error.to_string());
+            result.stop("archive-path", "the archive cannot be read");
+            Ok(result)
+        }
+    }
+}
+
+impl Static {
+    fn empty() -> Self {
+        let findings = Findings::default();
+        Self { findings, archive: None, description: None, source: Vec::new(), untested: Vec::new() }
+    }
+
+    /// Notes that the static rules from this one on were not tested.
+    fn stop(&mut self, from: &'static str, why: &str) {
+        let rest = RULES.iter().skip_while(|r| r.id != from).filter(|r| matches!(r.check, Check::Static));
+        self.untested.extend(rest.map(|r| (r.id, why.to_owned())));
+    }
+}
+
+/// Runs every static rule on an open archive.
+pub(crate) fn check_archive(mut archive: Archive) -> Static {
+    let mut result = Static::empty();
+    let safe = package::entries(&mut archive, &mut result.findings);
+    if !safe {
+        let why = "the entries were not inflated because of the findings above";
+        result.untested.extend(["archive-damaged", "archive-bomb"].map(|id| (id, why.to_owned())));
+    }
+    if !package::description(&archive, &mut result.findings) {
+        result.stop("xml-well-formed", "there is no modelDescription.xml");
+        return result;
+    }
+    let Ok(bytes) = archive.read("modelDescription.xml") else {
+        // The entry's damage is reported already.
+        result.stop("xml-well-formed", "modelDescription.xml cannot be read");
+        return result;
+    };
+    let Some(description) = check_description(&bytes, &mut result) else { return result };
+    package::layout(&mut archive, &description, &mut result.findings);
+    result.description = Some(description);
+    result.archive = safe.then_some(archive);
+    result
+}
+
+/// Runs the rules on `modelDescription.xml`; the description, when it is fit to be relied on.
+pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Description> {
+    let document = match Document::parse(bytes) {
+        Ok(document) => document,
+        Err(error) => {
+            result.source = String::from_utf8_lossy(bytes).lines().map(str::to_owned).collect();
+            result.findings.at("xml-well-formed", error.position, error.message);
+            result.stop("fmi-version", "modelDescription.xml is not well-formed");
+            return None;
+        }
+    };
+    result.source = document.source.lines().map(str::to_owned).collect();
+    let findings = &mut result.findings;
+    if !document::root(&document.root, findings) {
+        result.stop("interface-missing", "this is no model description of FMI 2.0");
+        return None;
+    }
+    schema::check(&document.root, findings);
+    // What the schema refuses reads as its default below; findings that follow from that would mislead.
+    if ["schema-element", "schema-required", "schema-value", "interface-missing"].iter().any(|r| findings.has(r)) {
+        result.stop("guid", "the schema's findings come first");
+        return None;
+    }
+    let description = Description::from_document(&document);
+    document::check(&description, &document.root, findings);
+    units::check(&description, findings);
+    variables::check(&description, findings);
+    structure::check(&description, findings);
+    Some(description)
+}

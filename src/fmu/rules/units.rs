@@ -1,0 +1,107 @@
+//! Rules on units and type definitions (FMI 2.0.4, sections 2.2.2 and 2.2.3).
+
+use std::collections::{HashMap, HashSet};
+
+use super::super::description::{BaseType, Description, TypeAttributes};
+use super::super::xml::Position;
+use super::finding::Findings;
+
+/// Checks units, display units, and type definitions with their uses.
+pub(super) fn check(d: &Description, findings: &mut Findings) {
+    definitions(d, findings);
+    types(d, findings);
+    let units: HashMap<&str, HashSet<&str>> =
+        d.units.iter().map(|u| (u.name.as_str(), u.display.iter().map(|x| x.name.as_str()).collect())).collect();
+    for t in &d.types {
+        use_of_unit(&units, &format!("type \"{}\"", t.name), &t.attributes, &t.attributes, findings);
+    }
+    for v in &d.variables {
+        let who = format!("variable \"{}\"", v.name);
+        use_of_unit(&units, &who, &v.attributes, &d.resolved(v), findings);
+        let Some(name) = &v.declared_type else { continue };
+        match d.type_of(v) {
+            None => {
+                findings.at("type-undeclared", v.attributes.position, format!("{who}: no SimpleType \"{name}\""));
+            }
+            Some(t) if t.attributes.base != v.base() => {
+                let message =
+                    format!("{who} is of type {}, its declared type \"{name}\" of {}", v.base(), t.attributes.base);
+                findings.at("type-mismatch", v.attributes.position, message);
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+fn duplicates<'a>(names: impl Iterator<Item = (&'a str, Position)>) -> Vec<(&'a str, Position)> {
+    let mut seen = HashSet::new();
+    names.filter(|(name, _)| !seen.insert(*name)).collect()
+}
+
+fn definitions(d: &Description, findings: &mut Findings) {
+    for (name, position) in duplicates(d.units.iter().map(|u| (u.name.as_str(), u.position))) {
+        findings.at("unit-unique", position, format!("a second unit \"{name}\""));
+    }
+    for u in &d.units {
+        for (name, position) in duplicates(u.display.iter().map(|x| (x.name.as_str(), x.position))) {
+            findings.at("unit-unique", position, format!("unit \"{}\": a second display unit \"{name}\"", u.name));
+        }
+        if u.base.is_some_and(|b| b.factor == 0.0 || !b.factor.is_finite() || !b.offset.is_finite()) {
+            let message = format!("unit \"{}\": the factor or offset cannot be inverted", u.name);
+            findings.at("unit-conversion", u.position, message);
+        }
+        for x in u.display.iter().filter(|x| x.factor == 0.0 || !x.factor.is_finite() || !x.offset.is_finite()) {
+            let message = format!("display unit \"{}\": the factor or offset cannot be inverted", x.name);
+            findings.at("unit-conversion", x.position, message);
+        }
+    }
+}
+
+fn types(d: &Description, findings: &mut Findings) {
+    for (name, position) in duplicates(d.types.iter().map(|t| (t.name.as_str(), t.position))) {
+        findings.at("type-unique", position, format!("a second type \"{name}\""));
+    }
+    let variables: HashSet<&str> = d.variables.iter().map(|v| v.name.as_str()).collect();
+    for t in d.types.iter().filter(|t| variables.contains(t.name.as_str())) {
+        let message = format!("the type \"{}\" has the name of a variable", t.name);
+        findings.at("type-unique", t.position, message);
+    }
+    for t in d.types.iter().filter(|t| t.attributes.base == BaseType::Enumeration) {
+        let mut values = HashSet::new();
+        let mut names = HashSet::new();
+        for (name, value, position) in &t.attributes.items {
+            if !values.insert(*value) || !names.insert(name.as_str()) {
+                let message = format!("type \"{}\": a second item named \"{name}\" or of value {value}", t.name);
+                findings.at("enumeration-items", *position, message);
+            }
+        }
+    }
+}
+
+/// `own` is what stands there, `resolved` with the type definition's attributes filled in.
+fn use_of_unit(
+    units: &HashMap<&str, HashSet<&str>>,
+    who: &str,
+    own: &TypeAttributes,
+    resolved: &TypeAttributes,
+    findings: &mut Findings,
+) {
+    if let Some(unit) = &own.unit
+        && !units.contains_key(unit.as_str())
+    {
+        findings.at("unit-undeclared", own.position, format!("{who}: no Unit \"{unit}\" in UnitDefinitions"));
+        return;
+    }
+    let Some(display) = &own.display_unit else { return };
+    let message = match &resolved.unit {
+        None => format!("{who} has a displayUnit \"{display}\" but no unit"),
+        Some(unit) => match units.get(unit.as_str()) {
+            // A unit may be its own display unit.
+            Some(known) if !known.contains(display.as_str()) && unit != display => {
+                format!("{who}: unit \"{unit}\" defines no DisplayUnit \"{display}\"")
+            }
+            _ => return,
+        },
+    };
+    findings.at("display-unit", own.position, message);
+}

@@ -1,0 +1,609 @@
+/* A small FMI 2.0 co-simulation FMU with switchable defects, for the tests of `eixo validate`.
+ *
+ * Model: a mass on a spring with an inner, hidden relaxation,
+ *     x' = v,  v' = F - k x - d v - 0.2 w + 0.1 on + 0.01 mode,  w' = v - w,
+ * integrated by classical Runge-Kutta in steps of at most 1 ms. y = x + 0.1 F, z = v.
+ *
+ * Compile: cc -shared -fPIC -DDEFECT=<name> -o corpus.so fmu.c -lm; DEFECT is one of the names below. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <fenv.h>
+#include <locale.h>
+#include <math.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum {
+    NONE, UNRESOLVED, SYMBOL_MISSING, SYMBOL_OPTIONAL, PLATFORM, VERSION, REFUSES, INSTANTIATE_CRASH, INITIALISE,
+    UNREADABLE, STEP_FAILS, STEP_CRASH, STEP_ABORT, STEP_EXIT, STEP_EXIT_ZERO, STEP_HANG, STEP_MEMORY, STEP_STACK,
+    PENDING, STATUS_NUMBER, RANDOM, UNINITIALISED, TERMINATE, FREE_CRASH, FREE_NULL, UNLOAD, GUID_ACCEPTED, RESOURCES,
+    START_VALUE, START_STRING, START_REFUSED, SET_GET, GET_EFFECT, BOOLEAN, STRING_NULL, STRING_LATIN, FIXED_DRIFTS,
+    NAN_OUTPUT, RANGE, TUNABLE_REFUSED, FIXED_ACCEPTED, BAD_GET, BAD_SET, BAD_GET_CRASH, EMPTY_CALL, RESET_FORGETS,
+    RESET_PARAMETER, RESET_CRASH, STATE_FORGETS, STATE_INPUT, STATE_SHARED, STATE_HANDLE, SERIALISE, SERIALISE_POINTER,
+    STEP_IGNORED, CONVERGENCE, VARIABLE, NEGATIVE, ZERO, WRONG_POINT, EARLY, EARLY_CRASH, LATE, INIT_ORDER, NAN_INPUT,
+    NAN_HANG, CANCEL, TIME, DERIVATIVE, INPUT_DERIVATIVE, OUTPUT_DERIVATIVE, DIRECTIONAL, DEPENDENCY, GLOBAL, THREADS,
+    HANDOVER, LEAK, LEAK_FILE, LEAK_THREAD, STEP_LEAK, CALLBACKS, NAME_KEPT, ALLOCATION, DEBUG_LOGGING, LOG_CATEGORY,
+    DIRECTORY, ROUNDING, DENORMALS, STDOUT, SIGNALS, ENVIRONMENT, LOCALE, FILES
+};
+#ifndef DEFECT
+#define DEFECT NONE
+#endif
+#define IS(name) (DEFECT == (name))
+
+typedef void *Component;
+typedef void *State;
+typedef int Status;
+enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING_STATUS };
+typedef struct {
+    void (*logger)(void *, const char *, int, const char *, const char *, ...);
+    void *(*allocate)(size_t, size_t);
+    void (*free)(void *);
+    void (*step_finished)(void *, int);
+    void *environment;
+} Callbacks;
+
+typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8 } Phase;
+
+typedef struct {
+    double x, v, w, F, k, d, g, time, last_step, noise;
+    int mode, on, calls;
+    Phase phase;
+    char label[32];
+} Values;
+
+typedef struct {
+    Values values;
+    Callbacks callbacks;
+    const Callbacks *kept;
+    char name[64];
+    const char *kept_name;
+    int logging;
+    pthread_t thread;
+    void *leaks;
+    Values *pointer;
+} Instance;
+
+static double global_w, scratch;
+static Values shared_state;
+
+#define W(i) (*(IS(GLOBAL) ? &global_w : &(i)->values.w))
+
+static void start(Values *s) {
+    double w = s->w, k = s->k;
+    memset(s, 0, sizeof *s);
+    s->x = 1;
+    s->k = IS(START_VALUE) ? 11 : 10;
+    s->d = 0.5;
+    s->g = 9.81;
+    strcpy(s->label, IS(START_STRING) ? "another" : "mass");
+    s->phase = INSTANTIATED;
+    (void)w;
+    (void)k;
+}
+
+static void log_text(Instance *i, int status, const char *category, const char *text, double value) {
+    const char *name = IS(NAME_KEPT) ? i->kept_name : i->name;
+    const Callbacks *callbacks = IS(CALLBACKS) ? i->kept : &i->callbacks;
+    if ((i->logging || status > WARNING) && callbacks->logger)
+        callbacks->logger(callbacks->environment, name, status, category, "%s, %g", text, value);
+}
+
+static Status fail(Instance *i, const char *text) {
+    log_text(i, ERROR, "logStatusError", text, i->values.time);
+    return ERROR;
+}
+
+#ifdef __GNUC__
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+EXPORT const char *fmi2GetTypesPlatform(void) { return IS(PLATFORM) ? "standard32" : "default"; }
+EXPORT const char *fmi2GetVersion(void) { return IS(VERSION) ? "2.0.1" : "2.0"; }
+
+#if DEFECT_UNRESOLVED
+extern void eixo_corpus_no_such_function(void);
+EXPORT void eixo_corpus_reference(void) { eixo_corpus_no_such_function(); }
+#endif
+#if DEFECT_UNLOAD
+__attribute__((destructor)) static void unload(void) { abort(); }
+#endif
+
+static void *sleeper(void *argument) {
+    for (;;) sleep(1000);
+    return argument;
+}
+
+EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
+                                 const Callbacks *callbacks, int visible, int logging) {
+    (void)visible;
+    if (!name || !*name || type != 1 || !callbacks) return NULL;
+    if (IS(REFUSES)) {
+        callbacks->logger(callbacks->environment, name, ERROR, "logStatusError", "no licence for %s", name);
+        return NULL;
+    }
+    if (IS(INSTANTIATE_CRASH)) *(volatile int *)8 = 1;
+    if (!IS(GUID_ACCEPTED) && (!guid || strcmp(guid, "{7d6b4f0e-3a52-4c7e-9d0e-c0a3b1f2e4d5}"))) return NULL;
+    if (IS(RESOURCES)) {
+        struct stat info;
+        char path[4096];
+        snprintf(path, sizeof path, "%s", resources + strlen("file://"));
+        if (stat(path, &info)) *(volatile int *)8 = 1;
+    }
+    Instance *i = callbacks->allocate(1, sizeof(Instance));
+    if (!i && !IS(ALLOCATION)) return NULL;
+    i->callbacks = *callbacks;
+    i->kept = callbacks;
+    i->kept_name = name;
+    snprintf(i->name, sizeof i->name, "%s", name);
+    i->logging = logging;
+    i->thread = pthread_self();
+    i->pointer = &i->values;
+    start(&i->values);
+    if (IS(UNINITIALISED)) {
+        double *noise = malloc(1000);
+        i->values.noise = ((unsigned char *)noise)[500];
+        free(noise);
+    }
+    if (IS(LEAK)) i->leaks = malloc(1000);
+    if (IS(LEAK_FILE)) i->leaks = fopen("/dev/null", "r");
+    if (IS(LEAK_THREAD)) {
+        pthread_t thread;
+        pthread_attr_t attributes;
+        pthread_attr_init(&attributes);
+        pthread_attr_setstacksize(&attributes, 65536);
+        pthread_create(&thread, &attributes, sleeper, NULL);
+        pthread_attr_destroy(&attributes);
+    }
+    if (IS(DIRECTORY) && chdir("/")) return NULL;
+    if (IS(ROUNDING)) fesetround(FE_UPWARD);
+    if (IS(DENORMALS)) {
+        unsigned int mxcsr;
+        __asm__ volatile("stmxcsr %0" : "=m"(mxcsr));
+        mxcsr |= 0x8040;
+        __asm__ volatile("ldmxcsr %0" : : "m"(mxcsr));
+    }
+    if (IS(SIGNALS)) signal(SIGINT, SIG_IGN);
+    if (IS(ENVIRONMENT)) setenv("EIXO_CORPUS", "1", 1);
+    if (IS(LOCALE) && !setlocale(LC_NUMERIC, "C.UTF-8")) return NULL;
+    return i;
+}
+
+EXPORT void fmi2FreeInstance(Component c) {
+    Instance *i = c;
+    if (!i && !IS(FREE_NULL)) return;
+    if (IS(FREE_CRASH) && i->values.phase == TERMINATED) abort();
+    if (IS(STEP_LEAK))
+        while (i->leaks) {
+            void *next = *(void **)i->leaks;
+            free(i->leaks);
+            i->leaks = next;
+        }
+    i->callbacks.free(i);
+}
+
+EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const char *const categories[]) {
+    Instance *i = c;
+    (void)categories;
+    if (IS(DEBUG_LOGGING) && count) return fail(i, "no such category");
+    i->logging = on;
+    return OK;
+}
+
+static Status in(Instance *i, int phases, const char *call) { return i->values.phase & phases ? OK : fail(i, call); }
+
+EXPORT Status fmi2SetupExperiment(Component c, int has_tolerance, double tolerance, double begin, int has_stop,
+                                  double stop) {
+    Instance *i = c;
+    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    if (!IS(INIT_ORDER) && in(i, INSTANTIATED, "fmi2SetupExperiment")) return ERROR;
+    i->values.time = begin;
+    return OK;
+}
+
+EXPORT Status fmi2EnterInitializationMode(Component c) {
+    Instance *i = c;
+    if (in(i, INSTANTIATED, "fmi2EnterInitializationMode")) return ERROR;
+    if (IS(GLOBAL)) global_w = 0;
+    i->values.phase = INITIALIZING;
+    return OK;
+}
+
+EXPORT Status fmi2ExitInitializationMode(Component c) {
+    Instance *i = c;
+    if (in(i, INITIALIZING, "fmi2ExitInitializationMode")) return ERROR;
+    if (IS(INITIALISE)) return fail(i, "no solution");
+    log_text(i, OK, IS(LOG_CATEGORY) ? "logChatter" : "logEvents", "initialised", i->values.x);
+    i->values.phase = STEPPING;
+    return OK;
+}
+
+EXPORT Status fmi2Terminate(Component c) {
+    Instance *i = c;
+    if (IS(TERMINATE)) return fail(i, "cannot end");
+    if (in(i, STEPPING, "fmi2Terminate")) return ERROR;
+    log_text(i, OK, "logEvents", "terminated", i->values.time);
+    i->values.phase = TERMINATED;
+    return OK;
+}
+
+#if !DEFECT_SYMBOL_MISSING
+EXPORT Status fmi2Reset(Component c) {
+    Instance *i = c;
+    double w = i->values.w, k = i->values.k;
+    if (IS(RESET_CRASH)) *(volatile int *)8 = 1;
+    start(&i->values);
+    if (IS(RESET_FORGETS)) i->values.w = w;
+    if (IS(RESET_PARAMETER)) i->values.k = k;
+    return OK;
+}
+#endif
+
+static double acceleration(const Instance *i, double x, double v, double w) {
+    const Values *s = &i->values;
+    return s->F - s->k * x - s->d * v - 0.2 * w + 0.1 * s->on + 0.01 * s->mode;
+}
+
+static void rate(const Instance *i, const double s[3], double d[3]) {
+    d[0] = s[1];
+    d[1] = acceleration(i, s[0], s[1], s[2]);
+    d[2] = s[1] - s[2];
+}
+
+static void integrate(Instance *i, double span) {
+    Values *s = &i->values;
+    int count = (int)ceil(span / 1e-3 - 1e-9), n, j;
+    double h = span / (count > 0 ? count : 1);
+    for (n = 0; n < count; n++) {
+        double a[3] = {s->x, s->v, W(i)}, b[3], k1[3], k2[3], k3[3], k4[3];
+        rate(i, a, k1);
+        for (j = 0; j < 3; j++) b[j] = a[j] + 0.5 * h * k1[j];
+        rate(i, b, k2);
+        for (j = 0; j < 3; j++) b[j] = a[j] + 0.5 * h * k2[j];
+        rate(i, b, k3);
+        for (j = 0; j < 3; j++) b[j] = a[j] + h * k3[j];
+        rate(i, b, k4);
+        for (j = 0; j < 3; j++) a[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
+        s->x = a[0], s->v = a[1], W(i) = a[2];
+    }
+}
+
+static int overflow(int depth) {
+    volatile char page[4096];
+    page[0] = (char)depth;
+    return overflow(depth + 1) + page[0];
+}
+
+EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prior) {
+    Instance *i = c;
+    Values *s = &i->values;
+    (void)no_set_prior;
+    if (IS(EARLY_CRASH) && s->phase == INSTANTIATED) *(volatile int *)8 = 1;
+    int phases = STEPPING | (IS(EARLY) ? INSTANTIATED | INITIALIZING : 0) | (IS(LATE) ? TERMINATED : 0);
+    if (in(i, phases, "fmi2DoStep")) return ERROR;
+    if (step < 0 && !IS(NEGATIVE)) return fail(i, "negative step");
+    if (!IS(WRONG_POINT) && !(step < 0) && fabs(point - s->time) > 1e-9 * fmax(1, fabs(point)))
+        return fail(i, "wrong communication point");
+    if (IS(STEP_FAILS) && point > 0.5) return fail(i, "no convergence");
+    if (IS(STEP_CRASH)) *(volatile int *)8 = 1;
+    if (IS(STEP_ABORT)) abort();
+    if (IS(STEP_EXIT)) exit(3);
+    if (IS(STEP_EXIT_ZERO)) exit(0);
+    if (IS(STEP_HANG)) for (;;) sleep(1);
+    if (IS(STEP_MEMORY)) for (;;) *(volatile char *)malloc(100 << 20) = 1;
+    if (IS(STEP_STACK)) return overflow(0);
+    if (IS(PENDING)) return PENDING_STATUS;
+    if (IS(STATUS_NUMBER)) return 42;
+    if (IS(NAN_INPUT) && !isfinite(s->F)) abort();
+    if (IS(NAN_HANG)) while (!(fabs(s->F) < 1e9)) sleep(1);
+    if (IS(ZERO)) s->v += 0 * (1 / step);
+    if (IS(STEP_LEAK)) {
+        void **block = malloc(100);
+        *block = i->leaks;
+        i->leaks = block;
+    }
+    if (IS(THREADS)) {
+        int n;
+        scratch = s->v;
+        for (n = 0; n < 3; n++) sched_yield();
+        s->v = scratch;
+    }
+    if (IS(STDOUT)) printf("step to %g\n", point + step);
+    if (IS(FILES)) {
+        FILE *file = fopen("trace.log", "a");
+        if (file) fclose(file);
+    }
+    if (IS(FIXED_DRIFTS)) s->k += 0.1 * step;
+    double span = step;
+    if (IS(STEP_IGNORED)) span = 0.01;
+    if (IS(VARIABLE) && s->last_step > 0 && step > 0.1 * s->last_step) span = s->last_step;
+    s->last_step = step;
+    if (!IS(HANDOVER) || pthread_equal(i->thread, pthread_self())) integrate(i, span);
+    s->calls++;
+    if (IS(RANDOM)) {
+        struct timespec now;
+        clock_gettime(CLOCK_MONOTONIC, &now);
+        s->noise = 1e-9 * (double)now.tv_nsec;
+    }
+    s->time = point + step;
+    return OK;
+}
+
+static double der_v(const Instance *i) { return acceleration(i, i->values.x, i->values.v, W(i)); }
+
+EXPORT Status fmi2GetReal(Component c, const uint32_t r[], size_t count, double value[]) {
+    Instance *i = c;
+    Values *s = &i->values;
+    size_t n;
+    if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetReal")) return ERROR;
+    if (IS(EMPTY_CALL) && !value) return fail(i, "null pointer");
+    for (n = 0; n < count; n++) {
+        switch (r[n]) {
+        case 0: value[n] = s->time - (IS(TIME) ? s->last_step : 0); break;
+        case 1: value[n] = s->x; break;
+        case 2:
+            if (IS(UNREADABLE)) return fail(i, "unknown reference");
+            value[n] = s->v;
+            break;
+        case 3: value[n] = (IS(DERIVATIVE) ? 2 : 1) * s->v; break;
+        case 4: value[n] = der_v(i); break;
+        case 5: value[n] = s->F; break;
+        case 6: value[n] = s->x + 0.1 * s->F + s->noise; break;
+        case 7:
+            value[n] = s->v;
+            if (IS(CONVERGENCE)) value[n] += 1e-2 * s->calls;
+            if (IS(DEPENDENCY)) value[n] += 0.05 * s->F;
+            if (IS(NAN_OUTPUT) && s->time > 0.05) value[n] = NAN;
+            if (IS(GET_EFFECT)) s->x += 1e-6;
+            break;
+        case 8: value[n] = s->k; break;
+        case 9: value[n] = s->d; break;
+        case 10: value[n] = s->g; break;
+        default:
+            if (IS(BAD_GET_CRASH)) value[n] = ((volatile double *)s)[r[n]];
+            if (!IS(BAD_GET)) return fail(i, "unknown reference");
+        }
+    }
+    return OK;
+}
+
+EXPORT Status fmi2GetInteger(Component c, const uint32_t r[], size_t count, int value[]) {
+    Instance *i = c;
+    Values *s = &i->values;
+    size_t n;
+    if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetInteger")) return ERROR;
+    for (n = 0; n < count; n++) {
+        switch (r[n]) {
+        case 0: value[n] = (int)floor(s->time * 10 + 1e-6); break;
+        case 1: value[n] = s->mode; break;
+        case 2: value[n] = IS(RANGE) ? 7 : s->x > 0.5 ? 3 : s->x > 0 ? 2 : 1; break;
+        default: return fail(i, "unknown reference");
+        }
+    }
+    return OK;
+}
+
+EXPORT Status fmi2GetBoolean(Component c, const uint32_t r[], size_t count, int value[]) {
+    Instance *i = c;
+    Values *s = &i->values;
+    size_t n;
+    if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetBoolean")) return ERROR;
+    for (n = 0; n < count; n++) {
+        switch (r[n]) {
+        case 0: value[n] = s->on; break;
+        case 1: value[n] = fabs(s->v) > 1e-3 ? IS(BOOLEAN) ? -1 : 1 : 0; break;
+        default: return fail(i, "unknown reference");
+        }
+    }
+    return OK;
+}
+
+EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const char *value[]) {
+    Instance *i = c;
+    Values *s = &i->values;
+    size_t n;
+    if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetString")) return ERROR;
+    for (n = 0; n < count; n++) {
+        switch (r[n]) {
+        case 0: value[n] = s->label; break;
+        case 1: value[n] = IS(STRING_NULL) ? NULL : IS(STRING_LATIN) ? "bewegt \xe4" : fabs(s->v) > 1e-3 ? "moving" : "at rest"; break;
+        default: return fail(i, "unknown reference");
+        }
+    }
+    return OK;
+}
+
+EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const double value[]) {
+    Instance *i = c;
+    Values *s = &i->values;
+    size_t n;
+    for (n = 0; n < count; n++) {
+        int before = s->phase == INSTANTIATED || s->phase == INITIALIZING;
+        switch (r[n]) {
+        case 1:
+            if (!before || IS(START_REFUSED)) return fail(i, "x is not to be set now");
+            s->x = value[n];
+            break;
+        case 2:
+            if (!before) return fail(i, "v is not to be set now");
+            s->v = value[n];
+            break;
+        case 5:
+            s->F = IS(SET_GET) ? (double)(float)value[n] : value[n];
+            break;
+        case 8:
+            if (!before && !IS(FIXED_ACCEPTED)) return fail(i, "k is fixed");
+            s->k = value[n];
+            break;
+        case 9:
+            if (!before && IS(TUNABLE_REFUSED)) return fail(i, "d is not to be set now");
+            s->d = value[n];
+            break;
+        case 10: return fail(i, "g is constant");
+        default:
+            if (!IS(BAD_SET)) return fail(i, "unknown reference");
+        }
+    }
+    return OK;
+}
+
+EXPORT Status fmi2SetInteger(Component c, const uint32_t r[], size_t count, const int value[]) {
+    Instance *i = c;
+    size_t n;
+    for (n = 0; n < count; n++) {
+        if (r[n] != 1) return fail(i, "unknown reference");
+        i->values.mode = value[n];
+    }
+    return OK;
+}
+
+EXPORT Status fmi2SetBoolean(Component c, const uint32_t r[], size_t count, const int value[]) {
+    Instance *i = c;
+    size_t n;
+    for (n = 0; n < count; n++) {
+        if (r[n] != 0) return fail(i, "unknown reference");
+        i->values.on = value[n] != 0;
+    }
+    return OK;
+}
+
+EXPORT Status fmi2SetString(Component c, const uint32_t r[], size_t count, const char *const value[]) {
+    Instance *i = c;
+    size_t n;
+    for (n = 0; n < count; n++) {
+        if (r[n] != 0) return fail(i, "unknown reference");
+        if (i->values.phase == STEPPING) return fail(i, "label is fixed");
+        snprintf(i->values.label, sizeof i->values.label, "%s", value[n]);
+    }
+    return OK;
+}
+
+typedef struct {
+    Values values;
+    double w;
+} Saved;
+
+EXPORT Status fmi2GetFMUstate(Component c, State *state) {
+    Instance *i = c;
+    if (!*state) *state = IS(STATE_SHARED) ? (void *)&shared_state : calloc(1, sizeof(Saved));
+    Saved *saved = *state;
+    saved->values = i->values;
+    if (!IS(STATE_SHARED)) saved->w = W(i);
+    return OK;
+}
+
+EXPORT Status fmi2SetFMUstate(Component c, State state) {
+    Instance *i = c;
+    Saved *saved = state;
+    double w = i->values.w, F = i->values.F;
+    if (!saved) return fail(i, "null state");
+    i->values = saved->values;
+    if (IS(GLOBAL)) global_w = saved->w;
+    if (IS(STATE_FORGETS)) i->values.w = w;
+    if (IS(STATE_INPUT)) i->values.F = F;
+    return OK;
+}
+
+EXPORT Status fmi2FreeFMUstate(Component c, State *state) {
+    (void)c;
+    if (!state || !*state) return OK;
+    if (!IS(STATE_SHARED)) free(*state);
+    *state = IS(STATE_HANDLE) ? (State)8 : NULL;
+    return OK;
+}
+
+EXPORT Status fmi2SerializedFMUstateSize(Component c, State state, size_t *size) {
+    (void)c, (void)state;
+    *size = IS(SERIALISE_POINTER) ? sizeof(State) + sizeof(Saved) : sizeof(Saved);
+    return OK;
+}
+
+EXPORT Status fmi2SerializeFMUstate(Component c, State state, char bytes[], size_t size) {
+    Instance *i = c;
+    if (size < sizeof(Saved)) return fail(i, "too small");
+    memcpy(bytes, state, sizeof(Saved));
+    if (IS(SERIALISE)) ((Saved *)bytes)->values.w = 0;
+    if (IS(SERIALISE_POINTER)) memcpy(bytes + sizeof(Saved), &i, sizeof i);
+    return OK;
+}
+
+EXPORT Status fmi2DeSerializeFMUstate(Component c, const char bytes[], size_t size, State *state) {
+    Instance *i = c;
+    if (size < sizeof(Saved)) return fail(i, "too small");
+    if (!*state) *state = malloc(sizeof(Saved));
+    memcpy(*state, bytes, sizeof(Saved));
+    if (IS(SERIALISE_POINTER)) {
+        Instance *other;
+        memcpy(&other, bytes + sizeof(Saved), sizeof other);
+        if (other != i) ((Saved *)*state)->values = other->values;
+    }
+    return OK;
+}
+
+static double partial(const Instance *i, uint32_t unknown, uint32_t known) {
+    const Values *s = &i->values;
+    switch (unknown * 100 + known) {
+    case 302: return IS(DERIVATIVE) ? 2 : 1;
+    case 401: return IS(DIRECTIONAL) ? s->k : -s->k;
+    case 402: return -s->d;
+    case 405: return 1;
+    case 601: return 1;
+    case 605: return 0.1;
+    case 702: return 1;
+    case 705: return IS(DEPENDENCY) ? 0.05 : 0;
+    default: return 0;
+    }
+}
+
+EXPORT Status fmi2GetDirectionalDerivative(Component c, const uint32_t unknown[], size_t unknowns, const uint32_t known[],
+                                           size_t knowns, const double seed[], double value[]) {
+    size_t n, m;
+    for (n = 0; n < unknowns; n++)
+        for (value[n] = 0, m = 0; m < knowns; m++) value[n] += partial(c, unknown[n], known[m]) * seed[m];
+    return OK;
+}
+
+EXPORT Status fmi2SetRealInputDerivatives(Component c, const uint32_t r[], size_t count, const int order[],
+                                          const double value[]) {
+    (void)r, (void)count, (void)order, (void)value;
+    return IS(INPUT_DERIVATIVE) ? fail(c, "not implemented") : OK;
+}
+
+EXPORT Status fmi2GetRealOutputDerivatives(Component c, const uint32_t r[], size_t count, const int order[],
+                                           double value[]) {
+    Instance *i = c;
+    size_t n;
+    for (n = 0; n < count; n++) {
+        if (order[n] != 1) return fail(i, "order");
+        value[n] = IS(OUTPUT_DERIVATIVE) ? NAN : r[n] == 6 ? i->values.v : der_v(i);
+    }
+    return OK;
+}
+
+EXPORT Status fmi2CancelStep(Component c) {
+    if (IS(CANCEL)) *(volatile int *)8 = 1;
+    return fail(c, "no step to cancel");
+}
+EXPORT Status fmi2GetStatus(Component c, int kind, Status *value) { (void)c, (void)kind, (void)value; return DISCARD; }
+EXPORT Status fmi2GetRealStatus(Component c, int kind, double *value) {
+    if (kind != 2) return DISCARD;
+    *value = ((Instance *)c)->values.time;
+    return OK;
+}
+EXPORT Status fmi2GetIntegerStatus(Component c, int kind, int *value) { (void)c, (void)kind, (void)value; return DISCARD; }
+EXPORT Status fmi2GetBooleanStatus(Component c, int kind, int *value) {
+    (void)c;
+    if (kind != 3) return DISCARD;
+    *value = 0;
+    return OK;
+}
+#if !DEFECT_SYMBOL_OPTIONAL
+EXPORT Status fmi2GetStringStatus(Component c, int kind, const char **value) { (void)c, (void)kind, (void)value; return DISCARD; }
+#endif
