@@ -94,20 +94,50 @@ impl<S: Scalar> Axis<S> {
         state
     }
 
-    /// Accelerations `[alpha1, alpha2]` under the torque `torque` on the motor, rad/s2 (paper, eq. 2).
-    pub fn accelerations(&self, s: &State<S>, torque: S) -> [S; 2] {
-        let motor = torque - s.force[0] - s.friction[0];
-        let table = -s.force[1] - s.friction[1];
-        match self.structure {
-            Structure::Rigid => {
-                let a = (motor + table) / (self.parameters.i1 + self.parameters.i2);
-                [a, a]
+    /// Accelerations `[alpha1, alpha2]` under the torque `torque` on the motor at `time` s, rad/s2 (paper, eq. 2).
+    ///
+    /// Dry friction at rest answers the torque of now, whatever it held over the step before: up to its level the
+    /// inertia stays.
+    pub fn accelerations(&self, s: &State<S>, torque: S, time: f64) -> [S; 2] {
+        let coupling = match self.structure {
+            Structure::Rigid => S::default(),
+            Structure::TwoInertia => self.parameters.k * s.linear[2] + self.parameters.b * s.linear[3],
+        };
+        let mut push = [torque - s.force[0] - coupling, coupling - s.force[1]];
+        let sticks = [0, 1].map(|i| s.dry[i] == 0 && self.has_dry(i));
+        if self.structure == Structure::Rigid {
+            let mut sum = push[0] + push[1];
+            if sticks[0] || sticks[1] {
+                let level = |i: usize| {
+                    if sticks[i] { self.rest_level(i, sum, time) } else { S::default() }
+                };
+                sum = beyond(sum, level(0) + level(1));
             }
-            Structure::TwoInertia => {
-                let coupling = self.parameters.k * s.linear[2] + self.parameters.b * s.linear[3];
-                [(motor - coupling) / self.parameters.i1, (table + coupling) / self.parameters.i2]
+            let a = sum / (self.parameters.i1 + self.parameters.i2);
+            return [a, a];
+        }
+        for i in 0..2 {
+            if sticks[i] {
+                push[i] = beyond(push[i], self.rest_level(i, push[i], time));
             }
         }
+        [push[0] / self.parameters.i1, push[1] / self.parameters.i2]
+    }
+
+    /// Level of dry friction of inertia `i` at rest, against `push`, N.m.
+    fn rest_level(&self, i: usize, push: S, time: f64) -> S {
+        self.level(i, push.re().signum(), S::default(), time).0
+    }
+}
+
+/// What is left of a torque beyond the `level` that friction can hold.
+fn beyond<S: Scalar>(push: S, level: S) -> S {
+    if push.re().abs() <= level.re() {
+        S::default()
+    } else if push.re() > 0.0 {
+        push - level
+    } else {
+        push + level
     }
 }
 

@@ -10,6 +10,7 @@
 //! their way out. The linear analogue (kg, N, m) is the same model in other units.
 
 mod axis_model;
+mod continuation;
 mod criterion;
 mod oscillator;
 mod parameters;
@@ -20,7 +21,7 @@ mod step;
 pub use axis_model::{Axis, Motions, State};
 pub use criterion::{dt_criterion, period_elongation};
 pub use oscillator::Scheme;
-pub use parameters::{Modal, ParameterError, Parameters, PhysicalData, Structure};
+pub use parameters::{Modal, Motion, ParameterError, Parameters, PhysicalData, Structure};
 pub use propagator::Propagator;
 pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps};
 

@@ -105,11 +105,11 @@ pub fn simulate<S: Scalar>(
             } else {
                 effects.transform_input(axis.on(), ramp, h.into(), &mut history)
             };
+            let time = options.start + (k * per + j) as f64 * h;
             if j == 0 {
-                response.accelerations.push(axis.accelerations(&state, ramp.start));
+                response.accelerations.push(axis.accelerations(&state, ramp.start, time));
             }
             if k + 1 < n {
-                let time = options.start + (k * per + j) as f64 * h;
                 after = axis.advance(&after, ramp, time);
             }
         }

@@ -95,11 +95,11 @@ impl<S: Scalar> Axis<S> {
 
     /// Level of dry friction of inertia `i` for motion that way, N.m.
     #[inline]
-    fn level(&self, i: usize, direction: f64, speed: S, at: f64) -> (S, f64) {
+    pub(super) fn level(&self, i: usize, direction: f64, speed: S, at: f64) -> (S, f64) {
         self.effects.dry_level(&self.on, PLACES[i], direction, speed, at)
     }
 
-    fn has_dry(&self, i: usize) -> bool {
+    pub(super) fn has_dry(&self, i: usize) -> bool {
         self.on.dry().iter().any(|e| e.info().place == PLACES[i])
     }
 

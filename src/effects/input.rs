@@ -36,17 +36,23 @@ impl<S: Scalar> Ramp<S> {
 /// Longest delay, in steps.
 pub const LONGEST_DELAY: usize = 255;
 
-/// What input effects remember of the torque: past steps, and the state of the lag.
+/// What input effects remember of the torque: past steps with their lengths, and the state of the lag.
 #[derive(Debug, Clone, Copy)]
 pub struct TorqueHistory<S> {
     past: [Ramp<S>; LONGEST_DELAY + 1],
+    /// Length of each step, s; infinite where nothing has been recorded yet.
+    lengths: [f64; LONGEST_DELAY + 1],
     next: usize,
+    /// Newest steps that share one length.
+    uniform: usize,
+    /// Steps recorded.
+    recorded: usize,
     lag: S,
 }
 
 impl<S: Scalar> Default for TorqueHistory<S> {
     fn default() -> Self {
-        Self { past: [Ramp::default(); LONGEST_DELAY + 1], next: 0, lag: S::default() }
+        Self::settled(S::default())
     }
 }
 
@@ -54,11 +60,111 @@ impl<S: Scalar> TorqueHistory<S> {
     /// A history in which the torque has always been `torque`.
     #[must_use]
     pub fn settled(torque: S) -> Self {
-        Self { past: [Ramp::held(torque); LONGEST_DELAY + 1], next: 0, lag: torque }
+        Self {
+            past: [Ramp::held(torque); LONGEST_DELAY + 1],
+            lengths: [f64::INFINITY; LONGEST_DELAY + 1],
+            next: 0,
+            uniform: 0,
+            recorded: 0,
+            lag: torque,
+        }
+    }
+
+    #[allow(clippy::float_cmp, reason = "equal lengths are the same number, not a measurement")]
+    fn push(&mut self, ramp: Ramp<S>, h: f64) {
+        let size = self.past.len();
+        let same = self.lengths[(self.next + size - 1) % size] == h;
+        self.uniform = if same { (self.uniform + 1).min(size) } else { 1 };
+        self.recorded = (self.recorded + 1).min(size);
+        self.past[self.next] = ramp;
+        self.lengths[self.next] = h;
+        self.next = (self.next + 1) % size;
+    }
+
+    fn index(&self, steps: usize) -> usize {
+        (self.next + self.past.len() - 1 - steps.min(LONGEST_DELAY)) % self.past.len()
     }
 
     fn ago(&self, steps: usize) -> &Ramp<S> {
-        &self.past[(self.next + self.past.len() - 1 - steps.min(LONGEST_DELAY)) % self.past.len()]
+        &self.past[self.index(steps)]
+    }
+
+    /// Whether a delay of `delay` s before a step of `h` s still lies inside what is remembered.
+    #[must_use]
+    pub fn covers(&self, delay: f64, h: f64) -> bool {
+        if self.recorded < LONGEST_DELAY {
+            return true;
+        }
+        // The step to come pushes the oldest out.
+        let mut length = h;
+        for k in 0..LONGEST_DELAY {
+            length += self.lengths[self.index(k)];
+            if length >= delay + h {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The torque `delay` s ago, after any jump there, seen from the end of the newest step.
+    fn value(&self, delay: f64) -> f64 {
+        let mut left = delay;
+        for k in 0..=LONGEST_DELAY {
+            let (i, length) = (self.index(k), self.lengths[self.index(k)]);
+            if left <= length {
+                let share = if length.is_finite() { 1.0 - left / length } else { 1.0 };
+                let ramp = &self.past[i];
+                return ramp.start.re() + (ramp.end.re() - ramp.start.re()) * share;
+            }
+            left -= length;
+        }
+        self.ago(LONGEST_DELAY).start.re()
+    }
+
+    /// The delayed torque over the newest step, when the steps had different lengths: mean and first moment, piece by
+    /// piece.
+    fn delayed(&self, delay: S, h: f64) -> Ramp<S> {
+        let (from, to) = (-delay, S::from(h) - delay);
+        let (mut m0, mut m1) = (S::default(), S::default());
+        let mut end = S::from(h);
+        for k in 0..=LONGEST_DELAY {
+            let i = self.index(k);
+            let (ramp, length) = (&self.past[i], self.lengths[i]);
+            let last = k == LONGEST_DELAY || !length.is_finite();
+            let start = if last { from } else { end - length };
+            if start.re() < to.re() {
+                let a = if start.re() > from.re() { start } else { from };
+                let b = if end.re() < to.re() { end } else { to };
+                let at = |t: S| if last { ramp.end } else { ramp.at((t - start) / length) };
+                let (va, vb) = (at(a), at(b));
+                let (s, w) = ((a + delay) / h, (b - a) / h);
+                m0 += w * (va + vb) * 0.5;
+                m1 += w * (s * (va + vb) * 0.5 + w * (va * (1.0 / 6.0) + vb * (1.0 / 3.0)));
+            }
+            if start.re() <= from.re() {
+                break;
+            }
+            end = start;
+        }
+        Ramp::from_moments(m0, m1)
+    }
+}
+
+impl TorqueHistory<f64> {
+    /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
+    pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+        for (ramp, length) in self.past.iter_mut().zip(&mut self.lengths) {
+            word(&mut ramp.start);
+            word(&mut ramp.end);
+            word(length);
+        }
+        word(&mut self.lag);
+        let size = self.past.len();
+        for (count, most) in [(&mut self.next, size - 1), (&mut self.uniform, size), (&mut self.recorded, size)] {
+            let mut value = *count as f64;
+            word(&mut value);
+            *count = (value.max(0.0) as usize).min(most);
+        }
     }
 }
 
@@ -83,6 +189,20 @@ impl Input for TorqueGain {
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
         Ramp { start: ramp.start * p[0], end: ramp.end * p[0] }
     }
+
+    fn now<S: Scalar>(p: &[S], torque: S, _history: &TorqueHistory<f64>) -> S {
+        torque * p[0]
+    }
+}
+
+fn clip<S: Scalar>(torque: S, limit: S) -> S {
+    if torque.re() > limit.re() {
+        limit
+    } else if torque.re() < -limit.re() {
+        -limit
+    } else {
+        torque
+    }
 }
 
 /// The drive's torque limit.
@@ -104,17 +224,11 @@ impl Input for Saturation {
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
-        let limit = p[0];
-        let clip = |t: S| {
-            if t.re() > limit.re() {
-                limit
-            } else if t.re() < -limit.re() {
-                -limit
-            } else {
-                t
-            }
-        };
-        Ramp { start: clip(ramp.start), end: clip(ramp.end) }
+        Ramp { start: clip(ramp.start, p[0]), end: clip(ramp.end, p[0]) }
+    }
+
+    fn now<S: Scalar>(p: &[S], torque: S, _history: &TorqueHistory<f64>) -> S {
+        clip(torque, p[0])
     }
 }
 
@@ -134,10 +248,12 @@ impl Input for Delay {
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
-        history.past[history.next] = ramp;
-        history.next = (history.next + 1) % history.past.len();
+        history.push(ramp, h.re());
         let steps = p[0] / h;
         let whole = steps.re().max(0.0).floor().min(LONGEST_DELAY as f64 - 1.0);
+        if history.uniform < history.recorded && history.uniform < whole as usize + 2 {
+            return history.delayed(p[0], h.re());
+        }
         // Share of this step that still belongs to the older of the two commands.
         let f = steps - whole;
         let (old, new) = (history.ago(whole as usize + 1), history.ago(whole as usize));
@@ -150,6 +266,10 @@ impl Input for Delay {
         let m1 = f * f * (oa * (1.0 / 6.0) + ob * (1.0 / 3.0))
             + rest * (f * (na + nb) * 0.5 + rest * (na * (1.0 / 6.0) + nb * (1.0 / 3.0)));
         Ramp::from_moments(m0, m1)
+    }
+
+    fn now<S: Scalar>(p: &[S], torque: S, history: &TorqueHistory<f64>) -> S {
+        if p[0].re() > 0.0 { S::from(history.value(p[0].re())) } else { torque }
     }
 }
 
@@ -190,6 +310,10 @@ impl Input for ActuatorLag {
         history.lag = settled + g + a * decay;
         Ramp::from_moments(m0, m1)
     }
+
+    fn now<S: Scalar>(p: &[S], torque: S, history: &TorqueHistory<f64>) -> S {
+        if p[0].re() > 0.0 { S::from(history.lag) } else { torque }
+    }
 }
 
 #[cfg(test)]
@@ -226,5 +350,42 @@ mod tests {
         let r = ActuatorLag::transform(&[tau], Ramp::held(1.0), h, &mut history);
         let mean = 1.0 - tau / h * ((-5.0 * h / tau).exp() - (-6.0 * h / tau).exp());
         assert!(((r.start + r.end) / 2.0 - mean).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_delay_over_steps_of_many_lengths_keeps_mean_and_first_moment() {
+        // The same held torque, 1 up to t = 2 and 3 after, cut into steps in two ways; the last step is [2.4, 3.4].
+        let run = |cuts: &[f64]| {
+            let mut history = TorqueHistory::default();
+            let mut from = 0.0;
+            for &to in cuts {
+                let ramp = Ramp::held(if from < 2.0 { 1.0 } else { 3.0 });
+                let _ = Delay::transform(&[0.7], ramp, to - from, &mut history);
+                from = to;
+            }
+            Delay::transform(&[0.7], Ramp::held(3.0), 1.0, &mut history)
+        };
+        let r = run(&[1.0, 2.0, 2.1, 2.4]);
+        // Delayed by 0.7 the jump lies at 2.7, at 0.3 of the step: mean 0.3 + 2.1, first moment 0.045 + 3*0.455.
+        assert!(((r.start + r.end) / 2.0 - 2.4).abs() < 1e-14, "{r:?}");
+        assert!((r.start / 6.0 + r.end / 3.0 - 1.41).abs() < 1e-14, "{r:?}");
+        let other = run(&[0.25, 1.3, 1.9, 2.0, 2.4]);
+        assert!((r.start - other.start).abs() < 1e-13 && (r.end - other.end).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_general_delay_equals_the_one_for_equal_steps() {
+        let mut history = TorqueHistory::default();
+        for k in 0..20 {
+            let ramp = Ramp { start: f64::from(k).sin(), end: f64::from(k).cos() };
+            let fast = Delay::transform(&[3.4e-3], ramp, 1e-3, &mut history);
+            let slow = history.delayed(3.4e-3, 1e-3);
+            assert!((fast.start - slow.start).abs() < 1e-12 && (fast.end - slow.end).abs() < 1e-12, "{k}");
+        }
+        assert!(history.covers(0.2, 1e-3));
+        for _ in 0..300 {
+            let _ = Delay::transform(&[3.4e-3], Ramp::held(1.0), 1e-3, &mut history);
+        }
+        assert!(history.covers(0.25, 1e-3) && !history.covers(0.26, 1e-3));
     }
 }

@@ -29,7 +29,7 @@ pub use info::{EffectInfo, Family, ParameterInfo, Place, Role};
 pub use input::{Ramp, TorqueHistory};
 pub use sensor::{Reading, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
-pub(crate) use settings::{MEMORY, StepMotion};
+pub(crate) use settings::{MEMORY, PARAMETERS, StepMotion, effect_scope};
 pub use shapes::{Base, DryFriction, Force, Input, Moment, Motion, Reaction, Sensor};
 
 use crate::scalar::Scalar;
@@ -117,6 +117,12 @@ macro_rules! effects {
             fn transform_input<S: Scalar>(self, p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
                 match self {
                     $(Self::$name => when!(input, $shape, <$law>::transform(p, ramp, h, history), ramp),)*
+                }
+            }
+
+            fn input_now<S: Scalar>(self, p: &[S], torque: S, history: &TorqueHistory<f64>) -> S {
+                match self {
+                    $(Self::$name => when!(input, $shape, <$law>::now(p, torque, history), torque),)*
                 }
             }
 

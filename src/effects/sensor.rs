@@ -24,11 +24,15 @@ const LONGEST: usize = 128;
 #[derive(Debug, Clone, Copy)]
 pub struct SensorHistory<S> {
     past: [Reading<S>; LONGEST],
+    /// Time from the sample before to each sample, s.
+    gaps: [f64; LONGEST],
     newest: usize,
+    /// Newest samples that share one gap.
+    uniform: usize,
 }
 
 impl<S: Scalar> SensorHistory<S> {
-    /// A history in which the axis has coasted up to `reading` at its present speed.
+    /// A history in which the axis has coasted up to `reading` at its present speed, sampled every `dt` seconds.
     #[must_use]
     pub fn settled(reading: Reading<S>, dt: f64) -> Self {
         let mut past = [reading; LONGEST];
@@ -37,13 +41,21 @@ impl<S: Scalar> SensorHistory<S> {
             slot.theta1 = reading.theta1 - reading.omega1 * ago;
             slot.theta2 = reading.theta2 - reading.omega2 * ago;
         }
-        Self { past, newest: LONGEST - 1 }
+        Self { past, gaps: [dt; LONGEST], newest: LONGEST - 1, uniform: LONGEST }
     }
 
-    /// Appends the motion of the next sample.
+    /// Appends the motion of the next sample, as long after the last one as that after its own.
     pub fn push(&mut self, reading: Reading<S>) {
+        self.push_after(reading, self.gaps[self.newest]);
+    }
+
+    /// Appends the motion `gap` seconds after the last sample.
+    #[allow(clippy::float_cmp, reason = "equal gaps are the same number, not a measurement")]
+    pub fn push_after(&mut self, reading: Reading<S>, gap: f64) {
+        self.uniform = if self.gaps[self.newest] == gap { (self.uniform + 1).min(LONGEST) } else { 1 };
         self.newest = (self.newest + 1) % LONGEST;
         self.past[self.newest] = reading;
+        self.gaps[self.newest] = gap;
     }
 
     /// The motion now.
@@ -52,25 +64,65 @@ impl<S: Scalar> SensorHistory<S> {
         self.past[self.newest]
     }
 
-    fn ago(&self, samples: usize) -> &Reading<S> {
-        &self.past[(self.newest + LONGEST - samples.min(LONGEST - 1)) % LONGEST]
+    fn index(&self, samples: usize) -> usize {
+        (self.newest + LONGEST - samples.min(LONGEST - 1)) % LONGEST
+    }
+
+    /// Whether the motion `delay` seconds ago is still remembered.
+    #[must_use]
+    pub fn covers(&self, delay: f64) -> bool {
+        let mut length = 0.0;
+        (0..LONGEST - 1).any(|k| {
+            length += self.gaps[self.index(k)];
+            length >= delay
+        })
     }
 
     /// Angle and speed of the table side `delay` seconds ago, by cubic Hermite interpolation between samples.
     fn table_at(&self, delay: S, dt: f64) -> (S, S) {
+        // The samples around it, how long before the later one, and the time between them.
         let steps = delay / dt;
         let whole = steps.re().max(0.0).floor().min((LONGEST - 2) as f64);
-        let (after, before) = (self.ago(whole as usize), self.ago(whole as usize + 1));
+        let (mut k, mut s, mut gap) = (whole as usize, S::from(1.0) - (steps - whole), dt);
+        #[allow(clippy::float_cmp, reason = "equal gaps are the same number, not a measurement")]
+        let equal = self.uniform >= (k + 1).min(LONGEST) && self.gaps[self.newest] == dt;
+        if !equal {
+            let mut left = delay;
+            k = 0;
+            gap = self.gaps[self.index(0)];
+            while left.re() > gap && k < LONGEST - 2 {
+                left = left - gap;
+                k += 1;
+                gap = self.gaps[self.index(k)];
+            }
+            s = S::from(1.0) - left / gap;
+        }
+        let (after, before) = (&self.past[self.index(k)], &self.past[self.index(k + 1)]);
         // s = 0 at `before`, 1 at `after`.
-        let s = S::from(1.0) - (steps - whole);
         let rise = after.theta2 - before.theta2;
-        let (v0, v1) = (before.omega2 * dt, after.omega2 * dt);
+        let (v0, v1) = (before.omega2 * gap, after.omega2 * gap);
         // before + v0*s + (3*rise - 2*v0 - v1)*s^2 + (v0 + v1 - 2*rise)*s^3
         let c2 = rise * 3.0 - v0 * 2.0 - v1;
         let c3 = v0 + v1 - rise * 2.0;
         let theta = before.theta2 + s * (v0 + s * (c2 + s * c3));
-        let omega = (v0 + s * (c2 * 2.0 + s * c3 * 3.0)) / dt;
+        let omega = (v0 + s * (c2 * 2.0 + s * c3 * 3.0)) / gap;
         (theta, omega)
+    }
+}
+
+impl SensorHistory<f64> {
+    /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
+    pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+        for (r, gap) in self.past.iter_mut().zip(&mut self.gaps) {
+            for value in [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2, gap] {
+                word(value);
+            }
+        }
+        for (count, most) in [(&mut self.newest, LONGEST - 1), (&mut self.uniform, LONGEST)] {
+            let mut value = *count as f64;
+            word(&mut value);
+            *count = (value.max(0.0) as usize).min(most);
+        }
     }
 }
 
@@ -146,5 +198,28 @@ impl Sensor for EncoderQuantisation {
         // The rounding moves by whole counts: its derivative is that of the motion, on average.
         let round = |x: S| x.chain((x.re() / step).round() * step, 1.0);
         Reading { theta1: round(r.theta1), theta2: round(r.theta2), ..r }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_motion_is_read_back_exactly_over_samples_of_many_lengths() {
+        // Hermite interpolation is exact for cubics.
+        let at = |t: f64| Reading { theta2: t * t * t - 2.0 * t, omega2: 3.0 * t * t - 2.0, ..Reading::default() };
+        let mut history = SensorHistory::settled(at(0.0), 0.1);
+        let mut t = 0.0;
+        for k in 0..30 {
+            let gap = [0.1, 0.03, 0.07][k % 3];
+            t += gap;
+            history.push_after(at(t), gap);
+        }
+        for delay in [0.0, 0.05, 0.1, 0.234, 1.0] {
+            let (theta, omega) = history.table_at(delay, 0.1);
+            let want = at(t - delay);
+            assert!((theta - want.theta2).abs() < 1e-12 && (omega - want.omega2).abs() < 1e-11, "{delay}");
+        }
     }
 }

@@ -34,7 +34,7 @@ const MEMORY_OFFSETS: [usize; COUNT + 1] = {
 };
 
 /// Number of effect parameters in all.
-pub(super) const PARAMETERS: usize = OFFSETS[COUNT];
+pub(crate) const PARAMETERS: usize = OFFSETS[COUNT];
 pub(crate) const MEMORY: usize = MEMORY_OFFSETS[COUNT];
 
 /// Internal states of all effects.
@@ -101,6 +101,18 @@ impl<S: Scalar> Settings<S> {
     #[must_use]
     pub fn lift(other: &Settings<f64>) -> Self {
         Self { values: other.values.map(S::from) }
+    }
+
+    /// The settings from every effect's parameters in the order of the list.
+    #[must_use]
+    pub(crate) fn from_flat(values: [S; PARAMETERS]) -> Self {
+        Self { values }
+    }
+
+    /// Every effect's parameters in the order of the list.
+    #[cfg(feature = "cli")]
+    pub(crate) fn flat(&self) -> &[S; PARAMETERS] {
+        &self.values
     }
 
     /// The parameters of an effect, in the order of its info.
@@ -188,6 +200,11 @@ impl<S: Scalar> Settings<S> {
         on.inputs.as_slice().iter().fold(ramp, |ramp, &e| e.transform_input(self.of(e), ramp, h, history))
     }
 
+    /// The torque on the motor at this instant, from the torque commanded now and the steps up to now.
+    pub fn input_now(&self, on: &ActiveEffects, torque: S, history: &TorqueHistory<f64>) -> S {
+        on.inputs.as_slice().iter().fold(torque, |torque, &e| e.input_now(self.of(e), torque, history))
+    }
+
     /// What the encoders read, from the motion up to now, sampled `dt` seconds apart.
     pub fn transform_sensor(&self, on: &ActiveEffects, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
         on.sensors
@@ -195,6 +212,13 @@ impl<S: Scalar> Settings<S> {
             .iter()
             .fold(history.now(), |reading, &e| e.transform_sensor(self.of(e), reading, history, dt))
     }
+}
+
+/// Hands the effects that are marked, one flag an effect of the list, to `f` as a slice; without heap.
+pub(crate) fn effect_scope<R>(marked: &[bool; COUNT], f: impl FnOnce(&[Effect]) -> R) -> R {
+    let mut few = Few::default();
+    EFFECTS.iter().zip(marked).filter(|(_, m)| **m).for_each(|(e, _)| few.push(*e));
+    f(few.as_slice())
 }
 
 /// Motion of both inertias at the start and at the trial end of a step.

@@ -77,6 +77,9 @@ pub trait Input {
 
     /// The torque over a step of length `h`, from the torque commanded over it.
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S>;
+
+    /// The torque at this instant, from the torque commanded now and the steps up to now.
+    fn now<S: Scalar>(p: &[S], torque: S, history: &TorqueHistory<f64>) -> S;
 }
 
 /// A change of the positions on their way from the axis to the log.

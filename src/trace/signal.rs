@@ -2,16 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Whether the axis is described in rotary units (kg.m2, rad, N.m) or by the paper's linear analogue (kg, m, N).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Motion {
-    /// Inertias in kg.m2, angles in rad, torques in N.m.
-    #[default]
-    Rotary,
-    /// Masses in kg, positions in m, forces in N.
-    Linear,
-}
+pub use crate::axis::Motion;
 
 /// A physical quantity, as far as a trace needs to tell one unit from another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
