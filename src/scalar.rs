@@ -4,7 +4,7 @@
 //! with its sensitivities to any `N` parameters, which is what the output-error fits and the FMU's directional
 //! derivatives use (forward-mode automatic differentiation, Griewank & Walther 2008, chapter 3).
 //!
-//! Own code, not a crate: the FMU's library may depend on nalgebra alone.
+//! Own code, not a crate: the FMU's library has no dependencies.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};

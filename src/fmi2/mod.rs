@@ -1,1 +1,19 @@
-//! The FMI 2.0 C ABI: exported symbols behind one gate.
+//! The FMU: FMI 2.0 co-simulation, its C ABI and the simulation behind it.
+//!
+//! [`kernel`] is the simulation, safe and without a heap; [`stored`] its state as bytes; `gate` the one way in from C (null
+//! check, call sequence, `catch_unwind`), and `exports` the functions of `fmi2Functions.h`. No globals: everything lives
+//! in the instance.
+
+mod abi;
+mod baked;
+mod exports;
+mod fault;
+mod gate;
+pub mod kernel;
+pub mod stored;
+
+pub use abi::*;
+#[cfg(feature = "cli")]
+pub use baked::bake;
+pub use exports::*;
+pub use gate::Mode;

@@ -6,6 +6,7 @@ pub mod description;
 pub mod host;
 pub mod isolation;
 pub mod output;
+pub mod package;
 pub mod rules;
 pub mod validation;
 pub mod xml;

@@ -1,0 +1,182 @@
+//! Packaging: the `.fmu` archive of the axis.
+//!
+//! The shared library comes embedded in the program (see `build.rs`), the description and the documentation from the
+//! variable table. The archive is deterministic: the same axis gives the same bytes.
+
+mod documentation;
+mod units;
+mod xml;
+
+use std::io::{self, Cursor, Write};
+use std::path::Path;
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use super::host;
+use crate::fmi2::bake;
+use crate::trace::{Machine, TraceError, write_text};
+use crate::variables::Starts;
+
+/// The lean shared library, from `build.rs`.
+static LIBRARY: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/eixo_fmu_library"));
+/// The picture of the model, from `scripts/draw_model.py`.
+static PICTURE: &[u8] = include_bytes!("../../../modelDescription/model.png");
+static LICENSE: &str = include_str!("../../../LICENSE");
+/// Name of the model where no machine gives one.
+const NAME: &str = "eixo";
+
+/// Why no FMU could be written.
+#[derive(Debug, thiserror::Error)]
+pub enum PackageError {
+    /// The embedded library.
+    #[error("the embedded library cannot carry the start values: {0}")]
+    Library(&'static str),
+    /// A start value out of its bounds.
+    #[error("{variable} = {value}: it must be from {min} to {max}")]
+    Bounds {
+        /// Name of the variable.
+        variable: String,
+        /// Its start value.
+        value: f64,
+        /// Smallest value allowed.
+        min: f64,
+        /// Largest value allowed.
+        max: f64,
+    },
+    /// Compressing.
+    #[error("cannot make the archive: {0}")]
+    Archive(#[from] zip::result::ZipError),
+    /// Writing into memory.
+    #[error("cannot make the archive: {0}")]
+    Io(#[from] io::Error),
+    /// Writing the file.
+    #[error(transparent)]
+    Write(#[from] TraceError),
+}
+
+/// What an FMU is made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Package {
+    /// Name of the model.
+    pub name: String,
+    /// Start values.
+    pub starts: Starts,
+}
+
+impl Default for Package {
+    /// The paper's axis with every effect off.
+    fn default() -> Self {
+        Self { name: NAME.to_owned(), starts: Starts::default() }
+    }
+}
+
+impl Package {
+    /// The FMU of a machine.
+    ///
+    /// # Errors
+    /// [`PackageError::Bounds`] when one of its values is out of the bounds of the FMU's variable.
+    pub fn of(machine: &Machine) -> Result<Self, PackageError> {
+        let starts = Starts::of(&machine.parameters, machine.structure, &machine.effects, machine.signals.motion);
+        for (index, &value) in starts.values.iter().enumerate() {
+            let v = crate::variables::at(index);
+            let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
+            if !(min <= value && value <= max) {
+                return Err(PackageError::Bounds { variable: v.to_string(), value, min, max });
+            }
+        }
+        let name = if machine.name.trim().is_empty() { NAME.to_owned() } else { machine.name.clone() };
+        Ok(Self { name, starts })
+    }
+
+    /// `modelDescription.xml`.
+    ///
+    /// # Errors
+    /// [`PackageError::Io`].
+    pub fn model_description(&self) -> Result<Vec<u8>, PackageError> {
+        Ok(xml::document(&self.name, &self.starts)?)
+    }
+
+    /// The shared library, with the start values in it.
+    ///
+    /// # Errors
+    /// [`PackageError::Library`].
+    pub fn library(&self) -> Result<Vec<u8>, PackageError> {
+        let mut library = LIBRARY.to_vec();
+        bake(&mut library, &self.starts).map_err(PackageError::Library)?;
+        Ok(library)
+    }
+
+    /// The archive.
+    ///
+    /// # Errors
+    /// See [`PackageError`].
+    pub fn archive(&self) -> Result<Vec<u8>, PackageError> {
+        let (platform, extension) = host::platform();
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        let mut add = |name: &str, bytes: &[u8], permissions: u32| -> Result<(), PackageError> {
+            let options = SimpleFileOptions::default()
+                .compression_method(CompressionMethod::Deflated)
+                .last_modified_time(DateTime::default())
+                .unix_permissions(permissions);
+            zip.start_file(name, options)?;
+            zip.write_all(bytes)?;
+            Ok(())
+        };
+        add("modelDescription.xml", &self.model_description()?, 0o644)?;
+        add("model.png", PICTURE, 0o644)?;
+        let library = format!("binaries/{platform}/{}.{extension}", xml::MODEL_IDENTIFIER);
+        add(&library, &self.library()?, 0o755)?;
+        add("documentation/index.html", documentation::page(&self.name, &self.starts).as_bytes(), 0o644)?;
+        add("documentation/model.png", PICTURE, 0o644)?;
+        add("documentation/licenses/license.txt", LICENSE.as_bytes(), 0o644)?;
+        Ok(zip.finish()?.into_inner())
+    }
+
+    /// Writes the archive: beside the target first, then renamed.
+    ///
+    /// # Errors
+    /// See [`PackageError`].
+    pub fn write(&self, path: &Path) -> Result<(), PackageError> {
+        Ok(write_text(path, &self.archive()?)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fmu::archive::{Archive, Limits};
+    use crate::fmu::description::Description;
+
+    #[test]
+    fn the_checked_in_model_description_is_the_one_of_the_table() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("modelDescription/modelDescription.xml");
+        let made = Package::default().model_description().unwrap();
+        if std::env::var_os("EIXO_BLESS").is_some() {
+            std::fs::write(&path, &made).unwrap();
+        }
+        let kept = std::fs::read(&path).unwrap();
+        assert!(made == kept, "the table has changed: EIXO_BLESS=1 cargo test --lib checked_in writes the file anew");
+    }
+
+    #[test]
+    fn the_same_axis_gives_the_same_archive_and_all_its_parts() {
+        let package = Package::default();
+        let bytes = package.archive().unwrap();
+        assert!(bytes == package.archive().unwrap());
+        let mut archive = Archive::from_bytes(bytes, Limits::default()).unwrap();
+        archive.test().unwrap();
+        let names: Vec<String> = archive.entries().iter().map(|e| e.name.clone()).collect();
+        assert_eq!(names[0], "modelDescription.xml");
+        assert!(names.iter().any(|n| n.starts_with("binaries/")), "{names:?}");
+        let description = Description::parse(&archive.read("modelDescription.xml").unwrap()).unwrap();
+        assert_eq!(description.variables.len(), crate::variables::COUNT);
+    }
+
+    #[test]
+    fn a_machine_out_of_the_bounds_is_refused_by_name() {
+        let mut machine = Machine::default();
+        machine.parameters.i1 = 0.0;
+        assert!(Package::of(&machine).unwrap_err().to_string().contains("I1"));
+    }
+}
