@@ -209,7 +209,7 @@ fn a_contact_that_lets_go_while_compressed_closes_again_only_when_it_pushes() {
     let t = |k: usize| 0.03 * (60.0 * k as f64 * h).sin();
     for k in 0..1000 {
         s = a.advance(&s, Ramp { start: t(k), end: t(k + 1) }, k as f64 * h);
-        let (d, coupling) = (s.theta1() - s.theta2(), P.i2 * a.accelerations(&s, t(k + 1))[1]);
+        let (d, coupling) = (s.theta1() - s.theta2(), P.i2 * a.accelerations(&s, t(k + 1), 0.0)[1]);
         assert!(coupling * d >= -1e-12, "step {k}: twist {d}, torque {coupling}");
     }
     assert!((s.theta1() - 1.062_538_9).abs() < 1e-6 && (s.theta2() - 1.053_133_1).abs() < 1e-5);
