@@ -243,8 +243,11 @@ def draw(effect: str, ref: Reference, rng: np.random.Generator, size: float) -> 
     elif effect == "cubic_stiffness":
         variant, p = _cubic(ref, rng, size)
     elif effect == "coupling_hysteresis":
-        p = {"hyst": size * ref.base["K"] * ref.twist_rms, "hyst_x": rng.uniform(0.1, 0.5) * ref.twist_rms,
-             "hyst_n": rng.uniform(1.0, 2.0)}
+        p = {"hyst": size * ref.base["K"] * ref.twist_rms, "hyst_x": rng.uniform(0.1, 0.5) * ref.twist_rms}
+        if rng.random() < 0.5:
+            variant, p["hyst_n"], p["hyst_even"] = "dahl", 1.0, 1.0
+        else:
+            variant, p["hyst_n"] = "bouc_wen", rng.uniform(1.0, 2.0)
     elif effect == "stiffness_drift":
         variant, p = _stiffness_drift(ref, rng, size)
     elif effect == "friction_drift":

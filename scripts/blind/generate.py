@@ -27,6 +27,7 @@ PREROLL = 64  # samples of the periodic excitation before the record begins
 MIN_GAP = 2.0  # least rms of the effect after a linear re-fit of the base model, in multiples of the encoder noise
 # A quantum of some 30 times the noise and more: below that the true model with the true quantum predicts no better than without.
 MIN_GAP_QUANTISATION = 10.0
+LEAST_SHARE = 0.1  # of two effects, the rms that the smaller leaves after the re-fit over that of the larger, at least
 TRIES = 40
 # Two effects that would move the same plant parameter, or that need opposite experiments, are not drawn together.
 FRICTION_MOTOR = {"coulomb_motor", "presliding_motor", "friction_drift"}
@@ -208,6 +209,10 @@ def draw_case(cls: str, kind: str, seed) -> dict | None:
             gaps.setdefault(d.id, {})[name] = gap
     need = [min(g.values()) / (MIN_GAP_QUANTISATION if e == "encoder_quantisation" else MIN_GAP)
             for e, g in gaps.items() if e not in effects.ABSORBED]
+    for part in ("train", "holdout") if len(gaps) == 2 else ():
+        pair = [g[part] for g in gaps.values()]
+        if min(pair) < LEAST_SHARE * max(pair):
+            return None
     if need:
         largest = min(need)
         if largest < 1e-5:

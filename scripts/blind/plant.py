@@ -17,7 +17,8 @@ Formulations (each differs from the crate on purpose):
 - backlash: contact on either flank with spring and damper, the sum clipped so that a flank never pulls; no torque in the gap;
 - delay: the held torque shifted in continuous time, sub-steps broken at the shifted jumps;
 - lag: tau*u' = r - u integrated beside the mechanics;
-- coupling hysteresis: Bouc-Wen with beta = gamma, x_y*z' = d'*(1 - |z|^n*(1 + sign(d'*z))/2), torque F*z in parallel with the spring;
+- coupling hysteresis: Bouc-Wen, torque F*z in parallel with the spring, x_y*z' = d'*(1 - |z|^n) while z grows and
+  d'*(1 + e*|z|^n) while it shrinks: e = 0 is beta = gamma (it unloads elastically), e = 1 with n = 1 is Dahl's curve;
 - end stop: Kelvin-Voigt contact, clipped at zero.
 """
 from __future__ import annotations
@@ -38,7 +39,7 @@ NAMES = (
     "vm", "vm_asym", "vm_rate", "vt", "vt_asym",
     "load_m", "load_t",
     "ripple", "ripple_order", "ripple_phase",
-    "backlash", "k3", "hyst", "hyst_x", "hyst_n",
+    "backlash", "k3", "hyst", "hyst_x", "hyst_n", "hyst_even",
     "kdrift", "kdrift_tau",
     "I3", "K3", "B3",
     "dist", "dist_f", "dist_phase",
@@ -54,7 +55,7 @@ INDEX = {name: i for i, name in enumerate(NAMES)}
     VM, VM_ASYM, VM_RATE, VT, VT_ASYM,
     LOAD_M, LOAD_T,
     RIPPLE, RIPPLE_ORDER, RIPPLE_PHASE,
-    BACKLASH, K3C, HYST, HYST_X, HYST_N,
+    BACKLASH, K3C, HYST, HYST_X, HYST_N, HYST_EVEN,
     KDRIFT, KDRIFT_TAU,
     I3, K3, B3,
     DIST, DIST_F, DIST_PHASE,
@@ -146,9 +147,9 @@ def _rhs(p, y, t, r, zm, zt, out):
     out[4] = 0.0
     if p[HYST] != 0.0:
         c += p[HYST] * zh
-        turn = 0.0
-        if dd * zh > 0.0:
-            turn = abs(zh) ** p[HYST_N]
+        turn = abs(zh) ** p[HYST_N]
+        if dd * zh <= 0.0:
+            turn *= -p[HYST_EVEN]
         out[4] = dd / p[HYST_X] * (1.0 - turn)
 
     m1 = u - c + p[LOAD_M]
