@@ -19,8 +19,10 @@ pub struct Roundness {
     pub mean: f64,
     /// Centre of the least-squares circle.
     pub centre: (f64, f64),
-    /// Height of the peak at +X, +Y, -X, -Y, outward positive, over what stands before and behind it.
+    /// Height of the peak at +X, +Y, -X, -Y, outward positive, over the straight lines before and behind it.
     pub reversals: [f64; 4],
+    /// Step at +X, +Y, -X, -Y: the line behind, in the sense of the angle, less the line before.
+    pub steps: [f64; 4],
     /// Amplitude of the ellipse along the axes: unequal scales.
     pub ellipse_axes: f64,
     /// Amplitude of the ellipse at 45 degrees: unequal loop gains (its sign turns with the direction) or axes that are not
@@ -28,10 +30,10 @@ pub struct Roundness {
     pub ellipse_diagonal: f64,
 }
 
-/// Half width of the stretch in which a reversal's peak is looked for, rad: ten degrees.
-const NEAR: f64 = PI / 18.0;
-/// Half width of the stretch it is compared with: twenty-five degrees.
-const AROUND: f64 = 25.0 * PI / 180.0;
+/// Half width of the stretch in which a reversal's peak is looked for, rad: seven degrees.
+const NEAR: f64 = 7.0 * PI / 180.0;
+/// Half width of the stretch it is compared with: fifteen degrees.
+const AROUND: f64 = 15.0 * PI / 180.0;
 
 /// Angle (rad, -pi..pi) and radial deviation (m) about the programmed centre, in the order of the path.
 #[must_use]
@@ -51,14 +53,15 @@ impl Roundness {
         let (smallest, largest) = extremes(deviation.iter().copied());
         let second =
             |f: fn(f64) -> f64| 2.0 / n * angle.iter().zip(&deviation).map(|(a, d)| d * f(2.0 * a)).sum::<f64>();
-        let reversals = [0.0, 0.25, 0.5, 0.75].map(|turn| reversal(&angle, &deviation, TAU * turn));
+        let at = [0.0, 0.25, 0.5, 0.75].map(|turn| reversal(&angle, &deviation, TAU * turn));
         Some(Self {
             deviation: high - low,
             largest,
             smallest,
             mean: deviation.iter().sum::<f64>() / n,
             centre,
-            reversals,
+            reversals: at.map(|(peak, _)| peak),
+            steps: at.map(|(_, step)| step),
             ellipse_axes: second(f64::cos),
             ellipse_diagonal: second(f64::sin),
         })
@@ -86,19 +89,38 @@ fn least_squares_centre(path: &Path) -> Option<(f64, f64)> {
     Some((fit[0] * scale, fit[1] * scale))
 }
 
-/// The extreme deviation near `at` over the mean of what stands around it.
-fn reversal(angle: &[f64], deviation: &[f64], at: f64) -> f64 {
-    let distance = |a: f64| ((a - at + PI).rem_euclid(TAU) - PI).abs();
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (a, d) in angle.iter().zip(deviation) {
-        if (NEAR..AROUND).contains(&distance(*a)) {
-            sum += d;
-            count += 1.0;
+/// Peak and step near `at`: what stands within [`NEAR`] over lines through what stands around it, one on each side.
+fn reversal(angle: &[f64], deviation: &[f64], at: f64) -> (f64, f64) {
+    let offset = |a: f64| (a - at + PI).rem_euclid(TAU) - PI;
+    let line = |behind: bool| -> (f64, f64) {
+        let side = angle
+            .iter()
+            .zip(deviation)
+            .map(|(a, d)| (offset(*a), *d))
+            .filter(|(a, _)| (NEAR..AROUND).contains(&a.abs()) && (*a > 0.0) == behind);
+        let (mut n, mut sa, mut sd, mut saa, mut sad) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (a, d) in side {
+            n += 1.0;
+            sa += a;
+            sd += d;
+            saa += a * a;
+            sad += a * d;
         }
-    }
-    let base = if count > 0.0 { sum / count } else { 0.0 };
-    let near = angle.iter().zip(deviation).filter(|(a, _)| distance(**a) < NEAR).map(|(_, d)| d - base);
-    near.fold(0.0, |peak: f64, d| if d.abs() > peak.abs() { d } else { peak })
+        let spread = n * saa - sa * sa;
+        if spread <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let slope = (n * sad - sa * sd) / spread;
+        ((sd - slope * sa) / n, slope)
+    };
+    let (before, behind) = (line(false), line(true));
+    let over = |a: f64, d: f64| {
+        let (base, slope) = if a >= 0.0 { behind } else { before };
+        d - base - slope * a
+    };
+    let near = angle.iter().zip(deviation).map(|(a, d)| (offset(*a), *d)).filter(|(a, _)| a.abs() < NEAR);
+    let peak = near.fold(0.0, |peak: f64, (a, d)| if over(a, d).abs() > peak.abs() { over(a, d) } else { peak });
+    (peak, behind.0 - before.0)
 }
 
 #[cfg(test)]
@@ -135,6 +157,16 @@ mod tests {
             Roundness::of(&path(|a| ((0.05 + bump(a)) * a.cos(), (0.05 + bump(a)) * a.sin())), 0.05).expect("a circle");
         assert!((r.reversals[1] - 6e-6).abs() < 1e-8, "{r:?}");
         assert!(r.reversals[0].abs() < 1e-8 && r.reversals[2].abs() < 1e-8);
+    }
+
+    #[test]
+    fn a_step_at_a_reversal_has_its_height_and_is_no_peak() {
+        // Moving towards -X above, towards +X below: the table stays behind by 3 um on either side.
+        let behind = |a: f64| if (0.0..TAU / 2.0).contains(&a) { 3e-6 } else { -3e-6 };
+        let r = Roundness::of(&path(|a| (0.05 * a.cos() + behind(a), 0.05 * a.sin())), 0.05).expect("a circle");
+        // The step's radial part falls with the cosine of the angle, which the lines follow to some per cent.
+        assert!((r.steps[0] - 6e-6).abs() < 2e-7 && (r.steps[2] - 6e-6).abs() < 2e-7, "{r:?}");
+        assert!(r.reversals[0].abs() < 2e-7 && r.steps[1].abs() < 1e-7, "{r:?}");
     }
 
     #[test]

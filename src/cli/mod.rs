@@ -57,6 +57,8 @@ commands! {
     Identify => identify,
     /// Diagnose the gap between the model and a measured trace: where, which effect, how far it shrinks
     Diagnose => diagnose,
+    /// Circular test (ISO 230-4) in simulation: what the axes' effects do to a circle
+    Circle => circle,
 }
 
 /// Parses the arguments, runs the command, prints an error with its causes, and gives the exit code.
