@@ -1,5 +1,6 @@
 //! The gap between model and machine: where, which, how far.
 
+pub mod location;
 mod noise;
 mod record;
 

@@ -1,0 +1,4 @@
+//! Where the gap lies, whatever its cause.
+
+mod kalman;
+mod plant;
