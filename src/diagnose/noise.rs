@@ -223,7 +223,7 @@ pub fn find_period(torque: &[f64]) -> Option<usize> {
 /// The step of values that lie on a lattice: gaps between neighbouring values are all whole multiples of it.
 ///
 /// Needs at least eight different values; of a lattice so fine that the values' own rounding hides it nothing is said.
-fn quantum(y: &[f64]) -> Option<f64> {
+pub(super) fn quantum(y: &[f64]) -> Option<f64> {
     let mut values: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let scale = values.first()?.abs().max(values.last()?.abs());

@@ -164,13 +164,15 @@ fn triangular<const N: usize>(a: &SMatrix<f64, N, N>, walk: &SVector<f64, N>) ->
     SMatrix::from_fn(|i, j| if j <= i { rows[i][j] } else { 0.0 })
 }
 
-/// States given the whole record, and their standard deviations.
+/// States given the whole record, and their standard deviations, by sample.
 #[derive(Debug, Clone)]
 pub struct Smoothed<const N: usize> {
-    /// By sample.
+    /// The states.
     pub states: Vec<SVector<f64, N>>,
-    /// By sample.
+    /// Their standard deviations.
     pub std: Vec<SVector<f64, N>>,
+    /// Standard deviations of `[theta2, omega2]`.
+    pub table_std: Vec<[f64; 2]>,
 }
 
 impl<const N: usize> Track<N> {
@@ -185,14 +187,21 @@ impl<const N: usize> Track<N> {
         let n = self.states.len();
         let mut states = self.states.clone();
         let mut std = vec![SVector::zeros(); n];
+        let mut table_std = vec![[0.0; 2]; n];
         let mut r = SVector::<f64, N>::zeros();
         let mut information = SMatrix::<f64, N, N>::zeros();
         for k in (0..n).rev() {
             let gains = self.gains(k);
             let covariance = gains.root * gains.root.transpose();
             states[k] += covariance * r;
-            let variance = covariance - covariance * information * covariance;
+            // P - P*N*P in the form that keeps the digits of directions which the future alone makes known.
+            let rest = SMatrix::<f64, N, N>::identity() - gains.root.tr_mul(&(information * gains.root));
+            let variance = gains.root * rest * gains.root.transpose();
             std[k] = variance.diagonal().map(|v| v.max(0.0).sqrt());
+            table_std[k] = [0, 1].map(|i| {
+                let v = variance[(i, i)] + variance[(i + 2, i + 2)] - 2.0 * variance[(i, i + 2)];
+                v.max(0.0).sqrt()
+            });
             for c in (0..4).rev().filter(|c| self.measured[*c]) {
                 let (h, gain, s) = (&self.plant.read[c], &gains.gain[c], gains.variance[c]);
                 r += h * (self.innovations[k][c] / s - gain.dot(&r));
@@ -205,7 +214,7 @@ impl<const N: usize> Track<N> {
             information = self.plant.f.tr_mul(&information) * self.plant.f;
             information = (information + information.transpose()) * 0.5;
         }
-        Smoothed { states, std }
+        Smoothed { states, std, table_std }
     }
 
     /// Innovations over their standard deviations, by channel measured, in the order of the channels.
@@ -221,25 +230,22 @@ impl<const N: usize> Track<N> {
         out
     }
 
-    /// How the whitened innovations answer to inputs of the axis: `drive(k)` is added to the state over sample `k`,
-    /// `error(k)` to the reading of each channel.
+    /// Whitened innovations of another plant with the gains and variances of this one.
     #[must_use]
-    pub fn answer(
-        &self,
-        mut drive: impl FnMut(usize) -> SVector<f64, N>,
-        mut error: impl FnMut(usize) -> [f64; 4],
-    ) -> Vec<f64> {
+    pub fn whitened_as(&self, plant: &Plant<N>, record: &Record) -> Vec<f64> {
         let mut out = Vec::with_capacity(4 * self.innovations.len());
-        let mut x = SVector::<f64, N>::zeros();
-        for k in 0..self.innovations.len() {
+        let mut x = plant.mean;
+        for k in 0..record.len() {
             let gains = self.gains(k);
-            let reading = error(k);
-            for c in (0..4).filter(|c| self.measured[*c]) {
-                let e = reading[c] - self.plant.read[c].dot(&x);
-                x += gains.gain[c] * e;
-                out.push(e / gains.variance[c].sqrt());
+            for (c, y) in record.channels.iter().enumerate() {
+                if let Some(y) = y {
+                    let e = y[k] - plant.read[c].dot(&x);
+                    x += gains.gain[c] * e;
+                    out.push(e / gains.variance[c].sqrt());
+                }
             }
-            x = self.plant.f * x + drive(k);
+            let (t0, t1) = (record.torque[k], record.torque.get(k + 1).copied().unwrap_or(record.torque[k]));
+            x = plant.f * x + plant.torque[0] * t0 + plant.torque[1] * t1;
         }
         out
     }
@@ -253,10 +259,8 @@ mod tests {
 
     #[test]
     fn filter_and_smoother_equal_the_dense_normal_distribution() {
-        let oracle: Vec<f64> = include_str!("../../../scripts/oracles/unknown_input.txt")
-            .lines()
-            .map(|l| l.parse().unwrap())
-            .collect();
+        let oracle: Vec<f64> =
+            include_str!("../../../scripts/oracles/unknown_input.txt").lines().map(|l| l.parse().unwrap()).collect();
         let n = 40;
         let at = |f: &dyn Fn(f64) -> f64| (0..n).map(|k| f(f64::from(k))).collect::<Vec<_>>();
         let record = Record {
@@ -273,8 +277,7 @@ mod tests {
             noise: [1e-3, 2e-2, 2e-3, 0.0],
         };
         let transition = Transition::new(&Parameters::PAPER, Structure::TwoInertia, record.hold, record.dt);
-        let prior =
-            Prior { mean: [0.05, 0.0, 0.0, 0.0], std: [0.2, 3.0, 0.5, 10.0], torque: 0.02 / 3.0, angle: 0.1 };
+        let prior = Prior { mean: [0.05, 0.0, 0.0, 0.0], std: [0.2, 3.0, 0.5, 10.0], torque: 0.02 / 3.0, angle: 0.1 };
         let plant = Plant::<6>::new(&transition, &prior, &[Port::Motor, Port::Table], &[3e-4, 1e-4]);
         let track = track(&plant, &record);
         assert_eq!(log_likelihood(&plant, &record), track.log_likelihood);

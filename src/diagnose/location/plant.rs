@@ -118,17 +118,20 @@ impl Prior {
     pub fn new(record: &Record, p: &Parameters, structure: Structure) -> Self {
         let torque = rms(&record.torque).max(f64::MIN_POSITIVE);
         let position = record.channels[0].as_ref().or(record.channels[2].as_ref());
-        let span = position.map_or(0.0, |y| {
-            let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
-            rms(&y.iter().map(|v| v - mean).collect::<Vec<_>>())
-        });
+        let noise = record.noise[0].max(record.noise[2]);
         let duration = record.dt * record.len() as f64;
-        // What the torque alone makes of the free axis, and what was measured.
-        let mut speed = span / duration.max(record.dt) + torque * duration / (p.i1 + p.i2);
+        // The fastest motion seen: over so many samples that the noise does not matter much.
+        const LAG: usize = 16;
+        let across = LAG as f64 * record.dt;
+        let mut speed = position.map_or(0.0, |y| y.windows(LAG + 1).map(|w| (w[LAG] - w[0]).abs()).fold(0.0, f64::max));
+        speed = speed / across + noise / across;
         for c in [1, 3] {
             if let Some(y) = &record.channels[c] {
-                speed = speed.max(rms(y));
+                speed = y.iter().fold(speed, |m, v| m.max(v.abs()));
             }
+        }
+        if speed == 0.0 {
+            speed = torque * duration / (p.i1 + p.i2);
         }
         let flexible = structure == Structure::TwoInertia;
         let static_twist = if flexible && p.k > 0.0 { torque / p.k } else { 0.0 };
@@ -136,15 +139,15 @@ impl Prior {
             (Some(a), Some(b)) => rms(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>()),
             _ => 0.0,
         };
-        let noise = record.noise[0].max(record.noise[2]);
         let angle = (3.0 * static_twist).max(seen).max(noise);
         let first = position.and_then(|y| y.first().copied()).unwrap_or(0.0);
-        let rate = if flexible { angle * (p.k * p.twist_mobility()).sqrt().max(1.0 / duration.max(record.dt)) } else { 0.0 };
+        let rate =
+            if flexible { angle * (p.k * p.twist_mobility()).sqrt().max(1.0 / duration.max(record.dt)) } else { 0.0 };
         Self {
             mean: [first, 0.0, 0.0, 0.0],
             std: [
-                10.0 * (angle + noise + record.dt * speed).max(f64::MIN_POSITIVE),
-                10.0 * speed.max(f64::MIN_POSITIVE),
+                10.0 * (angle + noise).max(f64::MIN_POSITIVE),
+                3.0 * speed.max(f64::MIN_POSITIVE),
                 if flexible { 10.0 * angle } else { 0.0 },
                 10.0 * rate,
             ],

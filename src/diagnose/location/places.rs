@@ -1,0 +1,93 @@
+//! How likely each place is, whatever the effect: an unknown input in one place at a time.
+
+use rayon::prelude::*;
+use serde::{Serialize, Serializer};
+
+use super::fit::{Fitted, Setting};
+use super::plant::Port;
+use crate::axis::Structure;
+use crate::effects::Place;
+
+/// What a place must gain in log-likelihood over "nowhere" to be believed, beyond the price of its walk (BIC).
+const MATERIAL: f64 = 10.0;
+/// The walk is only a stand-in for the effect: a gap between two places counts against this share of the number of
+/// readings, or of the gap between the best place and none where that is less.
+const TEMPER: f64 = 0.02;
+
+/// What speaks for a place.
+#[derive(Debug, Clone, Serialize)]
+pub struct PlaceEvidence {
+    /// The place; `None` is nowhere: parameters and initial state alone.
+    #[serde(serialize_with = "place_name")]
+    pub place: Option<Place>,
+    /// Log-likelihood of the record with an unknown input there, less the price of what is free (BIC).
+    pub log_likelihood: f64,
+    /// Share of the evidence, 0 to 1; all places sum to 1.
+    pub share: f64,
+    /// The fit behind it.
+    #[serde(skip)]
+    pub fitted: Fitted,
+}
+
+fn place_name<S: Serializer>(place: &Option<Place>, s: S) -> Result<S::Ok, S::Error> {
+    s.serialize_str(place.map_or("nowhere", Place::as_str))
+}
+
+/// Evidence for every place that the record can speak for, in the order of the chain, "nowhere" first.
+#[must_use]
+pub fn evidence(setting: &Setting<'_>) -> Vec<PlaceEvidence> {
+    let record = setting.record;
+    let flexible = setting.structure == Structure::TwoInertia;
+    let mut hypotheses: Vec<(Option<Place>, Vec<Port>)> = vec![(Some(Place::Motor), vec![Port::Motor])];
+    if flexible {
+        hypotheses.push((Some(Place::Coupling), vec![Port::Coupling]));
+        hypotheses.push((Some(Place::Table), vec![Port::Table]));
+    }
+    if record.sees_motor() && record.sees_table() {
+        let ports = [(2, Port::TableAngle), (3, Port::TableSpeed)];
+        let ports = ports.into_iter().filter(|(c, _)| record.channels[*c].is_some()).map(|(_, p)| p).collect();
+        hypotheses.push((Some(Place::Sensor), ports));
+    }
+    let samples = (record.len() * record.channels.iter().flatten().count()) as f64;
+    let price = |fitted: &Fitted| {
+        let free = fitted.ports.len() as f64 * 2.0 + if fitted.ports.contains(&Port::TableAngle) { 2.0 } else { 0.0 };
+        0.5 * free * samples.ln()
+    };
+    let nowhere = setting.fit(&[]);
+    let fit = |(place, ports): &(Option<Place>, Vec<Port>)| {
+        let fitted = setting.fit(ports);
+        if *place == Some(Place::Sensor) {
+            let other = setting.fit_slow(ports);
+            if other.log_likelihood > fitted.log_likelihood {
+                return other;
+            }
+        }
+        fitted
+    };
+    let fits: Vec<Fitted> = hypotheses.par_iter().map(fit).collect();
+    let mut all = vec![PlaceEvidence {
+        place: None,
+        log_likelihood: nowhere.log_likelihood + MATERIAL,
+        share: 0.0,
+        fitted: nowhere,
+    }];
+    for ((place, _), fitted) in hypotheses.into_iter().zip(fits) {
+        all.push(PlaceEvidence { place, log_likelihood: fitted.log_likelihood - price(&fitted), share: 0.0, fitted });
+    }
+    share(&mut all, samples);
+    all
+}
+
+/// Shares from the log-likelihoods, tempered.
+pub(super) fn share(all: &mut [PlaceEvidence], samples: f64) {
+    let best = all.iter().map(|e| e.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+    let none = all.iter().find(|e| e.place.is_none()).map_or(best, |e| e.log_likelihood);
+    let scale = (TEMPER * (best - none).min(samples)).max(1.0);
+    for e in all.iter_mut() {
+        e.share = ((e.log_likelihood - best) / scale).exp();
+    }
+    let sum: f64 = all.iter().map(|e| e.share).sum();
+    for e in all.iter_mut() {
+        e.share /= sum;
+    }
+}
