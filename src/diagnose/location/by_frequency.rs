@@ -111,7 +111,7 @@ fn by_lines(name: &'static str, residual: &[f64], torque: &[f64], dt: f64, perio
     let class = |k: usize| {
         if k == 0 {
             "mean"
-        } else if k % periods != 0 {
+        } else if !k.is_multiple_of(periods) {
             "foreign"
         } else if excited(k) {
             "excited_lines"

@@ -98,8 +98,8 @@ impl<'a> Setting<'a> {
             // theta2 read is (1 + scale)*theta2 - delay*omega2, omega2 read likewise; alpha2 = (K*d + B*d')/I2.
             let p = &h.parameters;
             for (channel, slope) in [(2, [0.0, 1.0, 0.0, -1.0]), (3, [0.0, 0.0, p.k / p.i2, p.b / p.i2])] {
-                for i in 0..4 {
-                    plant.read[channel][i] = plant.read[channel][i] * (1.0 + scale) - delay * slope[i];
+                for (row, slope) in plant.read[channel].iter_mut().zip(slope) {
+                    *row = *row * (1.0 + scale) - delay * slope;
                 }
             }
         }
