@@ -1,15 +1,186 @@
 //! `eixo simulate`.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::fmu::host::Fmu;
+use crate::fmu::package::Package;
+use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting, simulate};
+use crate::trace::{Hold, Machine, Table, load, write_columns};
 
 /// Arguments of `eixo simulate`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// An FMU, or an axis.toml, which is exported first
+    pub model: PathBuf,
+    /// Input trace: a column `time`, and one for each input of the FMU (T)
+    #[arg(short, long, value_name = "CSV")]
+    pub input: Option<PathBuf>,
+    /// Where the trace goes, as CSV
+    #[arg(short, long, value_name = "CSV")]
+    pub output: PathBuf,
+    /// A parameter or start value, as in coulomb_motor.level=0.01; may be given many times
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting)]
+    pub set: Vec<Setting>,
+    /// Outputs to record, separated by commas; all by default
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub outputs: Vec<String>,
+    /// White noise on the recorded outputs: NAME=STANDARD_DEVIATION, or a signal-to-noise ratio for all of them, as in 60dB
+    #[arg(long, value_name = "NOISE", value_delimiter = ',', value_parser = parse_noise)]
+    pub noise: Vec<Noise>,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// What the inputs do between samples; by default what the axis.toml says, else zoh
+    #[arg(long, value_enum)]
+    pub hold: Option<HoldArg>,
+    /// Start, s; by default the input's
+    #[arg(long, allow_negative_numbers = true)]
+    pub start: Option<f64>,
+    /// End, s; by default the input's
+    #[arg(long, allow_negative_numbers = true)]
+    pub stop: Option<f64>,
+    /// Communication step, s; by default the input's sampling interval
+    #[arg(long)]
+    pub step: Option<f64>,
+    /// Record the outputs as each step left them, before the next inputs are set (as most importers do)
+    #[arg(long)]
+    pub step_end: bool,
+}
+
+/// What the inputs do between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum HoldArg {
+    /// Held over the sample
+    Zoh,
+    /// A straight line between samples
+    Linear,
+}
+
+impl From<HoldArg> for Hold {
+    fn from(hold: HoldArg) -> Self {
+        match hold {
+            HoldArg::Zoh => Self::Zoh,
+            HoldArg::Linear => Self::Linear,
+        }
+    }
+}
+
+/// Noise to add.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Noise {
+    /// Standard deviation on one column.
+    Column(String, f64),
+    /// Signal-to-noise ratio of every output, dB, by root mean square.
+    Ratio(f64),
+}
+
+fn parse_noise(text: &str) -> Result<Noise, String> {
+    let usage = || format!("{text:?} is no noise; write NAME=STANDARD_DEVIATION, as in theta1=1e-5, or a ratio, as in 60dB");
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(usage);
+    match text.split_once('=') {
+        Some((name, std)) => {
+            Ok(Noise::Column(name.trim().to_owned(), number(std).and_then(|x| if x >= 0.0 { Ok(x) } else { Err(usage()) })?))
+        }
+        None => {
+            let ratio = text.strip_suffix("dB").or_else(|| text.strip_suffix("db")).ok_or_else(usage)?;
+            Ok(Noise::Ratio(number(ratio)?))
+        }
+    }
+}
+
+/// Adds the noise; each column draws from a stream of its own, so that one column's noise does not hang on the others.
+fn add_noise(record: &mut Record, noise: &[Noise], seed: u64) -> anyhow::Result<()> {
+    for wanted in noise {
+        if let Noise::Column(name, _) = wanted
+            && !record.columns.iter().any(|c| c.name == *name)
+        {
+            let names: Vec<&str> = record.columns.iter().map(|c| c.name.as_str()).collect();
+            bail!("--noise {name}: no such column is recorded; the columns are: {}", names.join(", "));
+        }
+    }
+    for (stream, column) in record.columns.iter_mut().enumerate() {
+        let square: f64 = noise
+            .iter()
+            .map(|n| match n {
+                Noise::Column(name, std) if *name == column.name => std * std,
+                Noise::Ratio(ratio) if !column.input => {
+                    let power = column.values.iter().map(|v| v * v).sum::<f64>() / column.values.len().max(1) as f64;
+                    power * 10_f64.powf(-ratio / 10.0)
+                }
+                _ => 0.0,
+            })
+            .sum();
+        if square > 0.0 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(stream as u64);
+            let std = square.sqrt();
+            for value in &mut column.values {
+                let draw: f64 = StandardNormal.sample(&mut rng);
+                *value += std * draw;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Opens the model; an axis file is exported into a temporary folder and run as an FMU, as any other tool would.
+fn open(path: &Path) -> anyhow::Result<(Fmu, Option<Machine>)> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let machine = Machine::read(path)?;
+        let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
+        let file = folder.path().join("axis.fmu");
+        Package::of(&machine).with_context(|| path.display().to_string())?.write(&file)?;
+        return Ok((Fmu::open(&file)?, Some(machine)));
+    }
+    Ok((Fmu::open(path).with_context(|| path.display().to_string())?, None))
+}
 
 /// Runs the command.
 ///
 /// # Errors
-/// When the command could not run.
-pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    anyhow::bail!("not built yet")
+/// When the FMU or the input cannot be used, the FMU stops, or the trace cannot be written.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let (fmu, machine) = open(&args.model)?;
+    let mut hold = args.hold.map(Hold::from);
+    let inputs = match (&args.input, &machine) {
+        (None, _) => Inputs::default(),
+        // The axis file says how its own log's columns are named.
+        (Some(path), Some(machine)) => {
+            let loaded = load(path, &machine.signals)?;
+            loaded.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+            hold = hold.or(Some(loaded.trace.hold));
+            Inputs::of(&loaded.trace)?
+        }
+        (Some(path), None) => Inputs::from_table(&Table::read(path)?, &fmu.description)?,
+    };
+    let options = Options {
+        start: args.start,
+        stop: args.stop,
+        step: args.step,
+        hold: hold.unwrap_or_default(),
+        settings: args.set,
+        outputs: args.outputs,
+        rows: if args.step_end { Rows::StepEnd } else { Rows::InputsSet },
+    };
+    let mut record = simulate(&fmu, &inputs, &options)?;
+    add_noise(&mut record, &args.noise, args.seed)?;
+    let table = record.table();
+    let columns: Vec<(&str, &[f64])> = table.iter().map(|(name, values)| (name.as_str(), *values)).collect();
+    write_columns(&args.output, &columns)?;
+    record.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    println!(
+        "{}: {} rows, {} s to {} s, {} columns",
+        args.output.display(),
+        record.time.len(),
+        record.time.first().copied().unwrap_or(0.0),
+        record.time.last().copied().unwrap_or(0.0),
+        columns.len()
+    );
+    Ok(ExitCode::SUCCESS)
 }

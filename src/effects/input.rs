@@ -92,6 +92,10 @@ impl<S: Scalar> TorqueHistory<S> {
     /// Whether a delay of `delay` s before a step of `h` s still lies inside what is remembered.
     #[must_use]
     pub fn covers(&self, delay: f64, h: f64) -> bool {
+        if self.uniform == self.recorded {
+            // Equal steps so far: say at once what equal steps to come cannot do.
+            return delay <= LONGEST_DELAY as f64 * h;
+        }
         if self.recorded < LONGEST_DELAY {
             return true;
         }

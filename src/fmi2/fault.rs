@@ -70,8 +70,8 @@ impl fmt::Display for Fault {
             Self::NotFinite { index, value } => write!(f, "{} = {value}: it must be a finite number", at(*index)),
             Self::Bounds { index, value } => {
                 let v = at(*index);
-                write!(f, "{v} = {value}: it must be from {} to ", v.min.unwrap_or(f64::NEG_INFINITY))?;
-                v.max.unwrap_or(f64::INFINITY).fmt(f)
+                let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
+                write!(f, "{v} = {value:?}: it must be from {min:?} to {max:?}")
             }
             Self::Number { name, value, must_be } => write!(f, "{name} = {value}: it must be {must_be}"),
             Self::Time { given, expected } => {

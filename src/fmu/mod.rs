@@ -8,5 +8,6 @@ pub mod isolation;
 pub mod output;
 pub mod package;
 pub mod rules;
+pub mod simulate;
 pub mod validation;
 pub mod xml;

@@ -17,6 +17,7 @@ use std::ops::Range;
 
 pub use crate::axis::Hold;
 pub use error::TraceError;
+pub(crate) use error::nearest;
 pub use load::{Column, Loaded, Mapping, from_table, load};
 pub use machine::{Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
