@@ -71,7 +71,8 @@ typedef struct {
     Values *pointer;
 } Instance;
 
-static double global_w, scratch;
+static double global_w;
+static volatile double scratch;
 static Values shared_state;
 
 #define W(i) (*(IS(GLOBAL) ? &global_w : &(i)->values.w))

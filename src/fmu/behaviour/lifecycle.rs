@@ -242,31 +242,35 @@ pub(super) fn resources(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-/// Cycles of a window, and bytes a cycle from which a growth counts.
+/// Cycles of a window, and of a slow FMU.
 const CYCLES: usize = 10;
+const SLOW_CYCLES: usize = 2;
+/// Windows that must all grow.
+const WINDOWS: usize = 4;
+/// Bytes a cycle, and a window, from which a growth counts: the C library's own bookkeeping moves by less.
 const GROWTH: i64 = 16;
+const WINDOW_GROWTH: i64 = 300;
 
-/// Repeats something until the heap is warm, then looks whether three windows grow alike.
-fn grows(limit: Duration, mut cycle: impl FnMut() -> Result<(), HostError>) -> Result<Option<i64>, Stop> {
+/// Repeats something until the heap is warm, then looks whether all windows grow; by how many bytes a cycle.
+fn grows(slow: Duration, mut cycle: impl FnMut() -> Result<(), HostError>) -> Result<Option<i64>, Stop> {
+    let mut sizes = Vec::with_capacity(WINDOWS + 1);
     let begin = Instant::now();
-    let mut cycles = CYCLES;
-    for done in 0..CYCLES {
+    cycle()?;
+    cycle()?;
+    let cycles = if begin.elapsed() > 2 * slow { SLOW_CYCLES } else { CYCLES };
+    for _ in 0..cycles {
         cycle()?;
-        if begin.elapsed() > limit / 4 && done >= 1 {
-            cycles = 2;
-            break;
-        }
     }
-    let mut sizes = vec![heap()?];
-    for _ in 0..3 {
+    sizes.push(heap()?);
+    for _ in 0..WINDOWS {
         for _ in 0..cycles {
             cycle()?;
         }
         sizes.push(heap()?);
     }
-    let growth: Vec<i64> = sizes.windows(2).map(|w| (w[1] - w[0]) / cycles as i64).collect();
-    let least = growth.iter().copied().min().unwrap_or(0);
-    Ok((least >= GROWTH).then_some(least))
+    let least = sizes.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(0);
+    let each = least / cycles as i64;
+    Ok((least >= WINDOW_GROWTH && each >= GROWTH).then_some(each))
 }
 
 fn heap() -> Result<i64, Stop> {
@@ -274,10 +278,9 @@ fn heap() -> Result<i64, Stop> {
 }
 
 pub(super) fn instance_leak(p: &Probe) -> Tested {
-    let limit = Duration::from_millis(400);
     let (mut files, mut threads) = (measure::open_files(), measure::threads());
     let mut cycle = 0;
-    let growth = grows(limit, || {
+    let growth = grows(Duration::from_millis(15), || {
         let mut instance = p.ready()?;
         p.run(&mut instance, 0, 3)?;
         instance.terminate()?;
@@ -305,7 +308,7 @@ pub(super) fn instance_leak(p: &Probe) -> Tested {
 pub(super) fn step_leak(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let mut k = 0;
-    let growth = grows(Duration::from_millis(200), || {
+    let growth = grows(Duration::from_millis(15), || {
         for _ in 0..10 {
             instance.do_step(p.time(k), p.step)?;
             k += 1;

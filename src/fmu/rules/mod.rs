@@ -2,6 +2,8 @@
 
 mod document;
 pub mod finding;
+#[cfg(test)]
+mod fuzz;
 pub mod list;
 mod names;
 mod package;

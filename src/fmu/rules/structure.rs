@@ -168,7 +168,7 @@ fn kind_of_type(
 ) {
     let real = |v: Option<&Variable>| v.is_some_and(|v| v.base() == BaseType::Real);
     for (kind, &known) in kinds.iter().zip(unknown.dependencies.iter().flatten()) {
-        if *kind == DependencyKind::Dependent {
+        if *kind == DependencyKind::Dependent || d.by_index(known).is_none() {
             continue;
         }
         let message = if section == "InitialUnknowns" && *kind != DependencyKind::Constant {
