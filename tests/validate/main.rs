@@ -5,6 +5,8 @@
 //! of its `modelDescription.xml` and archive. Without a C compiler the behavioural part says so and is skipped.
 
 #![cfg(all(unix, feature = "cli"))]
+// Helpers beside the test functions may fail as these do.
+#![allow(clippy::unwrap_used)]
 
 mod archives;
 mod cli;

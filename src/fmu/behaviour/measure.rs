@@ -25,7 +25,7 @@ pub(super) fn perturb_memory(byte: u8) {
         if byte == 0 {
             return;
         }
-        // Small blocks come back from a cache as they were freed.
+        // Free blocks come back as they were left.
         for size in (16..=4096).step_by(16) {
             let blocks = [(); 8].map(|()| libc::malloc(size));
             for block in blocks.into_iter().filter(|block| !block.is_null()) {

@@ -28,7 +28,7 @@ fn mutate(bytes: &mut Vec<u8>, edits: &[(usize, usize, usize, Vec<u8>)]) {
         let end = (at + length % 40).min(bytes.len());
         let part: Vec<u8> = bytes.splice(at..end, new.iter().copied()).collect();
         let to = to % (bytes.len() + 1);
-        if to % 2 == 0 {
+        if to.is_multiple_of(2) {
             bytes.splice(to..to, part);
         }
     }
