@@ -94,6 +94,14 @@ impl<S: Scalar> Axis<S> {
         state
     }
 
+    /// The same with the effects' internal states of another state, as at the seam of two windows of one record.
+    pub fn resume(&self, [theta1, omega1, theta2, omega2]: [S; 4], internals: &Memory<S>, time: f64) -> State<S> {
+        let mut state = self.state(theta1, omega1, theta2, omega2, time);
+        state.memory = *internals;
+        self.refresh_force(&mut state, time);
+        state
+    }
+
     /// Accelerations `[alpha1, alpha2]` under the torque `torque` on the motor at `time` s, rad/s2 (paper, eq. 2).
     ///
     /// Dry friction at rest answers the torque of now, whatever it held over the step before: up to its level the
@@ -195,12 +203,5 @@ impl<S: Scalar> State<S> {
     /// Internal states of the effects.
     pub fn memory(&self) -> &Memory<S> {
         &self.memory
-    }
-    /// The same motion with the effects' internal states and discrete modes of another state.
-    #[must_use]
-    pub fn with_internals_of(mut self, other: &Self) -> Self {
-        self.memory = other.memory;
-        self.contact = other.contact;
-        self
     }
 }

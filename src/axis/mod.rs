@@ -22,7 +22,7 @@ pub use axis_model::{Axis, Motions, State};
 pub use criterion::{dt_criterion, period_elongation};
 pub use oscillator::Scheme;
 pub use parameters::{Modal, Motion, ParameterError, Parameters, PhysicalData, Structure};
-pub use propagator::Propagator;
+pub use propagator::{Linear, Propagator};
 pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps};
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::parameters::{Parameters, Structure};
 use crate::scalar::Scalar;
 
 /// Positions and velocities: `[th1, w1, d, d']`, rad and rad/s.
-pub(super) type Linear<S> = [S; 4];
+pub type Linear<S> = [S; 4];
 
 /// The linear step of one length.
 #[derive(Debug, Clone, Copy)]
@@ -73,7 +73,7 @@ impl<S: Scalar> Propagator<S> {
 
     /// The state after the step, under torques on motor and table that run linearly from `tau0` to `tau1`, N.m.
     #[inline]
-    pub(super) fn apply(&self, s: &Linear<S>, tau0: [S; 2], tau1: [S; 2]) -> Linear<S> {
+    pub fn apply(&self, s: &Linear<S>, tau0: [S; 2], tau1: [S; 2]) -> Linear<S> {
         let a0 = (tau0[0] + tau0[1]) * self.inverse_total;
         let a1 = (tau1[0] + tau1[1]) * self.inverse_total;
         let u0 = tau0[0] * self.inverse_1 - tau0[1] * self.inverse_2;

@@ -5,7 +5,7 @@
 //! ([`Moment::contact`]); here is the force of a given side, less the `K*d + B*d'` that the linear axis already has.
 //! Nordin, Gutman, Automatica 38(10), 2002 (the physical model of backlash).
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -20,10 +20,11 @@ impl Force for Backlash {
         title: "Play in coupling or nut: a dead zone of the spring; contact cannot pull",
         equation: "f = max(0, K*(d - g) + B*d') at d > g, mirrored at d < -g, else 0",
         reference: "Nordin, Gutman, Automatica 38(10), 2002",
-        parameters: &[
-            ParameterInfo::size("half_gap", "rad", 0.0, 1e3, "Half of the play, on the motor side").nominal(1e-3)
-        ],
+        parameters: &[ParameterInfo::size("half_gap", "rad", 0.0, 1e3, "Half of the play, on the motor side")
+            .nominal(1e-3)
+            .start(Start::Grid(Scale::Twist, &[0.03, 0.1, 0.2, 0.4, 0.7, 1.2]))],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     #[inline]

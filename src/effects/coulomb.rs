@@ -3,14 +3,16 @@
 //! `f = sgn(v)*level*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2))`; at rest any torque up to the level at zero
 //! speed. Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, eq. 3 and 6.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::DryFriction;
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::size("level", "N.m", 0.0, 1e6, "Coulomb level: friction torque while moving").nominal(1e-2),
-    ParameterInfo::shape("peak", "1", 0.0, 0.0, 10.0, "Stribeck peak: breakaway above the level, as a share of it"),
-    ParameterInfo::shape("speed", "rad/s", 1.0, 1e-9, 1e6, "Stribeck speed: where the peak has fallen to 1/e"),
+    ParameterInfo::shape("peak", "1", 0.0, 0.0, 10.0, "Stribeck peak: breakaway above the level, as a share of it")
+        .start(Start::Grid(Scale::One, &[0.3, 1.0])),
+    ParameterInfo::shape("speed", "rad/s", 1.0, 1e-9, 1e6, "Stribeck speed: where the peak has fallen to 1/e")
+        .start(Start::Grid(Scale::Speed, &[0.05, 0.2, 0.6])),
     ParameterInfo::shape(
         "asymmetry",
         "1",
@@ -19,6 +21,11 @@ const PARAMETERS: &[ParameterInfo] = &[
         1.0,
         "Direction asymmetry: level is level*(1 + asymmetry) forwards and level*(1 - asymmetry) backwards",
     ),
+];
+const VARIANTS: &[Variant] = &[
+    Variant { name: "", free: &[0] },
+    Variant { name: "asymmetric", free: &[0, 3] },
+    Variant { name: "Stribeck", free: &[0, 1, 2] },
 ];
 const EQUATION: &str =
     "f = sgn(v)*level*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2)); |f| <= level*... at v = 0";
@@ -48,6 +55,7 @@ impl DryFriction for CoulombMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        variants: VARIANTS,
     };
 
     fn level<S: Scalar>(p: &[S], direction: f64, speed: S, _at: f64) -> (S, f64) {
@@ -68,6 +76,7 @@ impl DryFriction for CoulombTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        variants: VARIANTS,
     };
 
     fn level<S: Scalar>(p: &[S], direction: f64, speed: S, _at: f64) -> (S, f64) {

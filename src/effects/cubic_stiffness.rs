@@ -1,6 +1,6 @@
 //! Cubic stiffness: the spring is `K*(d + k3*d^3)`, hardening (`k3 > 0`) or softening.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -17,6 +17,7 @@ impl Force for CubicStiffness {
         reference: "Kovacic, Brennan, The Duffing Equation, Wiley 2011",
         parameters: &[ParameterInfo::size("k3", "1/rad2", -1e9, 1e9, "Cubic term as a share of K").nominal(1.0)],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     #[inline]

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -19,10 +19,12 @@ impl Force for Disturbance {
         reference: "Bodson, Douglas, Automatica 33(12), 1997",
         parameters: &[
             ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude of the torque").nominal(1e-2),
-            ParameterInfo::shape("frequency", "Hz", 10.0, 1e-6, 1e6, "Frequency of the torque"),
-            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at time zero"),
+            ParameterInfo::shape("frequency", "Hz", 10.0, 1e-6, 1e6, "Frequency of the torque")
+                .start(Start::Grid(Scale::Frequency, &[1.0])),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at time zero").start(Start::Phase),
         ],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 
     #[inline]

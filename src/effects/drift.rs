@@ -1,6 +1,6 @@
 //! Slow changes over the record: warming, wear.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
 use super::shapes::{Base, DryFriction, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -17,6 +17,7 @@ impl Force for StiffnessDrift {
         reference: "First-order term of any slow change of K",
         parameters: &[ParameterInfo::size("rate", "1/s", -1e3, 1e3, "Relative change of K per second").nominal(1e-2)],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     #[inline]
@@ -44,6 +45,11 @@ impl DryFriction for FrictionDrift {
                 .nominal(1e-4),
         ],
         memory: 0,
+        variants: &[
+            Variant { name: "dry", free: &[0] },
+            Variant { name: "viscous", free: &[1] },
+            Variant { name: "dry and viscous", free: &[0, 1] },
+        ],
     };
 
     fn level<S: Scalar>(p: &[S], _direction: f64, speed: S, at: f64) -> (S, f64) {

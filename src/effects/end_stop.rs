@@ -1,6 +1,6 @@
 //! End stop: a stiff one-sided spring at each end of the travel.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -17,10 +17,17 @@ impl Force for EndStop {
         reference: "Brogliato, Nonsmooth Mechanics, 2016, section 2.1 (compliant contact)",
         parameters: &[
             ParameterInfo::size("stiffness", "N.m/rad", 0.0, 1e9, "Stiffness of the stop").nominal(1.0),
-            ParameterInfo::shape("upper", "rad", 1e6, -1e6, 1e6, "Angle of the table at the upper stop"),
-            ParameterInfo::shape("lower", "rad", -1e6, -1e6, 1e6, "Angle of the table at the lower stop"),
+            ParameterInfo::shape("upper", "rad", 1e6, -1e6, 1e6, "Angle of the table at the upper stop")
+                .start(Start::Grid(Scale::Travel, &[0.7, 0.85, 0.92, 0.97])),
+            ParameterInfo::shape("lower", "rad", -1e6, -1e6, 1e6, "Angle of the table at the lower stop")
+                .start(Start::Grid(Scale::Travel, &[0.3, 0.15, 0.08, 0.03])),
         ],
         memory: 0,
+        variants: &[
+            Variant { name: "upper", free: &[0, 1] },
+            Variant { name: "lower", free: &[0, 2] },
+            Variant { name: "both", free: &[0, 1, 2] },
+        ],
     };
 
     #[inline]

@@ -3,7 +3,7 @@
 //! `I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0`; the table feels the spring. The third inertia is condensed
 //! out of the step: trapezoidal rule for it alone, driven by the trial motion of the table.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -21,11 +21,16 @@ impl Force for FlexibleMode {
         equation: "I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0; f = damping*(w2 - w3) + stiffness*(th2 - th3)",
         reference: "Den Hartog, Mechanical Vibrations, 1956, chapter 3",
         parameters: &[
-            ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia behind the table").nominal(1e-6),
-            ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the table and it"),
-            ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the table and it"),
+            ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia behind the table")
+                .nominal(1e-6)
+                .start(Start::Grid(Scale::Inertia, &[0.03, 0.15, 0.5])),
+            ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the table and it")
+                .start(Start::Grid(Scale::Mode, &[0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 3.0])),
+            ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the table and it")
+                .start(Start::Grid(Scale::One, &[0.05])),
         ],
         memory: 3,
+        variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 
     #[inline]

@@ -92,6 +92,55 @@ pub enum Role {
     Shape,
 }
 
+/// Where a fit of the parameter starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Start {
+    /// The torque is proportional to it: linear regression gives the start.
+    Linear,
+    /// The phase of a periodic torque whose amplitude is the parameter before: linear regression gives both.
+    Phase,
+    /// Each of these multiples of the scale is tried.
+    Grid(Scale, &'static [f64]),
+    /// Its off value; a variant that frees it starts from there.
+    Off,
+}
+
+/// What a start is a multiple of, taken from the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// The plain number.
+    One,
+    /// Root mean square speed at the effect's place.
+    Speed,
+    /// Root mean square twist.
+    Twist,
+    /// Largest torque.
+    Torque,
+    /// Root mean square torque per root mean square displacement between reversals: a stiffness that shows.
+    Stiffness,
+    /// The sampling interval.
+    Sample,
+    /// The coupling's natural frequency, in Hz, or a tenth of the sampling rate for a rigid axis.
+    Mode,
+    /// The share of the two inertias together.
+    Inertia,
+    /// Periods per radian, as far as the travel and the sampling let them be seen.
+    Order,
+    /// Frequencies in Hz, as the record lets them be seen.
+    Frequency,
+    /// Quantile of the table's travel.
+    Travel,
+}
+
+/// A form of an effect that is fitted as one hypothesis: which parameters are free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variant {
+    /// Name, for people; empty for the plain form.
+    pub name: &'static str,
+    /// Indices of the free parameters.
+    pub free: &'static [usize],
+}
+
 /// A parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterInfo {
@@ -109,6 +158,8 @@ pub struct ParameterInfo {
     pub max: f64,
     /// A typical magnitude.
     pub nominal: f64,
+    /// Where a fit starts.
+    pub start: Start,
     /// One sentence.
     pub doc: &'static str,
 }
@@ -117,7 +168,7 @@ impl ParameterInfo {
     /// A size whose off value is zero.
     #[must_use]
     pub const fn size(name: &'static str, unit: &'static str, min: f64, max: f64, doc: &'static str) -> Self {
-        Self { name, unit, role: Role::Size, off: 0.0, min, max, nominal: 1.0, doc }
+        Self { name, unit, role: Role::Size, off: 0.0, min, max, nominal: 1.0, start: Start::Linear, doc }
     }
 
     /// A shape with its start value.
@@ -130,7 +181,13 @@ impl ParameterInfo {
         max: f64,
         doc: &'static str,
     ) -> Self {
-        Self { name, unit, role: Role::Shape, off: start, min, max, nominal: 1.0, doc }
+        Self { name, unit, role: Role::Shape, off: start, min, max, nominal: 1.0, start: Start::Off, doc }
+    }
+
+    /// The same with another start of the fit.
+    #[must_use]
+    pub const fn start(self, start: Start) -> Self {
+        Self { start, ..self }
     }
 
     /// The same with another typical magnitude.
@@ -159,4 +216,6 @@ pub struct EffectInfo {
     pub parameters: &'static [ParameterInfo],
     /// Number of internal states (force effects).
     pub memory: usize,
+    /// The forms a diagnosis fits, the simplest first.
+    pub variants: &'static [Variant],
 }

@@ -4,7 +4,7 @@
 //! exponential), the ramp has its mean and its first moment: the velocity and the position it gives a free inertia at
 //! the end of the step are then exact, and the answer is smooth in the delay and in the time constant.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::Input;
 use crate::scalar::Scalar;
 
@@ -188,6 +188,7 @@ impl Input for TorqueGain {
             ..ParameterInfo::size("gain", "1", -1e3, 1e3, "Torque per torque commanded")
         }],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
@@ -222,9 +223,11 @@ impl Input for Saturation {
         reference: "Hippe, Windup in Control, 2006, chapter 1",
         parameters: &[ParameterInfo {
             off: 1e9,
+            start: Start::Grid(Scale::Torque, &[0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95]),
             ..ParameterInfo::size("limit", "N.m", 0.0, 1e9, "Largest torque; 1e9 means none")
         }],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
@@ -247,8 +250,11 @@ impl Input for Delay {
         title: "Transport delay between command and torque: bus cycles, computation",
         equation: "T(t) = command(t - time)",
         reference: "Astrom, Wittenmark, Computer-Controlled Systems, 1997, section 2.5",
-        parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay").nominal(1e-3)],
+        parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay")
+            .nominal(1e-3)
+            .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0, 10.0]))],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
@@ -288,8 +294,11 @@ impl Input for ActuatorLag {
         title: "First-order lag of the drive's current loop",
         equation: "time_constant*T' = command - T",
         reference: "Schroder, Elektrische Antriebe 2, section 15.5 (equivalent lag of the current loop)",
-        parameters: &[ParameterInfo::size("time_constant", "s", 0.0, 10.0, "Time constant of the lag").nominal(1e-3)],
+        parameters: &[ParameterInfo::size("time_constant", "s", 0.0, 10.0, "Time constant of the lag")
+            .nominal(1e-3)
+            .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0, 10.0]))],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {

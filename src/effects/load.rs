@@ -1,11 +1,12 @@
 //! A constant torque: gravity on a tilted axis, the offset of an amplifier. `f = torque`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] =
     &[ParameterInfo::size("torque", "N.m", -1e6, 1e6, "Torque that resists positive motion").nominal(1e-2)];
+const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0] }];
 const EQUATION: &str = "f = torque";
 const REFERENCE: &str = "Paper, section 2: T = Tm - Tc";
 
@@ -22,6 +23,7 @@ impl Force for LoadMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        variants: VARIANTS,
     };
 
     #[inline]
@@ -43,6 +45,7 @@ impl Force for LoadTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        variants: VARIANTS,
     };
 
     #[inline]

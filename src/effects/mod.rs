@@ -25,7 +25,7 @@ mod settings;
 mod shapes;
 mod viscous;
 
-pub use info::{EffectInfo, Family, ParameterInfo, Place, Role};
+pub use info::{EffectInfo, Family, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 pub use sensor::{Reading, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};

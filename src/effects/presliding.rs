@@ -4,15 +4,17 @@
 //! TAC 40(3), 1995, with a constant level (Dahl's curve). Over a step the bristle follows the mean velocity exactly:
 //! `z+ = z*exp(-a) + dx*(1 - exp(-a))/a` with `dx = h*(v + v+)/2`, `a = stiffness*|dx|/level`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::size("level", "N.m", 0.0, 1e6, "Friction torque once sliding").nominal(1e-2),
-    ParameterInfo::shape("stiffness", "N.m/rad", 10.0, 1e-9, 1e12, "Stiffness of the bristle before breakaway"),
+    ParameterInfo::shape("stiffness", "N.m/rad", 10.0, 1e-9, 1e12, "Stiffness of the bristle before breakaway")
+        .start(Start::Grid(Scale::Stiffness, &[0.3, 1.0, 3.0, 10.0, 100.0])),
     ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e6, "Damping of the bristle"),
 ];
+const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0, 1] }, Variant { name: "damped", free: &[0, 1, 2] }];
 const EQUATION: &str = "z' = v - stiffness*|v|*z/level; f = stiffness*z + damping*z'";
 const REFERENCE: &str = "Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40(3), 1995";
 
@@ -64,6 +66,7 @@ impl Force for PreslidingMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 1,
+        variants: VARIANTS,
     };
 
     #[inline]
@@ -85,6 +88,7 @@ impl Force for PreslidingTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 1,
+        variants: VARIANTS,
     };
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Quadratic drag: `f = coefficient*w2*|w2|`, the churning of oil or air.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -19,6 +19,7 @@ impl Force for QuadraticDrag {
             ParameterInfo::size("coefficient", "N.m.s2/rad2", 0.0, 1e6, "Drag torque per speed squared").nominal(1e-4)
         ],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     #[inline]

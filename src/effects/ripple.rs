@@ -2,7 +2,7 @@
 //!
 //! `f = -amplitude*sin(order*theta + phase)`: the sign makes the amplitude a torque that drives.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -35,10 +35,12 @@ impl Force for TorqueRipple {
                 1e-6,
                 1e6,
                 "Periods per radian of theta1: harmonic order of the turn",
-            ),
-            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta1 = 0"),
+            )
+            .start(Start::Grid(Scale::Order, &[1.0])),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta1 = 0").start(Start::Phase),
         ],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 
     #[inline]
@@ -61,9 +63,10 @@ impl Force for Unbalance {
         parameters: &[
             ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude: mass times gravity times eccentricity")
                 .nominal(1e-2),
-            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0"),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0").start(Start::Phase),
         ],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0, 1] }],
     };
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Effects on the positions' way out: what the measurement does, not the machine.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::Sensor;
 use crate::scalar::Scalar;
 
@@ -137,8 +137,11 @@ impl Sensor for SensorDelay {
         title: "The table's encoder is read late",
         equation: "theta2 read at t is theta2(t - time)",
         reference: "A delay of both encoders is one of the input; only their difference is a sensor's own",
-        parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay of the reading").nominal(1e-3)],
+        parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay of the reading")
+            .nominal(1e-3)
+            .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0]))],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     fn transform<S: Scalar>(p: &[S], reading: Reading<S>, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
@@ -161,10 +164,16 @@ impl Sensor for LeadError {
         parameters: &[
             ParameterInfo::size("scale", "1", -0.9, 10.0, "Relative error of the pitch").nominal(1e-3),
             ParameterInfo::size("amplitude", "rad", -1e3, 1e3, "Amplitude of the periodic part").nominal(1e-3),
-            ParameterInfo::shape("order", "1/rad", 1.0, 1e-6, 1e6, "Periods per radian of theta2"),
-            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0"),
+            ParameterInfo::shape("order", "1/rad", 1.0, 1e-6, 1e6, "Periods per radian of theta2")
+                .start(Start::Grid(Scale::Order, &[1.0])),
+            ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0").start(Start::Phase),
         ],
         memory: 0,
+        variants: &[
+            Variant { name: "scale", free: &[0] },
+            Variant { name: "periodic", free: &[1, 2, 3] },
+            Variant { name: "scale and periodic", free: &[0, 1, 2, 3] },
+        ],
     };
 
     fn transform<S: Scalar>(p: &[S], r: Reading<S>, _history: &SensorHistory<S>, _dt: f64) -> Reading<S> {
@@ -188,6 +197,7 @@ impl Sensor for EncoderQuantisation {
         reference: "Widrow, Kollar, Quantization Noise, Cambridge 2008",
         parameters: &[ParameterInfo::size("step", "rad", 0.0, 1e3, "Angle of one count").nominal(1e-3)],
         memory: 0,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     fn transform<S: Scalar>(p: &[S], r: Reading<S>, _history: &SensorHistory<S>, _dt: f64) -> Reading<S> {

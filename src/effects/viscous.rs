@@ -1,6 +1,6 @@
 //! Viscous friction to ground: `f = coefficient*(1 + asymmetry*sgn(v))*v`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -8,6 +8,7 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::size("coefficient", "N.m.s/rad", 0.0, 1e6, "Friction torque per speed").nominal(1e-3),
     ParameterInfo::shape("asymmetry", "1", 0.0, -1.0, 1.0, "Share by which forwards is more than the mean"),
 ];
+const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0] }, Variant { name: "asymmetric", free: &[0, 1] }];
 const EQUATION: &str = "f = coefficient*(1 + asymmetry*sgn(v))*v";
 const REFERENCE: &str = "Olsson, Astrom, Canudas de Wit, Gafvert, Lischinsky, European J. Control 4(3), 1998";
 
@@ -30,6 +31,7 @@ impl Force for ViscousMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        variants: VARIANTS,
     };
 
     #[inline]
@@ -51,6 +53,7 @@ impl Force for ViscousTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        variants: VARIANTS,
     };
 
     #[inline]

@@ -1,0 +1,121 @@
+//! What an effect of given parameters does along a known motion: extra torques, or a change of the readings.
+
+use super::model::Model;
+use super::record::Record;
+use super::response::{Column, Responder, States, Torques};
+use crate::axis::Structure;
+use crate::effects::{
+    ActiveEffects, Base, Effect, MEMORY, Motion, Place, Ramp, Reading, SensorHistory, Settings, StepMotion,
+    TorqueHistory,
+};
+
+/// The regression's column of one effect as set in `settings` (every other effect off).
+#[must_use]
+pub fn column(
+    effect: Effect,
+    settings: &Settings,
+    model: &Model,
+    record: &Record,
+    states: &States,
+    responder: &Responder<'_>,
+) -> Column {
+    let on = settings.active_with(&[effect]);
+    if effect.is_input() {
+        responder.torques(&input_torques(settings, &on, record))
+    } else if effect.is_sensor() {
+        let change = sensor_change(settings, &on, record, states);
+        responder.readings(|k| change[k])
+    } else {
+        responder.torques(&force_torques(effect, settings, &on, model, record, states))
+    }
+}
+
+fn input_torques(settings: &Settings, on: &ActiveEffects, record: &Record) -> Torques {
+    let mut history = TorqueHistory::settled(record.torque.first().copied().unwrap_or_default());
+    (0..record.len())
+        .map(|k| {
+            let given: Ramp<f64> = record.hold.ramp(&record.torque, k);
+            let got = settings.transform_input(on, given, record.dt, &mut history);
+            [Ramp { start: got.start - given.start, end: got.end - given.end }, Ramp::default()]
+        })
+        .collect()
+}
+
+fn sensor_change(settings: &Settings, on: &ActiveEffects, record: &Record, states: &States) -> Vec<[f64; 4]> {
+    let reading = |k: usize| {
+        let [theta1, omega1, theta2, omega2] = states.motion[k];
+        Reading { theta1, omega1, theta2, omega2 }
+    };
+    let mut history = SensorHistory::settled(reading(0), record.dt);
+    (0..record.len())
+        .map(|k| {
+            if k > 0 {
+                history.push(reading(k));
+            }
+            let got = settings.transform_sensor(on, &history, record.dt);
+            let was = history.now();
+            [got.theta1 - was.theta1, got.omega1 - was.omega1, got.theta2 - was.theta2, got.omega2 - was.omega2]
+        })
+        .collect()
+}
+
+/// Motion of motor, table and twist at a sample.
+fn motions(states: &States, k: usize) -> [Motion<f64>; 3] {
+    let [theta1, omega1, theta2, omega2] = states.motion[k];
+    [
+        Motion { x: theta1, v: omega1 },
+        Motion { x: theta2, v: omega2 },
+        Motion { x: theta1 - theta2, v: omega1 - omega2 },
+    ]
+}
+
+fn force_torques(
+    effect: Effect,
+    settings: &Settings,
+    on: &ActiveEffects,
+    model: &Model,
+    record: &Record,
+    states: &States,
+) -> Torques {
+    let base = match model.structure {
+        Structure::TwoInertia => Base { k: model.parameters.k, b: model.parameters.b },
+        Structure::Rigid => Base { k: 0.0, b: 0.0 },
+    };
+    let mut memory = [0.0; MEMORY];
+    let place = effect.info().place;
+    let at: Vec<[f64; 2]> = (0..record.len())
+        .map(|k| {
+            let time = record.time(k);
+            let end = motions(states, k);
+            if effect.is_dry() {
+                let coordinate = usize::from(place == Place::Table);
+                let v = end[coordinate].v;
+                let direction = v.signum();
+                let level = settings.dry_level(on, place, direction, v.abs(), time).0;
+                let mut torque = [0.0; 2];
+                torque[coordinate] = -level * direction;
+                return torque;
+            }
+            let start = motions(states, k.saturating_sub(1));
+            let gap = settings.of(Effect::Backlash)[0];
+            let d = end[2].x;
+            let contact = if d > gap { 1 } else { -i8::from(d < -gap) };
+            let step =
+                StepMotion { start, end, time, h: if k == 0 { 0.0 } else { record.dt }, contact };
+            let forces = settings.forces(on, &base, &step, &mut memory);
+            [-forces.torque[0], -forces.torque[1]]
+        })
+        .collect();
+    ramps(&at)
+}
+
+/// Torques known at the samples, straight lines between.
+#[must_use]
+pub fn ramps(at: &[[f64; 2]]) -> Torques {
+    (0..at.len())
+        .map(|k| {
+            let next = at.get(k + 1).unwrap_or(&at[k]);
+            [Ramp { start: at[k][0], end: next[0] }, Ramp { start: at[k][1], end: next[1] }]
+        })
+        .collect()
+}

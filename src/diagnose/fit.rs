@@ -1,0 +1,305 @@
+//! Output error over windows: the parameters and every window's initial state, by Levenberg-Marquardt with exact
+//! derivatives (forward mode), under priors on the nominal parameters.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::{Coordinate, Free, Model};
+use super::record::Record;
+use super::windows::{self, Window, local_count, local_state};
+use crate::effects::Effect;
+use crate::identify::levenberg::{self, Normal, Options, Problem, Termination};
+use crate::scalar::{Dual, Scalar};
+
+/// Prior standard deviation of the logarithm of a nominal parameter: a machine's data sheet is seldom off by more than
+/// a factor of two.
+const PRIOR: f64 = 0.5;
+/// Weight of the prior that ties I2, B and K together (their common factor is weakly determined; PAPER, 4.3).
+const SCALE_PRIOR: f64 = 0.3;
+
+/// Data of a fit: the record and its windows.
+#[derive(Debug, Clone, Copy)]
+pub struct Data<'a> {
+    /// The record.
+    pub record: &'a Record,
+    /// The windows compared.
+    pub windows: &'a [Window],
+}
+
+impl Data<'_> {
+    /// Number of compared values.
+    #[must_use]
+    pub fn values(&self) -> usize {
+        let channels = self.record.channels.iter().flatten().count();
+        self.windows.iter().map(|w| w.compared.len()).sum::<usize>() * channels
+    }
+}
+
+/// A fitted model.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// The model at the minimum.
+    pub model: Model,
+    /// What was free, with its coordinate.
+    pub coordinates: Vec<Coordinate>,
+    /// Standard error of each free value, in its unit, at unit noise.
+    pub std: Vec<f64>,
+    /// Initial state of each window.
+    pub initial: Vec<[f64; 4]>,
+    /// Sum of squared residuals in units of the noise, without the prior.
+    pub chi2: f64,
+    /// Squared residuals of each channel, summed, in its unit.
+    pub squares: [f64; 4],
+    /// How the minimisation ended.
+    pub termination: Termination,
+    /// Linearisations it took.
+    pub iterations: usize,
+}
+
+/// Sum of squares by channel, and in units of the noise.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    chi2: f64,
+    squares: [f64; 4],
+}
+
+struct Shooting<'a> {
+    data: Data<'a>,
+    start: Model,
+    coordinates: &'a [Coordinate],
+    also: Vec<Effect>,
+    per: usize,
+    locals: usize,
+    /// Prior mean of each coordinate that has one, in x.
+    prior: Vec<Option<f64>>,
+}
+
+impl Shooting<'_> {
+    fn local<'v>(&self, p: &'v DVector<f64>, w: usize) -> &'v [f64] {
+        let from = self.coordinates.len() + w * self.locals;
+        &p.as_slice()[from..from + self.locals]
+    }
+
+    fn sum(&self, p: &DVector<f64>) -> Sum {
+        let x = &p.as_slice()[..self.coordinates.len()];
+        let model = self.start.at(self.coordinates, x);
+        let record = self.data.record;
+        let weight = record.noise.map(|s| 1.0 / s);
+        let mut sum = Sum::default();
+        windows::run(
+            &model,
+            &self.also,
+            self.per,
+            record,
+            self.data.windows,
+            |w| local_state(model.structure, self.local(p, w)),
+            |m| m,
+            |_, k, reading| {
+                let model = [reading.theta1, reading.omega1, reading.theta2, reading.omega2];
+                for (c, channel) in record.channels.iter().enumerate() {
+                    if let Some(channel) = channel {
+                        let r = model[c] - channel[k];
+                        sum.squares[c] += r * r;
+                        sum.chi2 += (r * weight[c]) * (r * weight[c]);
+                    }
+                }
+            },
+        );
+        sum
+    }
+
+    /// Residuals of the prior: each nominal parameter's, and the common factor of I2, B, K.
+    fn prior_rows(&self, x: &[f64]) -> Vec<(f64, Vec<f64>)> {
+        let n = self.coordinates.len();
+        let mut rows = Vec::new();
+        let mut common = (0.0, vec![0.0; n], 0);
+        for (i, mean) in self.prior.iter().enumerate() {
+            let Some(mean) = mean else { continue };
+            let mut row = vec![0.0; n];
+            row[i] = 1.0 / PRIOR;
+            rows.push(((x[i] - mean) / PRIOR, row));
+            use super::model::BaseParameter::{B, I2, K};
+            if matches!(self.coordinates[i].free, Free::Base(I2 | B | K)) {
+                common.0 += (x[i] - mean) / (3.0 * SCALE_PRIOR);
+                common.1[i] = 1.0 / (3.0 * SCALE_PRIOR);
+                common.2 += 1;
+            }
+        }
+        if common.2 == 3 {
+            rows.push((common.0, common.1));
+        }
+        rows
+    }
+
+    fn linearise_with<const N: usize>(&self, p: &DVector<f64>) -> Normal {
+        let n = self.coordinates.len();
+        let x: Vec<Dual<N>> = (0..n).map(|i| Dual::variable(p[i], i)).collect();
+        let model = self.start.at(self.coordinates, &x);
+        let record = self.data.record;
+        let weight = record.noise.map(|s| 1.0 / s);
+        let locals = self.locals;
+        let m = n + locals;
+        // One small normal matrix a window, over the shared parameters and the window's own initial state.
+        let mut small = vec![([[0.0; N]; N], [0.0; N]); self.data.windows.len()];
+        let mut chi2 = 0.0;
+        windows::run(
+            &model,
+            &self.also,
+            self.per,
+            record,
+            self.data.windows,
+            |w| {
+                let own = self.local(p, w);
+                let own: Vec<Dual<N>> = (0..locals).map(|i| Dual::variable(own[i], n + i)).collect();
+                local_state(model.structure, &own)
+            },
+            |mut d| {
+                d.eps[n..m].fill(0.0);
+                d
+            },
+            |w, k, reading| {
+                let model = [reading.theta1, reading.omega1, reading.theta2, reading.omega2];
+                let (matrix, gradient) = &mut small[w];
+                for (c, channel) in record.channels.iter().enumerate() {
+                    if let Some(channel) = channel {
+                        let r = (model[c].re - channel[k]) * weight[c];
+                        let row = model[c].eps.map(|e| e * weight[c]);
+                        chi2 += r * r;
+                        for i in 0..N {
+                            let a = row[i];
+                            gradient[i] += a * r;
+                            for (to, b) in matrix[i].iter_mut().zip(&row) {
+                                *to += a * b;
+                            }
+                        }
+                    }
+                }
+            },
+        );
+        let total = n + locals * self.data.windows.len();
+        let mut normal = Normal { cost: 0.5 * chi2, gradient: DVector::zeros(total), curvature: DMatrix::zeros(total, total) };
+        for (w, (matrix, gradient)) in small.iter().enumerate() {
+            let at = |i: usize| if i < n { i } else { n + w * locals + (i - n) };
+            for i in 0..m {
+                normal.gradient[at(i)] += gradient[i];
+                for j in 0..m {
+                    normal.curvature[(at(i), at(j))] += matrix[i][j];
+                }
+            }
+        }
+        for (r, row) in self.prior_rows(&p.as_slice()[..n]) {
+            normal.cost += 0.5 * r * r;
+            for i in 0..n {
+                normal.gradient[i] += row[i] * r;
+                for j in 0..n {
+                    normal.curvature[(i, j)] += row[i] * row[j];
+                }
+            }
+        }
+        normal
+    }
+}
+
+impl Problem for Shooting<'_> {
+    fn cost(&self, p: &DVector<f64>) -> Option<f64> {
+        let prior: f64 = self.prior_rows(&p.as_slice()[..self.coordinates.len()]).iter().map(|(r, _)| r * r).sum();
+        Some(0.5 * (self.sum(p).chi2 + prior))
+    }
+
+    fn linearise(&self, p: &DVector<f64>) -> Option<Normal> {
+        // The derivative directions are a compile-time number: the next size up.
+        match self.coordinates.len() + self.locals {
+            0..=4 => Some(self.linearise_with::<4>(p)),
+            5..=8 => Some(self.linearise_with::<8>(p)),
+            9..=12 => Some(self.linearise_with::<12>(p)),
+            13..=16 => Some(self.linearise_with::<16>(p)),
+            17..=24 => Some(self.linearise_with::<24>(p)),
+            _ => None,
+        }
+    }
+}
+
+/// Fits the free numbers of `start`, and the windows' initial states from `initial`.
+///
+/// `nominal` gives the priors' means. `iterations` bounds the linearisations.
+#[must_use]
+pub fn fit(data: Data<'_>, nominal: &Model, start: &Model, free: &[Free], initial: &[[f64; 4]], iterations: usize) -> Fitted {
+    let coordinates: Vec<Coordinate> = free.iter().map(|f| Coordinate::new(*f, start)).collect();
+    let prior = coordinates
+        .iter()
+        .map(|c| matches!(c.free, Free::Base(_)).then(|| c.x(nominal)))
+        .collect();
+    let mut also: Vec<Effect> = free
+        .iter()
+        .filter_map(|f| match f {
+            Free::Effect(e, _) => Some(*e),
+            Free::Base(_) => None,
+        })
+        .collect();
+    also.dedup();
+    let locals = local_count(start.structure);
+    let problem = Shooting {
+        data,
+        start: *start,
+        coordinates: &coordinates,
+        also,
+        per: windows::steps(start, data.record),
+        locals,
+        prior,
+    };
+    let n = coordinates.len();
+    let total = n + locals * data.windows.len();
+    let mut p = DVector::zeros(total);
+    for (i, c) in coordinates.iter().enumerate() {
+        p[i] = c.x(start);
+    }
+    for (w, s) in initial.iter().enumerate() {
+        p.as_mut_slice()[n + w * locals..n + (w + 1) * locals].copy_from_slice(&s[..locals]);
+    }
+    let options = Options {
+        iterations,
+        cost: 1e-5,
+        step: 1e-9,
+        gradient: 1e-9,
+        lower: (0..total).map(|i| coordinates.get(i).map_or(f64::NEG_INFINITY, |c| c.bounds[0])).collect(),
+        upper: (0..total).map(|i| coordinates.get(i).map_or(f64::INFINITY, |c| c.bounds[1])).collect(),
+        ..Options::default()
+    };
+    let report = levenberg::minimise(&problem, &p, &options);
+    let sum = problem.sum(&report.parameters);
+    let std = shared_std(&report.normal.curvature, n, &coordinates, report.parameters.as_slice());
+    let x = &report.parameters.as_slice()[..n];
+    Fitted {
+        model: start.at(&coordinates, x),
+        std,
+        initial: (0..data.windows.len()).map(|w| local_state(start.structure, problem.local(&report.parameters, w))).collect(),
+        chi2: sum.chi2,
+        squares: sum.squares,
+        termination: report.termination,
+        iterations: report.iterations,
+        coordinates,
+    }
+}
+
+/// Standard errors of the shared parameters, the windows' initial states marginalised.
+fn shared_std(curvature: &DMatrix<f64>, n: usize, coordinates: &[Coordinate], x: &[f64]) -> Vec<f64> {
+    let (covariance, _) = levenberg::covariance(curvature);
+    (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt() * coordinates[i].slope(x[i]).abs()).collect()
+}
+
+/// The model's readings at every compared sample of the windows, from the given initial states: per channel, with the
+/// sample's index first.
+#[must_use]
+pub fn predict(data: Data<'_>, model: &Model, initial: &[[f64; 4]]) -> Vec<(usize, [f64; 4])> {
+    let mut out = Vec::with_capacity(data.windows.iter().map(|w| w.compared.len()).sum());
+    windows::run(
+        model,
+        &[],
+        windows::steps(model, data.record),
+        data.record,
+        data.windows,
+        |w| initial[w],
+        |m: f64| m,
+        |_, k, r| out.push((k, [r.theta1.re(), r.omega1.re(), r.theta2.re(), r.omega2.re()])),
+    );
+    out
+}

@@ -1,0 +1,171 @@
+//! A model under test: parameters, structure, effects; and which of its numbers a fit may move.
+
+use crate::axis::{Parameters, Structure};
+use crate::effects::{Effect, Role, Settings};
+use crate::scalar::Scalar;
+
+/// The axis with its effects, as numbers of one kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Model<S = f64> {
+    /// Nominal or fitted parameters.
+    pub parameters: Parameters<S>,
+    /// One inertia or two.
+    pub structure: Structure,
+    /// The effects' parameters.
+    pub effects: Settings<S>,
+}
+
+/// A parameter of the nominal axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BaseParameter {
+    /// Inertia of the motor.
+    I1,
+    /// Inertia of the table.
+    I2,
+    /// Damping.
+    B,
+    /// Stiffness.
+    K,
+}
+
+impl BaseParameter {
+    /// Those that the structure has.
+    #[must_use]
+    pub const fn of(structure: Structure) -> &'static [Self] {
+        match structure {
+            Structure::TwoInertia => &[Self::I1, Self::I2, Self::B, Self::K],
+            Structure::Rigid => &[Self::I1],
+        }
+    }
+
+    /// Name as in axis.toml.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::I1 => "I1",
+            Self::I2 => "I2",
+            Self::B => "B",
+            Self::K => "K",
+        }
+    }
+
+    /// Its place in the parameters.
+    pub fn slot<S>(self, p: &mut Parameters<S>) -> &mut S {
+        match self {
+            Self::I1 => &mut p.i1,
+            Self::I2 => &mut p.i2,
+            Self::B => &mut p.b,
+            Self::K => &mut p.k,
+        }
+    }
+
+    /// Its value.
+    pub fn value<S: Copy>(self, p: &Parameters<S>) -> S {
+        match self {
+            Self::I1 => p.i1,
+            Self::I2 => p.i2,
+            Self::B => p.b,
+            Self::K => p.k,
+        }
+    }
+}
+
+/// A number that a fit may move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Free {
+    /// Of the nominal axis.
+    Base(BaseParameter),
+    /// Of an effect: which parameter.
+    Effect(Effect, usize),
+}
+
+/// How a free number is moved: `value = exp(x)*unit` or `value = x*unit`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coordinate {
+    /// Which number.
+    pub free: Free,
+    /// Whether x is the logarithm.
+    pub log: bool,
+    /// Value of x = 1 (or of exp(x) = 1).
+    pub unit: f64,
+    /// Bounds of x.
+    pub bounds: [f64; 2],
+}
+
+impl Coordinate {
+    /// The coordinate of a free number around its present value in the model.
+    #[must_use]
+    pub fn new(free: Free, model: &Model) -> Self {
+        match free {
+            Free::Base(p) => {
+                let value = p.value(&model.parameters);
+                // A damping of zero cannot be scaled: a small share of the critical one stands for it.
+                let unit = if value > 0.0 { value } else { model.small_damping() };
+                Self { free, log: true, unit, bounds: [-6.0, 6.0] }
+            }
+            Free::Effect(effect, i) => {
+                let info = &effect.info().parameters[i];
+                let value = model.effects.of(effect)[i];
+                let log = info.role == Role::Shape && info.min > 0.0;
+                let unit = if value.abs() > 0.0 && value.abs() < 1e6 { value.abs() } else { info.nominal };
+                let bounds = if log {
+                    [(info.min / unit).ln(), (info.max / unit).ln()]
+                } else {
+                    [info.min / unit, info.max / unit]
+                };
+                Self { free, log, unit, bounds }
+            }
+        }
+    }
+
+    /// x of the model's present value.
+    #[must_use]
+    pub fn x(&self, model: &Model) -> f64 {
+        let value = self.value(model);
+        if self.log { (value.max(1e-300) / self.unit).ln().clamp(self.bounds[0], self.bounds[1]) } else { value / self.unit }
+    }
+
+    /// The model's present value.
+    #[must_use]
+    pub fn value(&self, model: &Model) -> f64 {
+        match self.free {
+            Free::Base(p) => p.value(&model.parameters),
+            Free::Effect(e, i) => model.effects.of(e)[i],
+        }
+    }
+
+    /// The value at x.
+    pub fn at<S: Scalar>(&self, x: S) -> S {
+        if self.log { x.exp() * self.unit } else { x * self.unit }
+    }
+
+    /// d value / d x, for standard errors.
+    #[must_use]
+    pub fn slope(&self, x: f64) -> f64 {
+        if self.log { x.exp() * self.unit } else { self.unit }
+    }
+}
+
+impl Model {
+    /// One hundredth of the critical damping.
+    fn small_damping(&self) -> f64 {
+        let p = &self.parameters;
+        0.02 * (p.k / p.twist_mobility()).sqrt()
+    }
+
+    /// The model at coordinates `x`, over the scalar of x.
+    pub fn at<S: Scalar>(&self, coordinates: &[Coordinate], x: &[S]) -> Model<S> {
+        let mut model = Model {
+            parameters: Parameters::lift(&self.parameters),
+            structure: self.structure,
+            effects: Settings::lift(&self.effects),
+        };
+        for (c, &x) in coordinates.iter().zip(x) {
+            match c.free {
+                Free::Base(p) => *p.slot(&mut model.parameters) = c.at(x),
+                Free::Effect(e, i) => model.effects.of_mut(e)[i] = c.at(x),
+            }
+        }
+        model
+    }
+}

@@ -1,0 +1,368 @@
+//! Screening: every effect, at every start its parameters name, by linear regression along the measured motion.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::features;
+use super::model::{BaseParameter, Model};
+use super::record::Record;
+use super::response::{Column, Responder, States, dot};
+use super::windows::Window;
+use crate::axis::Structure;
+use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
+
+/// Prior standard deviation of a relative error of a nominal parameter.
+const PRIOR: f64 = 0.3;
+/// Most orders or frequencies tried.
+const MOST_LINES: usize = 600;
+
+/// An effect at a start that the regression found, and what the regression leaves.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: Effect,
+    /// Which of its variants.
+    pub variant: usize,
+    /// Its parameters, all other effects as in the model under test.
+    pub settings: Settings,
+    /// Sum of squares that the regression leaves, in units of the noise.
+    pub chi2: f64,
+}
+
+/// The regression along one record.
+pub struct Screen<'a> {
+    model: &'a Model,
+    record: &'a Record,
+    states: &'a States,
+    responder: Responder<'a>,
+    residual: Column,
+    /// Columns that every hypothesis has: errors of the nominal parameters, and effects already found.
+    common: Vec<Column>,
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    scales: Scales,
+}
+
+impl<'a> Screen<'a> {
+    /// Prepares the regression; `found` are effects already taken as part of the model, refitted beside each candidate.
+    #[must_use]
+    pub fn new(model: &'a Model, record: &'a Record, windows: &'a [Window], states: &'a States, found: &[Effect]) -> Self {
+        let responder = Responder::new(model, record, windows);
+        let residual = responder.residual();
+        let mut common: Vec<Column> = BaseParameter::of(model.structure)
+            .iter()
+            .map(|p| responder.torques(&base_torques(*p, model, states)))
+            .collect();
+        for effect in found {
+            let mut alone = Settings::default();
+            alone.of_mut(*effect).copy_from_slice(model.effects.of(*effect));
+            common.push(features::column(*effect, &alone, model, record, states, &responder));
+        }
+        let n = common.len();
+        let mut gram = DMatrix::from_fn(n, n, |i, j| dot(&common[i], &common[j]));
+        let mut right = DVector::from_fn(n, |i, _| dot(&common[i], &residual));
+        for i in 0..n {
+            gram[(i, i)] += PRIOR.powi(-2);
+            if i >= BaseParameter::of(model.structure).len() {
+                // An effect already found has its size as prior mean.
+                right[i] += PRIOR.powi(-2);
+            }
+        }
+        let scales = Scales::new(model, record, states);
+        Self { model, record, states, responder, residual, common, gram, right, scales }
+    }
+
+    /// What the nominal parameters alone leave.
+    #[must_use]
+    pub fn parameters_only(&self) -> f64 {
+        self.solve(&[]).0
+    }
+
+    /// The best starts of an effect's variant, best first, at most `most`.
+    #[must_use]
+    pub fn starts(&self, effect: Effect, variant: usize, most: usize) -> Vec<Candidate> {
+        let form = &effect.info().variants[variant];
+        let trials = self.scales.trials(effect, form, self.model);
+        let mut found: Vec<Candidate> = trials
+            .par_iter()
+            .filter_map(|trial| self.regress(effect, variant, form, trial))
+            .collect();
+        found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        found.truncate(most);
+        found
+    }
+
+    fn regress(&self, effect: Effect, variant: usize, form: &Variant, trial: &Trial) -> Option<Candidate> {
+        let info = effect.info();
+        let mut columns = Vec::new();
+        let mut linear = Vec::new();
+        let column = |settings: &Settings| {
+            features::column(effect, settings, self.model, self.record, self.states, &self.responder)
+        };
+        for &i in form.free {
+            if info.parameters[i].start != Start::Linear {
+                continue;
+            }
+            let mut unit = trial.settings;
+            for &j in form.free {
+                if info.parameters[j].start == Start::Linear {
+                    unit.of_mut(effect)[j] = info.parameters[j].off;
+                }
+            }
+            unit.of_mut(effect)[i] = info.parameters[i].off + 1.0;
+            let phase = form.free.iter().copied().find(|&j| info.parameters[j].start == Start::Phase);
+            columns.push(column(&unit));
+            linear.push(i);
+            if let Some(phase) = phase.filter(|_| info.parameters[i].name == "amplitude") {
+                unit.of_mut(effect)[phase] = std::f64::consts::FRAC_PI_2;
+                columns.push(column(&unit));
+                linear.push(phase);
+            }
+        }
+        let nonlinear = columns.is_empty();
+        if nonlinear {
+            columns.push(column(&trial.settings));
+        }
+        let (chi2, sizes) = self.solve(&columns);
+        let mut settings = self.model.effects;
+        settings.of_mut(effect).copy_from_slice(trial.settings.of(effect));
+        if nonlinear {
+            let c = sizes[0];
+            // A start in the wrong direction, or far off, is none; its neighbour on the grid will do.
+            if !(0.05..=20.0).contains(&c) {
+                return None;
+            }
+            trial.rescale(effect, &mut settings, c, &self.scales);
+        } else {
+            let p = settings.of_mut(effect);
+            for (n, &i) in linear.iter().enumerate() {
+                if info.parameters[i].start == Start::Phase {
+                    let (s, c) = (sizes[n], sizes[n - 1]);
+                    p[linear[n - 1]] = s.hypot(c);
+                    p[i] = s.atan2(c);
+                } else {
+                    p[i] = info.parameters[i].off + sizes[n];
+                }
+            }
+        }
+        for (value, info) in settings.of_mut(effect).iter_mut().zip(info.parameters) {
+            *value = value.clamp(info.min, info.max);
+        }
+        settings.is_on(effect).then_some(Candidate { effect, variant, settings, chi2 })
+    }
+
+    /// Regression on the common columns and these: what is left, and the sizes of these.
+    fn solve(&self, columns: &[Column]) -> (f64, Vec<f64>) {
+        let (n, m) = (self.common.len(), columns.len());
+        let mut gram = DMatrix::zeros(n + m, n + m);
+        gram.view_mut((0, 0), (n, n)).copy_from(&self.gram);
+        let mut right = DVector::zeros(n + m);
+        right.rows_mut(0, n).copy_from(&self.right);
+        for (j, column) in columns.iter().enumerate() {
+            for (i, other) in self.common.iter().chain(columns).enumerate() {
+                let product = dot(column, other);
+                gram[(i, n + j)] = product;
+                gram[(n + j, i)] = product;
+            }
+            right[n + j] = dot(column, &self.residual);
+        }
+        let scale = DVector::from_fn(n + m, |i, _| gram[(i, i)].max(1e-300_f64).sqrt());
+        let scaled = DMatrix::from_fn(n + m, n + m, |i, j| {
+            gram[(i, j)] / (scale[i] * scale[j]) + if i == j { 1e-12 } else { 0.0 }
+        });
+        let target = right.component_div(&scale);
+        let total = dot(&self.residual, &self.residual);
+        match scaled.cholesky() {
+            Some(factor) => {
+                let x = factor.solve(&target);
+                let chi2 = total - target.dot(&x);
+                (chi2, (0..m).map(|j| x[n + j] / scale[n + j]).collect())
+            }
+            None => (total, vec![0.0; m]),
+        }
+    }
+}
+
+/// Torques that stand for a relative error of a nominal parameter, along the motion.
+fn base_torques(p: BaseParameter, model: &Model, states: &States) -> super::response::Torques {
+    let at: Vec<[f64; 2]> = states
+        .motion
+        .iter()
+        .zip(&states.acceleration)
+        .map(|(s, a)| {
+            let q = &model.parameters;
+            match p {
+                BaseParameter::I1 => [-q.i1 * a[0], 0.0],
+                BaseParameter::I2 => [0.0, -q.i2 * a[1]],
+                BaseParameter::B => {
+                    let c = q.b * (s[1] - s[3]);
+                    [-c, c]
+                }
+                BaseParameter::K => {
+                    let c = q.k * (s[0] - s[2]);
+                    [-c, c]
+                }
+            }
+        })
+        .collect();
+    features::ramps(&at)
+}
+
+/// Shapes of an effect to be tried, with the fractions they came from.
+struct Trial {
+    settings: Settings,
+    fractions: Vec<(usize, Scale, f64)>,
+}
+
+impl Trial {
+    /// Takes the regression's factor into a size that it was found at.
+    fn rescale(&self, effect: Effect, settings: &mut Settings, c: f64, scales: &Scales) {
+        for &(i, scale, _) in &self.fractions {
+            if matches!(scale, Scale::Sample | Scale::Inertia) {
+                settings.of_mut(effect)[i] *= c.clamp(0.2, 5.0);
+            }
+        }
+        // Shapes that hang on the size follow it.
+        for &(i, scale, fraction) in &self.fractions {
+            if matches!(scale, Scale::Mode | Scale::One) && effect == Effect::FlexibleMode {
+                settings.of_mut(effect)[i] = scales.value(effect, i, scale, fraction, settings);
+            }
+        }
+    }
+}
+
+/// Scales of the record.
+struct Scales {
+    speed: [f64; 2],
+    twist: f64,
+    torque: f64,
+    stiffness: [f64; 2],
+    dt: f64,
+    mode: f64,
+    inertia: f64,
+    orders: [Vec<f64>; 2],
+    frequencies: Vec<f64>,
+    travel: Vec<f64>,
+}
+
+impl Scales {
+    fn new(model: &Model, record: &Record, states: &States) -> Self {
+        let rms = |f: &dyn Fn(&[f64; 4]) -> f64| {
+            (states.motion.iter().map(|s| f(s).powi(2)).sum::<f64>() / states.motion.len() as f64).sqrt()
+        };
+        let p = &model.parameters;
+        let rms_torque = (record.torque.iter().map(|t| t * t).sum::<f64>() / record.len() as f64).sqrt();
+        let speed = [rms(&|s| s[1]), rms(&|s| s[3])];
+        let swing = |i: usize| {
+            let mut from = states.motion[0][i];
+            let mut direction = 0.0;
+            let mut swings = Vec::new();
+            for pair in states.motion.windows(2) {
+                let v = pair[1][i + 1];
+                if v.signum() != direction {
+                    swings.push((pair[1][i] - from).abs());
+                    from = pair[1][i];
+                    direction = v.signum();
+                }
+            }
+            swings.sort_by(f64::total_cmp);
+            swings.get(swings.len() / 2).copied().unwrap_or(1.0).max(1e-12)
+        };
+        let span = |i: usize| {
+            let (low, high) = states.motion.iter().fold((f64::MAX, f64::MIN), |(l, h), s| (l.min(s[i]), h.max(s[i])));
+            high - low
+        };
+        let orders = |i: usize, speed: f64| {
+            let step = 0.25 * std::f64::consts::TAU / span(i).max(1e-12);
+            let most = 0.5 / (record.dt * speed.max(1e-12));
+            lines(step, most)
+        };
+        let length = record.len() as f64 * record.dt;
+        let mut travel: Vec<f64> = states.motion.iter().map(|s| s[2]).collect();
+        travel.sort_by(f64::total_cmp);
+        let mode = match model.structure {
+            Structure::TwoInertia => p.modal().wn,
+            Structure::Rigid => std::f64::consts::TAU * 0.05 / record.dt,
+        };
+        Self {
+            orders: [orders(0, speed[0]), orders(2, speed[1])],
+            speed,
+            twist: rms(&|s| s[0] - s[2]),
+            torque: record.torque.iter().fold(0.0, |m, t| t.abs().max(m)),
+            stiffness: [rms_torque / swing(0), rms_torque / swing(2)],
+            dt: record.dt,
+            mode,
+            inertia: p.i1 + p.i2,
+            frequencies: lines(0.5 / length, 0.25 / record.dt),
+            travel,
+        }
+    }
+
+    fn value(&self, effect: Effect, i: usize, scale: Scale, fraction: f64, settings: &Settings) -> f64 {
+        let side = usize::from(effect.info().place == Place::Table);
+        match scale {
+            Scale::One if effect == Effect::FlexibleMode => {
+                // A damping ratio.
+                let p = settings.of(effect);
+                2.0 * fraction * (p[0] * p[1]).sqrt()
+            }
+            Scale::One | Scale::Order | Scale::Frequency => fraction,
+            Scale::Speed => fraction * self.speed[side],
+            Scale::Twist => fraction * self.twist,
+            Scale::Torque => fraction * self.torque,
+            Scale::Stiffness => fraction * self.stiffness[side],
+            Scale::Sample => fraction * self.dt,
+            Scale::Mode => {
+                let w = fraction * self.mode;
+                settings.of(effect)[0] * w * w
+            }
+            Scale::Inertia => fraction * self.inertia,
+            Scale::Travel => {
+                let _ = i;
+                let n = self.travel.len();
+                self.travel[((n - 1) as f64 * fraction) as usize]
+            }
+        }
+    }
+
+    /// Every combination of the starts of the variant's free parameters.
+    fn trials(&self, effect: Effect, form: &Variant, model: &Model) -> Vec<Trial> {
+        let info = effect.info();
+        let mut trials = vec![Trial { settings: Settings::default(), fractions: Vec::new() }];
+        let _ = model;
+        // Sizes first: shapes may hang on them.
+        let mut order: Vec<usize> = form.free.to_vec();
+        order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
+        for i in order {
+            let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
+            let lines;
+            let fractions: &[f64] = match scale {
+                Scale::Order => {
+                    lines = &self.orders[usize::from(info.place != Place::Motor)];
+                    lines
+                }
+                Scale::Frequency => &self.frequencies,
+                _ => fractions,
+            };
+            trials = trials
+                .iter()
+                .flat_map(|t| {
+                    fractions.iter().map(|&fraction| {
+                        let mut settings = t.settings;
+                        settings.of_mut(effect)[i] = self.value(effect, i, scale, fraction, &settings);
+                        let mut all = t.fractions.clone();
+                        all.push((i, scale, fraction));
+                        Trial { settings, fractions: all }
+                    })
+                })
+                .collect();
+        }
+        trials
+    }
+}
+
+/// `step, 2*step, ...` up to `most`, thinned to a bearable number by geometric growth at the far end.
+fn lines(step: f64, most: f64) -> Vec<f64> {
+    let count = (most / step).floor().max(1.0) as usize;
+    (1..=count.min(MOST_LINES)).map(|n| n as f64 * step).collect()
+}

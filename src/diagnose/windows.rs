@@ -1,0 +1,187 @@
+//! The record cut into windows, and a model run over them, each from its own initial state (multiple shooting).
+//!
+//! The free rigid-body mode makes a simulation of the whole record lose its phase; windows of some hundred samples with
+//! their own initial states do not. A window begins a few samples before the part that is compared, so that what an
+//! effect remembers (a late sensor) has come into being by then. Internal states of effects run on from window to
+//! window; the torque's own effects (delay, lag, limit) run along the whole record.
+
+use std::ops::Range;
+
+use super::model::Model;
+use super::record::Record;
+use crate::axis::{Axis, Hold, Scheme, Structure, substeps};
+use crate::effects::{Effect, MEMORY, Memory, Ramp, Reading, SensorHistory, TorqueHistory};
+use crate::scalar::Scalar;
+
+/// Samples in a window that are compared.
+pub const LENGTH: usize = 512;
+/// Samples before them.
+const WARM: usize = 12;
+/// Windows fitted at most: a longer record is sampled by so many, spread evenly.
+const MOST: usize = 64;
+
+/// One window.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Window {
+    /// First sample simulated.
+    pub begin: usize,
+    /// The samples compared.
+    pub compared: Range<usize>,
+}
+
+/// Cuts a part of the record into windows.
+#[must_use]
+pub fn cut(part: Range<usize>) -> Vec<Window> {
+    let usable = part.len().saturating_sub(WARM);
+    let count = (usable as f64 / LENGTH as f64).round().max(1.0) as usize;
+    let length = usable / count;
+    let all = (0..count).map(|w| {
+        let from = part.start + WARM + w * length;
+        let to = if w + 1 == count { part.end } else { from + length };
+        Window { begin: from - WARM.min(from - part.start), compared: from..to }
+    });
+    if count <= MOST {
+        return all.collect();
+    }
+    let all: Vec<Window> = all.collect();
+    (0..MOST).map(|i| all[i * count / MOST].clone()).collect()
+}
+
+/// Steps a sample the model needs, at its present parameters.
+#[must_use]
+pub fn steps(model: &Model, record: &Record) -> usize {
+    substeps(&model.parameters, model.structure, &model.effects, record.dt)
+}
+
+/// Runs the model over the windows; `visit(window, sample, reading)` for every compared sample.
+///
+/// `initial`: angles and speeds at the beginning of each window. `also`: effects taken as on whatever their size.
+/// `forget` drops what internal states know of the window they come from (derivatives to its initial state).
+#[allow(clippy::too_many_arguments)]
+pub fn run<S: Scalar>(
+    model: &Model<S>,
+    also: &[Effect],
+    per: usize,
+    record: &Record,
+    windows: &[Window],
+    initial: impl Fn(usize) -> [S; 4],
+    forget: impl Fn(S) -> S,
+    mut visit: impl FnMut(usize, usize, &Reading<S>),
+) {
+    let h = record.dt / per as f64;
+    let axis = Axis::with_on(model.parameters, model.structure, model.effects, also, Scheme::Exact, h);
+    let torque = Torque::new(&axis, record, per);
+    let sensed = !axis.on().sensors().is_empty();
+    let mut memory: Memory<S> = [S::default(); MEMORY];
+    for (w, window) in windows.iter().enumerate() {
+        let next = windows.get(w + 1).map_or(usize::MAX, |n| n.begin);
+        let time = |k: usize| record.start + k as f64 * record.dt;
+        let mut state = axis.resume(initial(w), &memory, time(window.begin));
+        let mut history = sensed.then(|| SensorHistory::settled(state.reading(), record.dt));
+        for k in window.begin..window.compared.end {
+            if k == next {
+                memory = state.memory().map(&forget);
+            }
+            if window.compared.contains(&k) {
+                match &history {
+                    Some(history) => {
+                        visit(w, k, &model.effects.transform_sensor(axis.on(), history, record.dt));
+                    }
+                    None => visit(w, k, &state.reading()),
+                }
+            }
+            if k + 1 == window.compared.end {
+                break;
+            }
+            for j in 0..per {
+                state = axis.advance(&state, torque.at(k, j), time(k) + j as f64 * h);
+            }
+            if let Some(history) = &mut history {
+                history.push(state.reading());
+            }
+        }
+        if next >= window.compared.end {
+            memory = state.memory().map(&forget);
+        }
+    }
+}
+
+/// The torque on the motor over every step of the record.
+struct Torque<'a, S> {
+    record: &'a Record,
+    per: usize,
+    changed: Vec<Ramp<S>>,
+}
+
+impl<'a, S: Scalar> Torque<'a, S> {
+    fn new(axis: &Axis<S>, record: &'a Record, per: usize) -> Self {
+        let mut torque = Self { record, per, changed: Vec::new() };
+        if axis.on().inputs().is_empty() {
+            return torque;
+        }
+        let h = record.dt / per as f64;
+        let first = record.torque.first().copied().unwrap_or_default();
+        let mut history = TorqueHistory::settled(S::from(first));
+        let mut changed = Vec::with_capacity(record.len() * per);
+        for k in 0..record.len() {
+            for j in 0..per {
+                changed.push(axis.effects().transform_input(axis.on(), torque.commanded(k, j), h.into(), &mut history));
+            }
+        }
+        torque.changed = changed;
+        torque
+    }
+
+    fn commanded(&self, k: usize, j: usize) -> Ramp<S> {
+        let ramp: Ramp<S> = self.record.hold.ramp(&self.record.torque, k);
+        if self.per == 1 || self.record.hold == Hold::Zoh {
+            return ramp;
+        }
+        let part = |i: usize| ramp.start + (ramp.end - ramp.start) * (i as f64 / self.per as f64);
+        Ramp { start: part(j), end: part(j + 1) }
+    }
+
+    #[inline]
+    fn at(&self, k: usize, j: usize) -> Ramp<S> {
+        if self.changed.is_empty() { self.commanded(k, j) } else { self.changed[k * self.per + j] }
+    }
+}
+
+/// Numbers of an initial state that are free: a rigid axis has two.
+#[must_use]
+pub const fn local_count(structure: Structure) -> usize {
+    match structure {
+        Structure::TwoInertia => 4,
+        Structure::Rigid => 2,
+    }
+}
+
+/// The four numbers of an initial state from the free ones: `[theta1, omega1, theta2, omega2]`.
+#[must_use]
+pub fn local_state<S: Scalar>(structure: Structure, free: &[S]) -> [S; 4] {
+    match structure {
+        Structure::TwoInertia => [free[0], free[1], free[2], free[3]],
+        Structure::Rigid => [free[0], free[1], free[0], free[1]],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_cover_the_part_without_a_gap() {
+        let windows = cut(100..8292);
+        assert_eq!(windows[0].begin, 100);
+        assert_eq!(windows[0].compared.start, 112);
+        for pair in windows.windows(2) {
+            assert_eq!(pair[0].compared.end, pair[1].compared.start);
+        }
+        assert_eq!(windows.last().expect("some").compared.end, 8292);
+    }
+
+    #[test]
+    fn a_long_record_is_sampled() {
+        assert_eq!(cut(0..1_000_000).len(), MOST);
+    }
+}
