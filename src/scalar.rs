@@ -53,6 +53,15 @@ pub trait Scalar:
         let r = self.re().sqrt();
         self.chain(r, if r > 0.0 { 0.5 / r } else { 0.0 })
     }
+    /// Power of a positive base to a real exponent; zero, with zero derivatives, for a base of zero.
+    fn powf(self, exponent: Self) -> Self {
+        let (x, n) = (self.re(), exponent.re());
+        if x <= 0.0 {
+            return Self::default();
+        }
+        let value = x.powf(n);
+        self.chain(0.0, n * value / x) + exponent.chain(0.0, value * x.ln()) + value
+    }
     /// Absolute value, with the derivative +1 at zero.
     fn abs(self) -> Self {
         if self.re() < 0.0 { -self } else { self }
@@ -233,7 +242,7 @@ mod tests {
 
     /// A function that uses every operation, and its derivative by hand.
     fn f<S: Scalar>(x: S) -> S {
-        (x.sin() * x.exp() + x.cos() / (x.squared() + 1.0)) - (x * 3.0).sqrt() + (-x).abs() / 2.0
+        (x.sin() * x.exp() + x.cos() / (x.squared() + 1.0)) - (x * 3.0).sqrt() + (-x).abs() / 2.0 + x.powf(x * 2.0)
     }
 
     #[test]
@@ -243,7 +252,8 @@ mod tests {
         let q = x * x + 1.0;
         let by_hand = x.cos() * x.exp() + x.sin() * x.exp() + (-x.sin() * q - x.cos() * 2.0 * x) / (q * q)
             - 3.0 / (2.0 * (3.0 * x).sqrt())
-            + 0.5;
+            + 0.5
+            + x.powf(2.0 * x) * (2.0 * x.ln() + 2.0);
         assert!((d.re - f(x)).abs() < 1e-15);
         assert_eq!(d.eps[0], 0.0);
         assert!((d.eps[1] - by_hand).abs() < 1e-14, "{} {by_hand}", d.eps[1]);

@@ -229,7 +229,7 @@ pub(super) fn shown(effect: Effect) -> Settings {
         Effect::TorqueRipple => &[5e-3, 4.0, 0.3],
         Effect::Backlash => &[0.02],
         Effect::CubicStiffness => &[20.0],
-        Effect::CouplingHysteresis => &[1e-3, 0.02],
+        Effect::CouplingHysteresis => &[1e-3, 0.02, 1.5],
         Effect::StiffnessDrift => &[0.3],
         Effect::FrictionDrift => &[4e-3, 1e-4],
         Effect::FlexibleMode => &[2e-6, 0.02, 1e-5],

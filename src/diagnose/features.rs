@@ -97,11 +97,8 @@ fn force_torques(
                 return torque;
             }
             let start = motions(states, k.saturating_sub(1));
-            let gap = settings.of(Effect::Backlash)[0];
-            let d = end[2].x;
-            let contact = if d > gap { 1 } else { -i8::from(d < -gap) };
-            let step =
-                StepMotion { start, end, time, h: if k == 0 { 0.0 } else { record.dt }, contact };
+            let contact = contact(&base, settings.of(Effect::Backlash)[0], &end[2]);
+            let step = StepMotion { start, end, time, h: if k == 0 { 0.0 } else { record.dt }, contact };
             let forces = settings.forces(on, &base, &step, &mut memory);
             [-forces.torque[0], -forces.torque[1]]
         })
@@ -118,4 +115,12 @@ pub fn ramps(at: &[[f64; 2]]) -> Torques {
             [Ramp { start: at[k][0], end: next[0] }, Ramp { start: at[k][1], end: next[1] }]
         })
         .collect()
+}
+
+/// The side on which a gap is in contact and pushes.
+fn contact(base: &Base<f64>, gap: f64, twist: &Motion<f64>) -> i8 {
+    let side = twist.x.signum();
+    let beyond = twist.x * side - gap;
+    let pushes = base.k * beyond + base.b * twist.v * side > 0.0;
+    if beyond > 0.0 && pushes { side as i8 } else { 0 }
 }

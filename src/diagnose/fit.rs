@@ -8,7 +8,7 @@ use super::record::Record;
 use super::windows::{self, Window, local_count, local_state};
 use crate::effects::Effect;
 use crate::identify::levenberg::{self, Normal, Options, Problem, Termination};
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::Dual;
 
 /// Prior standard deviation of the logarithm of a nominal parameter: a machine's data sheet is seldom off by more than
 /// a factor of two.
@@ -71,6 +71,8 @@ struct Shooting<'a> {
     locals: usize,
     /// Prior mean of each coordinate that has one, in x.
     prior: Vec<Option<f64>>,
+    /// Squared residual per value that the model cannot remove: the priors count as much as data of that quality.
+    misfit: f64,
 }
 
 impl Shooting<'_> {
@@ -115,12 +117,14 @@ impl Shooting<'_> {
         for (i, mean) in self.prior.iter().enumerate() {
             let Some(mean) = mean else { continue };
             let mut row = vec![0.0; n];
-            row[i] = 1.0 / PRIOR;
-            rows.push(((x[i] - mean) / PRIOR, row));
+            let strength = self.misfit.sqrt() / PRIOR;
+            row[i] = strength;
+            rows.push(((x[i] - mean) * strength, row));
             use super::model::BaseParameter::{B, I2, K};
             if matches!(self.coordinates[i].free, Free::Base(I2 | B | K)) {
-                common.0 += (x[i] - mean) / (3.0 * SCALE_PRIOR);
-                common.1[i] = 1.0 / (3.0 * SCALE_PRIOR);
+                let strength = self.misfit.sqrt() / (3.0 * SCALE_PRIOR);
+                common.0 += (x[i] - mean) * strength;
+                common.1[i] = strength;
                 common.2 += 1;
             }
         }
@@ -176,7 +180,8 @@ impl Shooting<'_> {
             },
         );
         let total = n + locals * self.data.windows.len();
-        let mut normal = Normal { cost: 0.5 * chi2, gradient: DVector::zeros(total), curvature: DMatrix::zeros(total, total) };
+        let mut normal =
+            Normal { cost: 0.5 * chi2, gradient: DVector::zeros(total), curvature: DMatrix::zeros(total, total) };
         for (w, (matrix, gradient)) in small.iter().enumerate() {
             let at = |i: usize| if i < n { i } else { n + w * locals + (i - n) };
             for i in 0..m {
@@ -218,16 +223,29 @@ impl Problem for Shooting<'_> {
     }
 }
 
+/// How a fit is run.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Linearisations at most.
+    pub iterations: usize,
+    /// Squared residual per value to be expected, in units of the noise; at least 1.
+    pub misfit: f64,
+}
+
 /// Fits the free numbers of `start`, and the windows' initial states from `initial`.
 ///
-/// `nominal` gives the priors' means. `iterations` bounds the linearisations.
+/// `nominal` gives the priors' means.
 #[must_use]
-pub fn fit(data: Data<'_>, nominal: &Model, start: &Model, free: &[Free], initial: &[[f64; 4]], iterations: usize) -> Fitted {
+pub fn fit(
+    data: Data<'_>,
+    nominal: &Model,
+    start: &Model,
+    free: &[Free],
+    initial: &[[f64; 4]],
+    effort: Effort,
+) -> Fitted {
     let coordinates: Vec<Coordinate> = free.iter().map(|f| Coordinate::new(*f, start)).collect();
-    let prior = coordinates
-        .iter()
-        .map(|c| matches!(c.free, Free::Base(_)).then(|| c.x(nominal)))
-        .collect();
+    let prior = coordinates.iter().map(|c| matches!(c.free, Free::Base(_)).then(|| c.x(nominal))).collect();
     let mut also: Vec<Effect> = free
         .iter()
         .filter_map(|f| match f {
@@ -245,6 +263,7 @@ pub fn fit(data: Data<'_>, nominal: &Model, start: &Model, free: &[Free], initia
         per: windows::steps(start, data.record),
         locals,
         prior,
+        misfit: effort.misfit.max(1.0),
     };
     let n = coordinates.len();
     let total = n + locals * data.windows.len();
@@ -256,7 +275,7 @@ pub fn fit(data: Data<'_>, nominal: &Model, start: &Model, free: &[Free], initia
         p.as_mut_slice()[n + w * locals..n + (w + 1) * locals].copy_from_slice(&s[..locals]);
     }
     let options = Options {
-        iterations,
+        iterations: effort.iterations,
         cost: 1e-5,
         step: 1e-9,
         gradient: 1e-9,
@@ -271,7 +290,9 @@ pub fn fit(data: Data<'_>, nominal: &Model, start: &Model, free: &[Free], initia
     Fitted {
         model: start.at(&coordinates, x),
         std,
-        initial: (0..data.windows.len()).map(|w| local_state(start.structure, problem.local(&report.parameters, w))).collect(),
+        initial: (0..data.windows.len())
+            .map(|w| local_state(start.structure, problem.local(&report.parameters, w)))
+            .collect(),
         chi2: sum.chi2,
         squares: sum.squares,
         termination: report.termination,
@@ -286,10 +307,10 @@ fn shared_std(curvature: &DMatrix<f64>, n: usize, coordinates: &[Coordinate], x:
     (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt() * coordinates[i].slope(x[i]).abs()).collect()
 }
 
-/// The model's readings at every compared sample of the windows, from the given initial states: per channel, with the
-/// sample's index first.
+/// The model's readings at every compared sample of the windows, from the given initial states: window, sample,
+/// readings.
 #[must_use]
-pub fn predict(data: Data<'_>, model: &Model, initial: &[[f64; 4]]) -> Vec<(usize, [f64; 4])> {
+pub fn predict(data: Data<'_>, model: &Model, initial: &[[f64; 4]]) -> Vec<(usize, usize, [f64; 4])> {
     let mut out = Vec::with_capacity(data.windows.iter().map(|w| w.compared.len()).sum());
     windows::run(
         model,
@@ -299,7 +320,7 @@ pub fn predict(data: Data<'_>, model: &Model, initial: &[[f64; 4]]) -> Vec<(usiz
         data.windows,
         |w| initial[w],
         |m: f64| m,
-        |_, k, r| out.push((k, [r.theta1.re(), r.omega1.re(), r.theta2.re(), r.omega2.re()])),
+        |w, k, r| out.push((w, k, [r.theta1, r.omega1, r.theta2, r.omega2])),
     );
     out
 }

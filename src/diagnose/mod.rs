@@ -1,20 +1,29 @@
 //! The gap between model and machine: where, which, how far.
 
+mod assess;
+mod decide;
+mod diagnosis;
 mod features;
 mod fit;
+mod gap;
+mod lattice;
 mod model;
 mod noise;
 mod record;
 mod response;
 mod screen;
 mod search;
+mod states;
 mod windows;
+mod words;
 
-pub use fit::{Data, Fitted, fit, predict};
-pub use model::{BaseParameter, Coordinate, Free, Model};
+pub use assess::{Case, Outcome, diagnose};
+pub use decide::{Decision, Verdict};
+pub use diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
+pub use fit::{Data, predict};
+pub use gap::{Figures, Levels};
+pub use model::{BaseParameter, Model};
 pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
 pub use record::{CHANNELS, Record};
-pub use response::States;
-pub use screen::{Candidate, Screen};
-pub use search::{Search, Tested};
+pub use search::Tested;
 pub use windows::{Window, cut};

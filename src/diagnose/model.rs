@@ -122,7 +122,11 @@ impl Coordinate {
     #[must_use]
     pub fn x(&self, model: &Model) -> f64 {
         let value = self.value(model);
-        if self.log { (value.max(1e-300) / self.unit).ln().clamp(self.bounds[0], self.bounds[1]) } else { value / self.unit }
+        if self.log {
+            (value.max(1e-300) / self.unit).ln().clamp(self.bounds[0], self.bounds[1])
+        } else {
+            value / self.unit
+        }
     }
 
     /// The model's present value.

@@ -46,7 +46,13 @@ pub struct Screen<'a> {
 impl<'a> Screen<'a> {
     /// Prepares the regression; `found` are effects already taken as part of the model, refitted beside each candidate.
     #[must_use]
-    pub fn new(model: &'a Model, record: &'a Record, windows: &'a [Window], states: &'a States, found: &[Effect]) -> Self {
+    pub fn new(
+        model: &'a Model,
+        record: &'a Record,
+        windows: &'a [Window],
+        states: &'a States,
+        found: &[Effect],
+    ) -> Self {
         let responder = Responder::new(model, record, windows);
         let residual = responder.residual();
         let mut common: Vec<Column> = BaseParameter::of(model.structure)
@@ -72,21 +78,13 @@ impl<'a> Screen<'a> {
         Self { model, record, states, responder, residual, common, gram, right, scales }
     }
 
-    /// What the nominal parameters alone leave.
-    #[must_use]
-    pub fn parameters_only(&self) -> f64 {
-        self.solve(&[]).0
-    }
-
     /// The best starts of an effect's variant, best first, at most `most`.
     #[must_use]
     pub fn starts(&self, effect: Effect, variant: usize, most: usize) -> Vec<Candidate> {
         let form = &effect.info().variants[variant];
         let trials = self.scales.trials(effect, form, self.model);
-        let mut found: Vec<Candidate> = trials
-            .par_iter()
-            .filter_map(|trial| self.regress(effect, variant, form, trial))
-            .collect();
+        let mut found: Vec<Candidate> =
+            trials.par_iter().filter_map(|trial| self.regress(effect, variant, form, trial)).collect();
         found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
         found.truncate(most);
         found

@@ -1,15 +1,39 @@
 //! Hysteresis of the coupling: a rate-independent loop beside the spring.
 //!
-//! `f = level*z/reach`, `dz = dd*(1 - sgn(dd)*z/reach)`: Dahl's curve over the twist, the Bouc-Wen loop with beta =
-//! 1/reach, gamma = 0, n = 1. Dahl 1968; Ikhouane, Rodellar, Systems with Hysteresis, Wiley 2007.
+//! `f = level*z`, `reach*dz = dd*(1 - |z|^sharpness*(1 + sgn(dd*z))/2)`: the Bouc-Wen loop with beta = gamma, which turns
+//! with the stiffness `level/reach` and closes at `level`. Wen, J. Eng. Mech. 102(2), 1976; Ikhouane, Rodellar, Systems
+//! with Hysteresis, Wiley 2007, chapter 2.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::presliding::bristle;
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Hysteresis of the coupling.
 pub struct CouplingHysteresis;
+
+/// `dz/dx` of the loop, x the twist in units of the reach, moving in `direction`.
+fn slope<S: Scalar>(z: S, direction: f64, sharpness: S) -> S {
+    if z.re() * direction > 0.0 { S::from(1.0) - z.abs().powf(sharpness) } else { S::from(1.0) }
+}
+
+/// The loop after a move `x` in units of the reach: classical Runge-Kutta, in parts of at most half a reach.
+fn advance<S: Scalar>(z: S, x: S, sharpness: S) -> S {
+    let direction = x.re().signum();
+    let parts = (2.0 * x.re().abs()).ceil().clamp(1.0, 32.0);
+    let dx = x / parts;
+    let mut z = z;
+    for _ in 0..parts as usize {
+        let a = slope(z, direction, sharpness);
+        let b = slope(z + dx * a * 0.5, direction, sharpness);
+        let c = slope(z + dx * b * 0.5, direction, sharpness);
+        let d = slope(z + dx * c, direction, sharpness);
+        z += dx * (a + b * 2.0 + c * 2.0 + d) * (1.0 / 6.0);
+        if z.re().abs() > 1.0 {
+            z = S::from(z.re().signum());
+        }
+    }
+    z
+}
 
 impl Force for CouplingHysteresis {
     const INFO: EffectInfo = EffectInfo {
@@ -17,23 +41,24 @@ impl Force for CouplingHysteresis {
         place: Place::Coupling,
         family: Family::Hysteresis,
         title: "A loop in the spring's characteristic that speed does not open",
-        equation: "f = level*z/reach; dz = dd*(1 - sgn(dd)*z/reach)",
-        reference: "Dahl, Aerospace Corp. TOR-158, 1968; Ikhouane, Rodellar, Systems with Hysteresis, 2007",
+        equation: "f = level*z; reach*dz = dd*(1 - |z|^sharpness*(1 + sgn(dd*z))/2)",
+        reference: "Wen, J. Eng. Mech. 102(2), 1976; Ikhouane, Rodellar, Systems with Hysteresis, 2007",
         parameters: &[
             ParameterInfo::size("level", "N.m", 0.0, 1e6, "Torque of the loop when it has closed").nominal(1e-2),
             ParameterInfo::shape("reach", "rad", 1e-2, 1e-9, 1e3, "Twist over which the loop closes")
                 .start(Start::Grid(Scale::Twist, &[0.03, 0.1, 0.3, 1.0])),
+            ParameterInfo::shape("sharpness", "1", 1.0, 0.2, 20.0, "How abruptly the loop yields"),
         ],
         memory: 1,
-        variants: &[Variant { name: "", free: &[0, 1] }],
+        variants: &[Variant { name: "", free: &[0, 1] }, Variant { name: "sharp", free: &[0, 1, 2] }],
     };
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, z: &mut [S]) -> Reaction<S> {
-        let dx = if m.h.re() == 0.0 { S::default() } else { m.end.x - m.start.x };
-        let (after, slope) = bristle(z[0], dx, p[1]);
+        let dx = if m.h.re() == 0.0 { S::default() } else { (m.end.x - m.start.x) / p[1] };
+        let after = advance(z[0], dx, p[2]);
         z[0] = after;
-        let stiffness = p[0] / p[1];
-        Reaction { torque: stiffness * after, stiffness: stiffness.re() * slope, damping: 0.0 }
+        let tangent = slope(after, if dx.re() < 0.0 { -1.0 } else { 1.0 }, p[2]).re();
+        Reaction { torque: p[0] * after, stiffness: p[0].re() / p[1].re() * tangent, damping: 0.0 }
     }
 }

@@ -28,7 +28,7 @@ fn mean_decay<S: Scalar>(a: S) -> S {
 }
 
 /// Advances a bristle of the given `level / stiffness` reach by `dx`; also its derivative to `dx`.
-pub(super) fn bristle<S: Scalar>(z: S, dx: S, reach: S) -> (S, f64) {
+fn bristle<S: Scalar>(z: S, dx: S, reach: S) -> (S, f64) {
     let a = dx.abs() / reach;
     let decay = (-a).exp();
     let after = z * decay + dx * mean_decay(a);

@@ -1,0 +1,267 @@
+//! The whole diagnosis of one record: search, decision, held-out figures, words.
+
+use serde_json::{Map, Value, json};
+
+use super::decide::{Decision, Verdict, decide};
+use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
+use super::fit::Data;
+use super::gap::{self, Gap};
+use super::lattice;
+use super::model::{BaseParameter, Free, Model};
+use super::noise::NoiseEstimate;
+use super::record::Record;
+use super::search::{Search, Tested};
+use super::windows::{Window, cut};
+use super::{states, words};
+use crate::effects::{Effect, Place};
+
+/// Share of a single record that is held out.
+const HELD_OUT: f64 = 1.0 / 3.0;
+
+/// What is diagnosed.
+pub struct Case<'a> {
+    /// The machine's name.
+    pub machine: String,
+    /// The nominal model.
+    pub nominal: Model,
+    /// Record that the fits see.
+    pub train: &'a Record,
+    /// What is known of its noise.
+    pub noise: &'a NoiseEstimate,
+    /// Record held out; without it the last third of the one given.
+    pub holdout: Option<&'a Record>,
+    /// Effects that may be named.
+    pub library: Vec<Effect>,
+}
+
+/// The diagnosis, and the improved model.
+pub struct Outcome {
+    /// For files and people.
+    pub diagnosis: Diagnosis,
+    /// The nominal model with its parameters as fitted and the effects found.
+    pub improved: Model,
+    /// Model as given, re-identified, improved: for plots.
+    pub models: [Model; 3],
+    /// The decision with its fits.
+    pub decision: Decision,
+}
+
+/// Diagnoses a record.
+#[must_use]
+pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
+    let record = case.train;
+    let (train, held) = match case.holdout {
+        Some(other) => (cut(0..record.len()), (other, cut(0..other.len()))),
+        None => {
+            let split = record.len() - (record.len() as f64 * HELD_OUT) as usize;
+            (cut(0..split), (record, cut(split..record.len())))
+        }
+    };
+    let data = Data { record, windows: &train };
+    let search = Search {
+        data,
+        nominal: case.nominal,
+        library: case.library.clone(),
+        states: states::along(record, &case.nominal),
+    };
+    progress("the model as given");
+    let decision = decide(&search, progress);
+    progress("held-out data");
+    let held = Held { record: held.0, windows: &held.1, states: states::along(held.0, &case.nominal) };
+    let models = [case.nominal, decision.parameters.fitted.model, decision.chosen.fitted.model];
+    let on_train = {
+        let initial = initial(&search.states, &train);
+        let e = models.map(|m| gap::errors(data, &m, &initial).0);
+        gap::measure(record, &train, [&e[0], &e[1], &e[2]])
+    };
+    let on_held = held.gap(models);
+    let mut diagnosis = build(case, &decision, &held, on_train, on_held);
+    lattice::judge(case, &decision, &mut diagnosis);
+    words::fill(&mut diagnosis, &decision);
+    Outcome { diagnosis, improved: models[2], models, decision }
+}
+
+fn initial(states: &super::response::States, windows: &[Window]) -> Vec<[f64; 4]> {
+    windows.iter().map(|w| states.motion[w.begin]).collect()
+}
+
+/// Held-out data.
+struct Held<'a> {
+    record: &'a Record,
+    windows: &'a [Window],
+    states: super::response::States,
+}
+
+impl Held<'_> {
+    fn errors(&self, model: &Model) -> Vec<nalgebra::Vector4<f64>> {
+        let data = Data { record: self.record, windows: self.windows };
+        gap::errors(data, model, &initial(&self.states, self.windows)).0
+    }
+
+    fn gap(&self, models: [Model; 3]) -> Gap {
+        let e = models.map(|m| self.errors(&m));
+        gap::measure(self.record, self.windows, [&e[0], &e[1], &e[2]])
+    }
+}
+
+fn build(case: &Case<'_>, decision: &Decision, held: &Held<'_>, train: Gap, holdout: Gap) -> Diagnosis {
+    let values = held_free_values(case, decision);
+    let best = decision.ranking.first().map_or(0.0, |w| w.bic);
+    let before = held.errors(&decision.given.fitted.model);
+    let ranking = decision
+        .ranking
+        .iter()
+        .map(|w| {
+            let e = held.errors(&w.tested.fitted.model);
+            let closure = gap::measure(held.record, held.windows, [&before, &before, &e]).closure;
+            let (id, family, place) = name(&w.tested);
+            Ranked {
+                id,
+                family,
+                place,
+                probability: w.probability,
+                delta_bic: w.bic - best,
+                chi2: w.tested.fitted.chi2 / values,
+                closure_holdout: closure,
+            }
+        })
+        .collect();
+    let causes = causes(decision);
+    let verdict = decision.verdict;
+    Diagnosis {
+        schema: SCHEMA,
+        machine: case.machine.clone(),
+        verdict,
+        sentence: String::new(),
+        location: location(&causes),
+        causes,
+        ranking,
+        confusable: Vec::new(),
+        next_experiment: String::new(),
+        gap: GapReport {
+            closure: holdout.closure,
+            closure_of_effect: holdout.closure_of_effect,
+            interval: holdout.interval,
+            train: train.figures,
+            holdout: holdout.figures,
+            holdout_is: if case.holdout.is_some() { "a second record" } else { "the last third of the record" }
+                .to_owned(),
+        },
+        parameters: parameters(case, decision),
+        warnings: Vec::new(),
+    }
+}
+
+fn held_free_values(case: &Case<'_>, decision: &Decision) -> f64 {
+    // Values compared per unit chi2: the ranking quotes squared residual per value.
+    let channels = case.train.channels.iter().flatten().count() as f64;
+    let samples: f64 = decision.given.fitted.initial.len() as f64;
+    let _ = samples;
+    let windows = match case.holdout {
+        Some(_) => cut(0..case.train.len()),
+        None => cut(0..case.train.len() - (case.train.len() as f64 * HELD_OUT) as usize),
+    };
+    windows.iter().map(|w| w.compared.len()).sum::<usize>() as f64 * channels
+}
+
+/// Id, family and place of a hypothesis.
+fn name(t: &Tested) -> (String, String, String) {
+    match t.effects.first() {
+        None if t.freedom == 0 => ("no_gap".to_owned(), "none".to_owned(), "none".to_owned()),
+        None => ("parameters".to_owned(), "parameters".to_owned(), "none".to_owned()),
+        Some((e, _)) => (t.ids().join("+"), e.info().family.as_str().to_owned(), e.info().place.as_str().to_owned()),
+    }
+}
+
+fn causes(decision: &Decision) -> Vec<Cause> {
+    if decision.verdict == Verdict::Parameters {
+        let Some((gain, std)) = decision.torque_gain() else { return Vec::new() };
+        let info = Effect::TorqueGain.info();
+        let mut parameters = Map::new();
+        parameters.insert("gain".to_owned(), json!({ "value": gain, "std": std, "unit": "1" }));
+        return vec![Cause {
+            id: info.id.to_owned(),
+            family: info.family.as_str().to_owned(),
+            place: info.place.as_str().to_owned(),
+            variant: String::new(),
+            probability: 1.0,
+            share_of_gap: 1.0,
+            parameters,
+        }];
+    }
+    let chosen = &decision.chosen;
+    let fitted = &chosen.fitted;
+    let mut causes: Vec<Cause> = chosen
+        .effects
+        .iter()
+        .zip(&decision.shares)
+        .map(|((effect, variant), share)| {
+            let info = effect.info();
+            let mut parameters = Map::new();
+            for (i, p) in info.parameters.iter().enumerate() {
+                let free = fitted.coordinates.iter().position(|c| c.free == Free::Effect(*effect, i));
+                if let Some(at) = free {
+                    let value = fitted.model.effects.of(*effect)[i];
+                    parameters.insert(
+                        p.name.to_owned(),
+                        json!({ "value": value, "std": finite(fitted.std[at]), "unit": p.unit }),
+                    );
+                }
+            }
+            Cause {
+                id: info.id.to_owned(),
+                family: info.family.as_str().to_owned(),
+                place: info.place.as_str().to_owned(),
+                variant: info.variants[*variant].name.to_owned(),
+                probability: decision
+                    .ranking
+                    .iter()
+                    .filter(|w| w.tested.effects.iter().any(|(e, _)| e == effect))
+                    .map(|w| w.probability)
+                    .sum::<f64>()
+                    .min(1.0),
+                share_of_gap: *share,
+                parameters,
+            }
+        })
+        .collect();
+    causes.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap));
+    causes
+}
+
+fn finite(v: f64) -> Value {
+    if v.is_finite() { json!(v) } else { Value::Null }
+}
+
+fn location(causes: &[Cause]) -> Where {
+    let mut by_place = Map::new();
+    for place in Place::ALL {
+        let share: f64 = causes.iter().filter(|c| c.place == place.as_str()).map(|c| c.share_of_gap).sum();
+        by_place.insert(place.as_str().to_owned(), json!(share));
+    }
+    Where {
+        place: causes.first().map_or_else(|| "none".to_owned(), |c| c.place.clone()),
+        by_place,
+        by_time: json!([]),
+        by_frequency: json!([]),
+        by_state: json!([]),
+        summary: String::new(),
+    }
+}
+
+fn parameters(case: &Case<'_>, decision: &Decision) -> Map<String, Value> {
+    let fitted = &decision.chosen.fitted;
+    BaseParameter::of(case.nominal.structure)
+        .iter()
+        .map(|p| {
+            let at = fitted.coordinates.iter().position(|c| c.free == Free::Base(*p));
+            let value = json!({
+                "nominal": p.value(&case.nominal.parameters),
+                "reidentified": p.value(&decision.parameters.fitted.model.parameters),
+                "fitted": p.value(&fitted.model.parameters),
+                "std": at.map_or(Value::Null, |i| finite(fitted.std[i])),
+            });
+            (p.name().to_owned(), value)
+        })
+        .collect()
+}

@@ -1,0 +1,112 @@
+//! The diagnosis as plain data: the contract of `diagnosis.json` (schema `eixo.diagnosis/1`).
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::decide::Verdict;
+use super::gap::Figures;
+
+/// Name and version of the format.
+pub const SCHEMA: &str = "eixo.diagnosis/1";
+
+/// Everything that `eixo diagnose` found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnosis {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// The machine's name.
+    pub machine: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The verdict in a sentence.
+    pub sentence: String,
+    /// Causes, strongest first.
+    pub causes: Vec<Cause>,
+    /// Every hypothesis tried, best first.
+    pub ranking: Vec<Ranked>,
+    /// Pairs that the record cannot tell apart, and why.
+    pub confusable: Vec<[String; 3]>,
+    /// What to measure next.
+    pub next_experiment: String,
+    /// Where the gap lies.
+    #[serde(rename = "where")]
+    pub location: Where,
+    /// How large it is, and how far it shrinks.
+    pub gap: GapReport,
+    /// The nominal parameters as given and as fitted.
+    pub parameters: Map<String, Value>,
+    /// What the user should know of the data.
+    pub warnings: Vec<String>,
+}
+
+/// A cause.
+#[derive(Debug, Clone, Serialize)]
+pub struct Cause {
+    /// Id of the effect.
+    pub id: String,
+    /// Its family.
+    pub family: String,
+    /// Its place.
+    pub place: String,
+    /// Form of the effect; empty for the plain one.
+    pub variant: String,
+    /// Posterior probability.
+    pub probability: f64,
+    /// Share of the gap that comes back without it.
+    pub share_of_gap: f64,
+    /// Its parameters by name.
+    pub parameters: Map<String, Value>,
+}
+
+/// A hypothesis in the ranking.
+#[derive(Debug, Clone, Serialize)]
+pub struct Ranked {
+    /// Id of the effect, ids joined by `+`, `parameters` or `no_gap`.
+    pub id: String,
+    /// Family of its first effect.
+    pub family: String,
+    /// Place of its first effect.
+    pub place: String,
+    /// Posterior probability.
+    pub probability: f64,
+    /// BIC above the best's.
+    pub delta_bic: f64,
+    /// Squared residual per value, in units of the noise.
+    pub chi2: f64,
+    /// Closure on held-out data.
+    pub closure_holdout: f64,
+}
+
+/// Where the gap lies.
+#[derive(Debug, Clone, Serialize)]
+pub struct Where {
+    /// The place.
+    pub place: String,
+    /// Share of each place.
+    pub by_place: Map<String, Value>,
+    /// The residual along time.
+    pub by_time: Value,
+    /// And along frequency.
+    pub by_frequency: Value,
+    /// And against the state.
+    pub by_state: Value,
+    /// In words.
+    pub summary: String,
+}
+
+/// The gap on both records.
+#[derive(Debug, Clone, Serialize)]
+pub struct GapReport {
+    /// On the data the fits saw.
+    pub train: Figures,
+    /// On data they did not see.
+    pub holdout: Figures,
+    /// `1 - (after^2 - floor^2)/(before^2 - floor^2)` on held-out data.
+    pub closure: f64,
+    /// The same from the re-identified model.
+    pub closure_of_effect: f64,
+    /// 95 % interval of `closure`.
+    pub interval: [f64; 2],
+    /// What the held-out data are.
+    pub holdout_is: String,
+}

@@ -1,0 +1,45 @@
+//! Quantisation: rounding has no derivative to fit, but leaves its lattice in the readings.
+//!
+//! Rounding to a step `q` adds an error of variance `q^2/12` (Widrow & Kollar, Quantization Noise, 2008, chapter 5). It
+//! is named as the cause when the readings lie on a lattice whose error makes the better part of the noise floor, and
+//! nothing else explains the record better.
+
+use serde_json::{Map, json};
+
+use super::assess::Case;
+use super::decide::{Decision, Verdict};
+use super::diagnosis::{Cause, Diagnosis};
+use crate::effects::{Effect, Place};
+
+/// Names quantisation where the record is at the floor and the lattice is what the floor is made of.
+pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
+    let quantum = case.noise.quantum.iter().flatten().copied().fold(0.0, f64::max);
+    if quantum <= 0.0 || !case.library.contains(&Effect::EncoderQuantisation) {
+        return;
+    }
+    let coarse: Vec<usize> = (0..4).filter(|c| case.noise.quantum[*c].is_some()).collect();
+    diagnosis.warnings.push(format!(
+        "{} read in steps of {quantum:.3e}; the noise floor holds their rounding.",
+        coarse.iter().map(|c| super::record::CHANNELS[*c]).collect::<Vec<_>>().join(" and "),
+    ));
+    if !matches!(decision.verdict, Verdict::NoGap | Verdict::Parameters) {
+        return;
+    }
+    let info = Effect::EncoderQuantisation.info();
+    let mut parameters = Map::new();
+    parameters.insert("step".to_owned(), json!({ "value": quantum, "std": 0.0, "unit": "rad" }));
+    diagnosis.verdict = Verdict::Effect;
+    diagnosis.causes = vec![Cause {
+        id: info.id.to_owned(),
+        family: info.family.as_str().to_owned(),
+        place: info.place.as_str().to_owned(),
+        variant: String::new(),
+        probability: 1.0,
+        share_of_gap: 1.0,
+        parameters,
+    }];
+    diagnosis.location.place = Place::Sensor.as_str().to_owned();
+    for (place, share) in &mut diagnosis.location.by_place {
+        *share = json!(f64::from(u8::from(place == Place::Sensor.as_str())));
+    }
+}

@@ -1,0 +1,252 @@
+//! The search: no gap, parameters only, every single effect, then more effects beside the best.
+
+use rayon::prelude::*;
+
+use super::fit::{Data, Effort, Fitted, fit};
+use super::model::{BaseParameter, Free, Model};
+use super::response::States;
+use super::screen::{Candidate, Screen};
+use crate::axis::Structure;
+use crate::effects::{Effect, Place, Settings};
+
+/// Linearisations of a first look at a start.
+const GLANCE: usize = 6;
+/// Linearisations of a fit that counts.
+const FULL: usize = 40;
+/// Starts looked at per effect.
+const STARTS: usize = 3;
+/// Effects that are fitted at all: the best by the regression.
+const LOOKED_AT: usize = 10;
+/// Effects whose fits are taken to the end, at most.
+const FINALISTS: usize = 6;
+/// And only those within this factor of the best at first look.
+const NEAR: f64 = 30.0;
+
+/// A hypothesis that was fitted.
+#[derive(Debug, Clone)]
+pub struct Tested {
+    /// Its effects with their variants, in the order they were found; empty for the nominal structure.
+    pub effects: Vec<(Effect, usize)>,
+    /// The fit.
+    pub fitted: Fitted,
+    /// Number of free parameters, initial states not counted.
+    pub freedom: usize,
+}
+
+impl Tested {
+    /// Its effects.
+    pub fn ids(&self) -> Vec<&'static str> {
+        self.effects.iter().map(|(e, _)| e.info().id).collect()
+    }
+}
+
+/// What is searched through.
+pub struct Search<'a> {
+    /// Training data.
+    pub data: Data<'a>,
+    /// The model as given.
+    pub nominal: Model,
+    /// Effects that may be named.
+    pub library: Vec<Effect>,
+    /// Motion along the record.
+    pub states: States,
+}
+
+impl Search<'_> {
+    fn initial(&self) -> Vec<[f64; 4]> {
+        self.data.windows.iter().map(|w| self.states.motion[w.begin]).collect()
+    }
+
+    fn base(&self) -> Vec<Free> {
+        BaseParameter::of(self.nominal.structure).iter().map(|p| Free::Base(*p)).collect()
+    }
+
+    /// The nominal model, only the windows' initial states fitted.
+    #[must_use]
+    pub fn as_given(&self) -> Tested {
+        self.test(&self.nominal, &[], &self.initial(), Vec::new(), FULL, 1.0)
+    }
+
+    /// The nominal structure with its parameters fitted.
+    #[must_use]
+    pub fn parameters_only(&self, given: &Tested) -> Tested {
+        let free = self.base();
+        let look = self.test(
+            &self.nominal,
+            &free,
+            &given.fitted.initial,
+            Vec::new(),
+            FULL / 2,
+            self.misfit(given.fitted.chi2),
+        );
+        let misfit = self.misfit(look.fitted.chi2);
+        self.test(&look.fitted.model, &free, &look.fitted.initial, Vec::new(), FULL, misfit)
+    }
+
+    fn misfit(&self, chi2: f64) -> f64 {
+        (chi2 / self.data.values() as f64).max(1.0)
+    }
+
+    fn test(
+        &self,
+        start: &Model,
+        free: &[Free],
+        initial: &[[f64; 4]],
+        effects: Vec<(Effect, usize)>,
+        iterations: usize,
+        misfit: f64,
+    ) -> Tested {
+        let fitted = fit(self.data, &self.nominal, start, free, initial, Effort { iterations, misfit });
+        Tested { effects, fitted, freedom: free.len() }
+    }
+
+    /// Every effect of the library beside those of `beside`, best first: one [`Tested`] per effect, its best variant
+    /// by [`simplest`].
+    #[must_use]
+    pub fn one_more(&self, beside: &Tested, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
+        let model = Model { effects: beside.fitted.model.effects, ..self.nominal };
+        let found: Vec<Effect> = beside.effects.iter().map(|(e, _)| *e).collect();
+        let screen = Screen::new(&model, self.data.record, self.data.windows, &self.states, &found);
+        let mut screened: Vec<Vec<Candidate>> = self
+            .library
+            .iter()
+            .filter(|e| !found.contains(e) && self.applies(**e))
+            .map(|&effect| {
+                progress(effect.info().id);
+                screen.starts(effect, 0, STARTS)
+            })
+            .filter(|starts| !starts.is_empty())
+            .collect();
+        screened.sort_by(|a, b| a[0].chi2.total_cmp(&b[0].chi2));
+        screened.truncate(LOOKED_AT);
+        let mut glances: Vec<(Tested, Candidate)> = screened
+            .par_iter()
+            .flat_map_iter(|starts| {
+                progress(starts[0].effect.info().id);
+                starts
+                    .iter()
+                    .map(|c| (self.fit_candidate(beside, c, GLANCE), c.clone()))
+                    .min_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2))
+            })
+            .collect();
+        glances.sort_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2));
+        let near = glances.first().map_or(0.0, |g| NEAR * g.0.fitted.chi2);
+        let mut tested: Vec<Tested> = glances
+            .par_iter()
+            .enumerate()
+            .map(|(rank, (glance, candidate))| {
+                progress(candidate.effect.info().id);
+                if rank < FINALISTS && (rank < 2 || glance.fitted.chi2 < near) {
+                    self.best_variant(beside, glance, candidate, &screen)
+                } else {
+                    glance.clone()
+                }
+            })
+            .collect();
+        tested.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+        tested
+    }
+
+    /// One of a combination's effects alone, as it was fitted there: a start for other partners.
+    #[must_use]
+    pub fn only(&self, combination: &Tested, effect: Effect, variant: usize) -> Tested {
+        let mut model = Model { effects: self.nominal.effects, ..combination.fitted.model };
+        model.effects.of_mut(effect).copy_from_slice(combination.fitted.model.effects.of(effect));
+        let fitted = Fitted { model, ..combination.fitted.clone() };
+        Tested { effects: vec![(effect, variant)], fitted, freedom: combination.freedom }
+    }
+
+    /// A combination without some of its effects, fitted again.
+    #[must_use]
+    pub fn without(&self, combination: &Tested, keep: &[(Effect, usize)]) -> Tested {
+        let mut start = combination.fitted.model;
+        let mut free = self.base();
+        for (effect, _) in &combination.effects {
+            if !keep.iter().any(|(e, _)| e == effect) {
+                start.effects.of_mut(*effect).copy_from_slice(self.nominal.effects.of(*effect));
+            }
+        }
+        for (effect, variant) in keep {
+            free.extend(effect.info().variants[*variant].free.iter().map(|i| Free::Effect(*effect, *i)));
+        }
+        let misfit = self.misfit(combination.fitted.chi2);
+        self.test(&start, &free, &combination.fitted.initial, keep.to_vec(), FULL, misfit)
+    }
+
+    /// Whether the effect can act on this axis and be fitted: a rigid axis has no coupling; rounding has no derivative
+    /// and is judged by its lattice; a torque constant is a common factor of the nominal parameters.
+    fn applies(&self, effect: Effect) -> bool {
+        let rigid = self.nominal.structure == Structure::Rigid;
+        let info = effect.info();
+        let beyond_a_rigid_axis = info.place == Place::Coupling
+            || (info.place == Place::Table && effect != Effect::FlexibleMode)
+            || (info.place == Place::Sensor);
+        !matches!(effect, Effect::EncoderQuantisation | Effect::TorqueGain) && !(rigid && beyond_a_rigid_axis)
+    }
+
+    /// Takes an effect's plain form to its minimum, then tries its richer forms from there.
+    fn best_variant(&self, beside: &Tested, glance: &Tested, candidate: &Candidate, screen: &Screen<'_>) -> Tested {
+        let effect = candidate.effect;
+        let plain = self.refit(beside, &glance.fitted, effect, 0, FULL);
+        let mut forms = vec![plain];
+        for variant in 1..effect.info().variants.len() {
+            let mut starts = vec![forms[0].fitted.model.effects];
+            starts.extend(screen.starts(effect, variant, 1).iter().map(|c| c.settings));
+            let best = starts
+                .iter()
+                .map(|settings| {
+                    let start = Fitted {
+                        model: Model { effects: *settings, ..forms[0].fitted.model },
+                        ..forms[0].fitted.clone()
+                    };
+                    self.refit(beside, &start, effect, variant, FULL)
+                })
+                .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+            forms.extend(best);
+        }
+        simplest(&forms, self.data.values() as f64).clone()
+    }
+
+    fn free(&self, beside: &Tested, effect: Effect, variant: usize) -> Vec<Free> {
+        let mut free = self.base();
+        for (e, v) in beside.effects.iter().copied().chain([(effect, variant)]) {
+            free.extend(e.info().variants[v].free.iter().map(|i| Free::Effect(e, *i)));
+        }
+        free
+    }
+
+    fn refit(&self, beside: &Tested, from: &Fitted, effect: Effect, variant: usize, iterations: usize) -> Tested {
+        let free = self.free(beside, effect, variant);
+        let effects = beside.effects.iter().copied().chain([(effect, variant)]).collect();
+        self.test(&from.model, &free, &from.initial, effects, iterations, self.misfit(from.chi2))
+    }
+
+    fn fit_candidate(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {
+        let mut effects: Settings = beside.fitted.model.effects;
+        effects.of_mut(candidate.effect).copy_from_slice(candidate.settings.of(candidate.effect));
+        // Nominal parameters to start from: what they were refitted to without the effect leans against it.
+        let base = if beside.effects.is_empty() { self.nominal } else { beside.fitted.model };
+        let start = Fitted { model: Model { effects, ..base }, initial: self.initial(), ..beside.fitted.clone() };
+        self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
+    }
+}
+
+/// Share of the excess over the simplest form's that a richer form must take away to be preferred.
+const MATERIAL: f64 = 0.02;
+
+/// Of forms that close the gap alike, the one with the fewest free parameters.
+#[must_use]
+pub fn simplest(forms: &[Tested], values: f64) -> &Tested {
+    let best = forms.iter().map(|t| t.fitted.chi2).fold(f64::INFINITY, f64::min);
+    let mut chosen = &forms[0];
+    for form in forms {
+        let gain = chosen.fitted.chi2 - form.fitted.chi2;
+        let excess = (chosen.fitted.chi2 - values).max(best * 1e-3);
+        let extra = form.freedom.saturating_sub(chosen.freedom) as f64;
+        // More freedom must pay its price, and close a material share of what was left.
+        if gain > extra * values.ln() * (best / values).max(1.0) && gain > MATERIAL * excess {
+            chosen = form;
+        }
+    }
+    chosen
+}
