@@ -184,10 +184,10 @@ impl Shooting<'_> {
             Normal { cost: 0.5 * chi2, gradient: DVector::zeros(total), curvature: DMatrix::zeros(total, total) };
         for (w, (matrix, gradient)) in small.iter().enumerate() {
             let at = |i: usize| if i < n { i } else { n + w * locals + (i - n) };
-            for i in 0..m {
-                normal.gradient[at(i)] += gradient[i];
-                for j in 0..m {
-                    normal.curvature[(at(i), at(j))] += matrix[i][j];
+            for (i, (row, slope)) in matrix.iter().zip(gradient).enumerate().take(m) {
+                normal.gradient[at(i)] += slope;
+                for (j, value) in row.iter().enumerate().take(m) {
+                    normal.curvature[(at(i), at(j))] += value;
                 }
             }
         }

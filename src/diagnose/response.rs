@@ -119,11 +119,10 @@ impl<'a> Responder<'a> {
         let mut column = Vec::with_capacity(self.values());
         for window in self.windows {
             let mut s = [0.0; 4];
-            for k in window.begin..window.compared.end {
+            for (k, [motor, table]) in torque.iter().enumerate().take(window.compared.end).skip(window.begin) {
                 if k >= window.compared.start {
                     self.push(&mut column, &s);
                 }
-                let [motor, table] = torque[k];
                 s = self.step.apply(&s, [motor.start, table.start], [motor.end, table.end]);
             }
         }

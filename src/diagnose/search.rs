@@ -181,7 +181,8 @@ impl Search<'_> {
         let beyond_a_rigid_axis = info.place == Place::Coupling
             || (info.place == Place::Table && effect != Effect::FlexibleMode)
             || (info.place == Place::Sensor);
-        !matches!(effect, Effect::EncoderQuantisation | Effect::TorqueGain) && !(rigid && beyond_a_rigid_axis)
+        let unfit = matches!(effect, Effect::EncoderQuantisation | Effect::TorqueGain);
+        !unfit && (!rigid || !beyond_a_rigid_axis)
     }
 
     /// Takes an effect's plain form to its minimum, then tries its richer forms from there.
