@@ -62,6 +62,7 @@ pub fn substeps(p: &Parameters<f64>, structure: Structure, effects: &Settings<f6
         return 1;
     }
     let mut rate: f64 = 0.0;
+    let inertia = if structure == Structure::TwoInertia { p.i2 } else { p.i1 + p.i2 };
     if structure == Structure::TwoInertia {
         rate = rate.max((p.k * p.twist_mobility()).sqrt());
     }
@@ -69,6 +70,9 @@ pub fn substeps(p: &Parameters<f64>, structure: Structure, effects: &Settings<f6
         let p = effects.of(effect);
         if effect == Effect::FlexibleMode && p[0] > 0.0 {
             rate = rate.max((p[1] / p[0]).sqrt());
+        }
+        if effect == Effect::EndStop && inertia > 0.0 {
+            rate = rate.max((p[0] / inertia).sqrt());
         }
     }
     ((rate * dt / 0.25).ceil() as usize).clamp(1, 16)

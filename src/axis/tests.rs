@@ -236,7 +236,7 @@ pub(super) fn shown(effect: Effect) -> Settings {
         Effect::Disturbance => &[1e-3, 7.0, 0.4],
         Effect::Unbalance => &[1e-3, 0.2],
         Effect::QuadraticDrag => &[1e-5],
-        Effect::EndStop => &[0.5, 0.3, -0.2],
+        Effect::EndStop => &[0.5, 0.3, -0.2, 0.02],
         Effect::TorqueGain => &[1.2],
         Effect::Saturation => &[0.02],
         Effect::Delay => &[2.3e-3],

@@ -7,11 +7,12 @@ use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
 use super::fit::Data;
 use super::gap::{self, Gap};
 use super::lattice;
+use super::location::{Location, locate};
 use super::model::{BaseParameter, Free, Model};
 use super::noise::NoiseEstimate;
 use super::record::Record;
 use super::search::{Search, Tested};
-use super::windows::{Window, cut};
+use super::windows::{Initial, Window, cut};
 use super::{states, words};
 use crate::effects::{Effect, Place};
 
@@ -66,6 +67,8 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     };
     progress("the model as given");
     let decision = decide(&search, progress);
+    progress("where");
+    let located = locate(record, &case.nominal.parameters, case.nominal.structure);
     progress("held-out data");
     let held = Held { record: held.0, windows: &held.1, states: states::along(held.0, &case.nominal) };
     let models = [case.nominal, decision.parameters.fitted.model, decision.chosen.fitted.model];
@@ -75,14 +78,14 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         gap::measure(record, &train, [&e[0], &e[1], &e[2]])
     };
     let on_held = held.gap(models);
-    let mut diagnosis = build(case, &decision, &held, on_train, on_held);
+    let mut diagnosis = build(case, &decision, &held, on_train, on_held, &located);
     lattice::judge(case, &decision, &mut diagnosis);
     words::fill(&mut diagnosis, &decision);
     Outcome { diagnosis, improved: models[2], models, decision }
 }
 
-fn initial(states: &super::response::States, windows: &[Window]) -> Vec<[f64; 4]> {
-    windows.iter().map(|w| states.motion[w.begin]).collect()
+fn initial(states: &super::response::States, windows: &[Window]) -> Vec<Initial> {
+    windows.iter().map(|w| states.initial(w.begin)).collect()
 }
 
 /// Held-out data.
@@ -104,7 +107,14 @@ impl Held<'_> {
     }
 }
 
-fn build(case: &Case<'_>, decision: &Decision, held: &Held<'_>, train: Gap, holdout: Gap) -> Diagnosis {
+fn build(
+    case: &Case<'_>,
+    decision: &Decision,
+    held: &Held<'_>,
+    train: Gap,
+    holdout: Gap,
+    located: &Location,
+) -> Diagnosis {
     let values = held_free_values(case, decision);
     let best = decision.ranking.first().map_or(0.0, |w| w.bic);
     let before = held.errors(&decision.given.fitted.model);
@@ -133,7 +143,7 @@ fn build(case: &Case<'_>, decision: &Decision, held: &Held<'_>, train: Gap, hold
         machine: case.machine.clone(),
         verdict,
         sentence: String::new(),
-        location: location(&causes),
+        location: location(&causes, verdict, located),
         causes,
         ranking,
         confusable: Vec::new(),
@@ -233,19 +243,34 @@ fn finite(v: f64) -> Value {
     if v.is_finite() { json!(v) } else { Value::Null }
 }
 
-fn location(causes: &[Cause]) -> Where {
+/// Where the gap lies: the causes' own places, beside what the smoother says without knowing any cause.
+fn location(causes: &[Cause], verdict: Verdict, located: &Location) -> Where {
     let mut by_place = Map::new();
     for place in Place::ALL {
-        let share: f64 = causes.iter().filter(|c| c.place == place.as_str()).map(|c| c.share_of_gap).sum();
-        by_place.insert(place.as_str().to_owned(), json!(share));
+        let named: f64 = causes.iter().filter(|c| c.place == place.as_str()).map(|c| c.share_of_gap).sum();
+        let seen = located.by_place.iter().find(|e| e.place == Some(place)).map_or(0.0, |e| e.share);
+        by_place.insert(place.as_str().to_owned(), json!(if causes.is_empty() { seen } else { named }));
+    }
+    let smoother = located.place.map_or("none", Place::as_str);
+    let place = match (causes.first(), verdict) {
+        (Some(c), Verdict::Effect | Verdict::Parameters) => c.place.clone(),
+        (_, Verdict::Unexplained) => smoother.to_owned(),
+        _ => "none".to_owned(),
+    };
+    let mut summary = located.summary.clone();
+    if verdict == Verdict::Effect && located.place.is_some() && place != smoother {
+        summary.push_str(&format!(
+            " The unknown-input smoother alone puts it at the {smoother}, the fitted cause at the {place}: the fit, which \
+             explains the record better, decides."
+        ));
     }
     Where {
-        place: causes.first().map_or_else(|| "none".to_owned(), |c| c.place.clone()),
+        place,
         by_place,
-        by_time: json!([]),
-        by_frequency: json!([]),
-        by_state: json!([]),
-        summary: String::new(),
+        by_time: json!(located.by_time),
+        by_frequency: json!(located.by_frequency),
+        by_state: json!(located.by_state),
+        summary,
     }
 }
 

@@ -30,6 +30,30 @@ pub fn column(
     }
 }
 
+/// The columns of a flexible mode that was already swinging when the record began: its free decay from a unit twist
+/// and from a unit rate.
+#[must_use]
+pub fn free_decay(settings: &Settings, record: &Record, responder: &Responder<'_>) -> Vec<Column> {
+    let on = settings.active_with(&[Effect::FlexibleMode]);
+    [[1.0, 0.0], [0.0, 1.0]]
+        .into_iter()
+        .map(|[twist, rate]| {
+            let mut memory = [0.0; MEMORY];
+            settings.set_mode(&mut memory, twist, rate);
+            let still = [Motion::default(); 3];
+            let at: Vec<[f64; 2]> = (0..record.len())
+                .map(|k| {
+                    let h = if k == 0 { 0.0 } else { record.dt };
+                    let step = StepMotion { start: still, end: still, time: record.time(k), h, contact: 0 };
+                    let forces = settings.forces(&on, &Base { k: 0.0, b: 0.0 }, &step, &mut memory);
+                    [-forces.torque[0], -forces.torque[1]]
+                })
+                .collect();
+            responder.torques(&ramps(&at))
+        })
+        .collect()
+}
+
 fn input_torques(settings: &Settings, on: &ActiveEffects, record: &Record) -> Torques {
     let mut history = TorqueHistory::settled(record.torque.first().copied().unwrap_or_default());
     (0..record.len())

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::model::{Coordinate, Free, Model};
 use super::record::Record;
-use super::windows::{self, Window, local_count, local_state};
+use super::windows::{self, Initial, Window, local_indices, local_state};
 use crate::effects::Effect;
 use crate::identify::levenberg::{self, Normal, Options, Problem, Termination};
 use crate::scalar::Dual;
@@ -44,7 +44,7 @@ pub struct Fitted {
     /// Standard error of each free value, in its unit, at unit noise.
     pub std: Vec<f64>,
     /// Initial state of each window.
-    pub initial: Vec<[f64; 4]>,
+    pub initial: Vec<Initial>,
     /// Sum of squared residuals in units of the noise, without the prior.
     pub chi2: f64,
     /// Squared residuals of each channel, summed, in its unit.
@@ -68,7 +68,7 @@ struct Shooting<'a> {
     coordinates: &'a [Coordinate],
     also: Vec<Effect>,
     per: usize,
-    locals: usize,
+    locals: &'static [usize],
     /// Prior mean of each coordinate that has one, in x.
     prior: Vec<Option<f64>>,
     /// Squared residual per value that the model cannot remove: the priors count as much as data of that quality.
@@ -77,8 +77,8 @@ struct Shooting<'a> {
 
 impl Shooting<'_> {
     fn local<'v>(&self, p: &'v DVector<f64>, w: usize) -> &'v [f64] {
-        let from = self.coordinates.len() + w * self.locals;
-        &p.as_slice()[from..from + self.locals]
+        let from = self.coordinates.len() + w * self.locals.len();
+        &p.as_slice()[from..from + self.locals.len()]
     }
 
     fn sum(&self, p: &DVector<f64>) -> Sum {
@@ -93,7 +93,7 @@ impl Shooting<'_> {
             self.per,
             record,
             self.data.windows,
-            |w| local_state(model.structure, self.local(p, w)),
+            |w| local_state(model.structure, self.locals, self.local(p, w)),
             |m| m,
             |_, k, reading| {
                 let model = [reading.theta1, reading.omega1, reading.theta2, reading.omega2];
@@ -140,7 +140,7 @@ impl Shooting<'_> {
         let model = self.start.at(self.coordinates, &x);
         let record = self.data.record;
         let weight = record.noise.map(|s| 1.0 / s);
-        let locals = self.locals;
+        let locals = self.locals.len();
         let m = n + locals;
         // One small normal matrix a window, over the shared parameters and the window's own initial state.
         let mut small = vec![([[0.0; N]; N], [0.0; N]); self.data.windows.len()];
@@ -154,7 +154,7 @@ impl Shooting<'_> {
             |w| {
                 let own = self.local(p, w);
                 let own: Vec<Dual<N>> = (0..locals).map(|i| Dual::variable(own[i], n + i)).collect();
-                local_state(model.structure, &own)
+                local_state(model.structure, self.locals, &own)
             },
             |mut d| {
                 d.eps[n..m].fill(0.0);
@@ -212,7 +212,7 @@ impl Problem for Shooting<'_> {
 
     fn linearise(&self, p: &DVector<f64>) -> Option<Normal> {
         // The derivative directions are a compile-time number: the next size up.
-        match self.coordinates.len() + self.locals {
+        match self.coordinates.len() + self.locals.len() {
             0..=4 => Some(self.linearise_with::<4>(p)),
             5..=8 => Some(self.linearise_with::<8>(p)),
             9..=12 => Some(self.linearise_with::<12>(p)),
@@ -241,7 +241,7 @@ pub fn fit(
     nominal: &Model,
     start: &Model,
     free: &[Free],
-    initial: &[[f64; 4]],
+    initial: &[Initial],
     effort: Effort,
 ) -> Fitted {
     let coordinates: Vec<Coordinate> = free.iter().map(|f| Coordinate::new(*f, start)).collect();
@@ -254,7 +254,8 @@ pub fn fit(
         })
         .collect();
     also.dedup();
-    let locals = local_count(start.structure);
+    let flexible = also.contains(&Effect::FlexibleMode) || start.effects.is_on(Effect::FlexibleMode);
+    let locals = local_indices(start.structure, flexible);
     let problem = Shooting {
         data,
         start: *start,
@@ -266,13 +267,15 @@ pub fn fit(
         misfit: effort.misfit.max(1.0),
     };
     let n = coordinates.len();
-    let total = n + locals * data.windows.len();
+    let total = n + locals.len() * data.windows.len();
     let mut p = DVector::zeros(total);
     for (i, c) in coordinates.iter().enumerate() {
         p[i] = c.x(start);
     }
     for (w, s) in initial.iter().enumerate() {
-        p.as_mut_slice()[n + w * locals..n + (w + 1) * locals].copy_from_slice(&s[..locals]);
+        for (i, local) in locals.iter().enumerate() {
+            p[n + w * locals.len() + i] = s[*local];
+        }
     }
     let options = Options {
         iterations: effort.iterations,
@@ -291,7 +294,7 @@ pub fn fit(
         model: start.at(&coordinates, x),
         std,
         initial: (0..data.windows.len())
-            .map(|w| local_state(start.structure, problem.local(&report.parameters, w)))
+            .map(|w| local_state(start.structure, locals, problem.local(&report.parameters, w)))
             .collect(),
         chi2: sum.chi2,
         squares: sum.squares,
@@ -310,7 +313,7 @@ fn shared_std(curvature: &DMatrix<f64>, n: usize, coordinates: &[Coordinate], x:
 /// The model's readings at every compared sample of the windows, from the given initial states: window, sample,
 /// readings.
 #[must_use]
-pub fn predict(data: Data<'_>, model: &Model, initial: &[[f64; 4]]) -> Vec<(usize, usize, [f64; 4])> {
+pub fn predict(data: Data<'_>, model: &Model, initial: &[Initial]) -> Vec<(usize, usize, [f64; 4])> {
     let mut out = Vec::with_capacity(data.windows.iter().map(|w| w.compared.len()).sum());
     windows::run(
         model,

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::fit::{Data, Effort, fit};
 use super::model::Model;
 use super::record::{CHANNELS, Record};
-use super::windows::Window;
+use super::windows::{Initial, Window};
 
 /// Resamplings of the block bootstrap.
 const RESAMPLINGS: usize = 400;
@@ -45,7 +45,7 @@ type Errors = Vector4<f64>;
 
 /// Squared errors of a model over windows whose initial states are fitted, window by window, and the initial states.
 #[must_use]
-pub fn errors(data: Data<'_>, model: &Model, initial: &[[f64; 4]]) -> (Vec<Errors>, Vec<[f64; 4]>) {
+pub fn errors(data: Data<'_>, model: &Model, initial: &[Initial]) -> (Vec<Errors>, Vec<Initial>) {
     let fitted = fit(data, model, model, &[], initial, Effort { iterations: 12, misfit: 1.0 });
     let mut windows = vec![Errors::zeros(); data.windows.len()];
     for (w, k, r) in super::fit::predict(data, model, &fitted.initial) {

@@ -6,7 +6,7 @@
 
 use super::model::Model;
 use super::record::Record;
-use super::windows::Window;
+use super::windows::{Initial, Window};
 use crate::axis::{Linear, Propagator, Scheme, Structure};
 use crate::effects::Ramp;
 
@@ -17,6 +17,15 @@ pub struct States {
     pub motion: Vec<[f64; 4]>,
     /// Accelerations, rad/s2.
     pub acceleration: Vec<[f64; 2]>,
+}
+
+impl States {
+    /// The state of a window that begins at the sample; a third inertia moves with the table.
+    #[must_use]
+    pub fn initial(&self, sample: usize) -> Initial {
+        let [theta1, omega1, theta2, omega2] = self.motion[sample];
+        [theta1, omega1, theta2, omega2, 0.0, 0.0]
+    }
 }
 
 /// Extra torque on motor and table over each sample.

@@ -82,7 +82,7 @@ impl<'a> Screen<'a> {
     #[must_use]
     pub fn starts(&self, effect: Effect, variant: usize, most: usize) -> Vec<Candidate> {
         let form = &effect.info().variants[variant];
-        let trials = self.scales.trials(effect, form, self.model);
+        let trials = self.scales.trials(effect, form);
         let mut found: Vec<Candidate> =
             trials.par_iter().filter_map(|trial| self.regress(effect, variant, form, trial)).collect();
         found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
@@ -120,6 +120,9 @@ impl<'a> Screen<'a> {
         let nonlinear = columns.is_empty();
         if nonlinear {
             columns.push(column(&trial.settings));
+            if effect == Effect::FlexibleMode {
+                columns.extend(features::free_decay(&trial.settings, self.record, &self.responder));
+            }
         }
         let (chi2, sizes) = self.solve(&columns);
         let mut settings = self.model.effects;
@@ -223,7 +226,7 @@ impl Trial {
         // Shapes that hang on the size follow it.
         for &(i, scale, fraction) in &self.fractions {
             if matches!(scale, Scale::Mode | Scale::One) && effect == Effect::FlexibleMode {
-                settings.of_mut(effect)[i] = scales.value(effect, i, scale, fraction, settings);
+                settings.of_mut(effect)[i] = scales.value(effect, scale, fraction, settings);
             }
         }
     }
@@ -240,7 +243,8 @@ struct Scales {
     inertia: f64,
     orders: [Vec<f64>; 2],
     frequencies: Vec<f64>,
-    travel: Vec<f64>,
+    /// Lowest and highest angle of the table.
+    travel: [f64; 2],
 }
 
 impl Scales {
@@ -276,8 +280,7 @@ impl Scales {
             lines(step, most)
         };
         let length = record.len() as f64 * record.dt;
-        let mut travel: Vec<f64> = states.motion.iter().map(|s| s[2]).collect();
-        travel.sort_by(f64::total_cmp);
+        let travel = states.motion.iter().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s[2]), high.max(s[2])]);
         let mode = match model.structure {
             Structure::TwoInertia => p.modal().wn,
             Structure::Rigid => std::f64::consts::TAU * 0.05 / record.dt,
@@ -296,7 +299,7 @@ impl Scales {
         }
     }
 
-    fn value(&self, effect: Effect, i: usize, scale: Scale, fraction: f64, settings: &Settings) -> f64 {
+    fn value(&self, effect: Effect, scale: Scale, fraction: f64, settings: &Settings) -> f64 {
         let side = usize::from(effect.info().place == Place::Table);
         match scale {
             Scale::One if effect == Effect::FlexibleMode => {
@@ -315,19 +318,16 @@ impl Scales {
                 settings.of(effect)[0] * w * w
             }
             Scale::Inertia => fraction * self.inertia,
-            Scale::Travel => {
-                let _ = i;
-                let n = self.travel.len();
-                self.travel[((n - 1) as f64 * fraction) as usize]
-            }
+            // From the upper end of the travel downwards, or from the lower end upwards.
+            Scale::Travel if fraction > 0.0 => self.travel[1] - fraction * (self.travel[1] - self.travel[0]),
+            Scale::Travel => self.travel[0] - fraction * (self.travel[1] - self.travel[0]),
         }
     }
 
     /// Every combination of the starts of the variant's free parameters.
-    fn trials(&self, effect: Effect, form: &Variant, model: &Model) -> Vec<Trial> {
+    fn trials(&self, effect: Effect, form: &Variant) -> Vec<Trial> {
         let info = effect.info();
         let mut trials = vec![Trial { settings: Settings::default(), fractions: Vec::new() }];
-        let _ = model;
         // Sizes first: shapes may hang on them.
         let mut order: Vec<usize> = form.free.to_vec();
         order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
@@ -347,7 +347,7 @@ impl Scales {
                 .flat_map(|t| {
                     fractions.iter().map(|&fraction| {
                         let mut settings = t.settings;
-                        settings.of_mut(effect)[i] = self.value(effect, i, scale, fraction, &settings);
+                        settings.of_mut(effect)[i] = self.value(effect, scale, fraction, &settings);
                         let mut all = t.fractions.clone();
                         all.push((i, scale, fraction));
                         Trial { settings, fractions: all }

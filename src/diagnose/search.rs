@@ -6,8 +6,9 @@ use super::fit::{Data, Effort, Fitted, fit};
 use super::model::{BaseParameter, Free, Model};
 use super::response::States;
 use super::screen::{Candidate, Screen};
+use super::windows::Initial;
 use crate::axis::Structure;
-use crate::effects::{Effect, Place, Settings};
+use crate::effects::{Effect, Place, Settings, Variant};
 
 /// Linearisations of a first look at a start.
 const GLANCE: usize = 6;
@@ -15,6 +16,14 @@ const GLANCE: usize = 6;
 const FULL: usize = 40;
 /// Starts looked at per effect.
 const STARTS: usize = 3;
+/// Effects fitted at a time.
+const BATCH: usize = 4;
+/// Squared residual per value at which a fit counts as having reached the floor,
+const REACHED: f64 = 1.3;
+/// or having nearly reached it.
+const REACHED_NEARLY: f64 = 1.02;
+/// An effect whose regression leaves this many times a fit at the floor is not looked at.
+const HOPELESS: f64 = 3.0;
 /// Effects that are fitted at all: the best by the regression.
 const LOOKED_AT: usize = 10;
 /// Effects whose fits are taken to the end, at most.
@@ -53,8 +62,8 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn initial(&self) -> Vec<[f64; 4]> {
-        self.data.windows.iter().map(|w| self.states.motion[w.begin]).collect()
+    fn initial(&self) -> Vec<Initial> {
+        self.data.windows.iter().map(|w| self.states.initial(w.begin)).collect()
     }
 
     fn base(&self) -> Vec<Free> {
@@ -91,7 +100,7 @@ impl Search<'_> {
         &self,
         start: &Model,
         free: &[Free],
-        initial: &[[f64; 4]],
+        initial: &[Initial],
         effects: Vec<(Effect, usize)>,
         iterations: usize,
         misfit: f64,
@@ -113,22 +122,31 @@ impl Search<'_> {
             .filter(|e| !found.contains(e) && self.applies(**e))
             .map(|&effect| {
                 progress(effect.info().id);
-                screen.starts(effect, 0, STARTS)
+                let variants = 0..effect.info().variants.len();
+                let mut starts: Vec<Candidate> = variants.flat_map(|v| screen.starts(effect, v, STARTS)).collect();
+                starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+                starts
             })
             .filter(|starts| !starts.is_empty())
             .collect();
         screened.sort_by(|a, b| a[0].chi2.total_cmp(&b[0].chi2));
         screened.truncate(LOOKED_AT);
-        let mut glances: Vec<(Tested, Candidate)> = screened
-            .par_iter()
-            .flat_map_iter(|starts| {
+        // The regression's favourites first; when they reach the floor, the others need not be looked at.
+        let mut glances: Vec<(Tested, Candidate)> = Vec::new();
+        for batch in screened.chunks(BATCH) {
+            let best = glances.iter().map(|g| g.0.fitted.chi2).fold(f64::INFINITY, f64::min);
+            if best < REACHED * self.data.values() as f64 && batch[0][0].chi2 > HOPELESS * best {
+                break;
+            }
+            glances.par_extend(batch.par_iter().flat_map_iter(|starts| {
                 progress(starts[0].effect.info().id);
                 starts
                     .iter()
+                    .take(STARTS)
                     .map(|c| (self.fit_candidate(beside, c, GLANCE), c.clone()))
                     .min_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2))
-            })
-            .collect();
+            }));
+        }
         glances.sort_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2));
         let near = glances.first().map_or(0.0, |g| NEAR * g.0.fitted.chi2);
         let mut tested: Vec<Tested> = glances
@@ -136,15 +154,62 @@ impl Search<'_> {
             .enumerate()
             .map(|(rank, (glance, candidate))| {
                 progress(candidate.effect.info().id);
-                if rank < FINALISTS && (rank < 2 || glance.fitted.chi2 < near) {
+                if rank < FINALISTS && (rank < 1 || glance.fitted.chi2 < near) {
                     self.best_variant(beside, glance, candidate, &screen)
                 } else {
                     glance.clone()
                 }
             })
             .collect();
+        tested.retain(|t| t.fitted.chi2.is_finite());
         tested.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
         tested
+    }
+
+    /// Takes an effect to its minimum in the form it was looked at, then tries its other forms from there.
+    fn best_variant(&self, beside: &Tested, glance: &Tested, candidate: &Candidate, screen: &Screen<'_>) -> Tested {
+        let effect = candidate.effect;
+        let first = self.refit(beside, &glance.fitted, effect, candidate.variant, FULL);
+        let values = self.data.values() as f64;
+        let mut forms = vec![first];
+        for (variant, form) in effect.info().variants.iter().enumerate() {
+            if variant == candidate.variant {
+                continue;
+            }
+            // A richer form than one that is at the floor has nothing left to explain.
+            let richer = form.free.len() > effect.info().variants[candidate.variant].free.len();
+            if richer && forms[0].fitted.chi2 < REACHED_NEARLY * values {
+                continue;
+            }
+            let mut starts = vec![restricted(&forms[0].fitted.model.effects, effect, form, &self.nominal.effects)];
+            starts.extend(screen.starts(effect, variant, 1).iter().map(|c| c.settings));
+            let best = starts
+                .iter()
+                .filter(|s| s.is_on(effect))
+                .map(|settings| {
+                    let mut model = forms[0].fitted.model;
+                    model.effects.of_mut(effect).copy_from_slice(settings.of(effect));
+                    let start = Fitted { model, ..forms[0].fitted.clone() };
+                    self.refit(beside, &start, effect, variant, FULL)
+                })
+                .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+            forms.extend(best);
+        }
+        forms.retain(|t| t.fitted.chi2.is_finite());
+        forms.sort_by_key(|t| t.freedom);
+        if forms.is_empty() { glance.clone() } else { simplest(&forms, values).clone() }
+    }
+
+    /// Whether the effect can act on this axis and be fitted: a rigid axis has no coupling; rounding has no derivative
+    /// and is judged by its lattice; a torque constant is a common factor of the nominal parameters.
+    fn applies(&self, effect: Effect) -> bool {
+        let rigid = self.nominal.structure == Structure::Rigid;
+        let info = effect.info();
+        let beyond_a_rigid_axis = info.place == Place::Coupling
+            || (info.place == Place::Table && effect != Effect::FlexibleMode)
+            || (info.place == Place::Sensor);
+        let unfit = matches!(effect, Effect::EncoderQuantisation | Effect::TorqueGain);
+        !unfit && (!rigid || !beyond_a_rigid_axis)
     }
 
     /// One of a combination's effects alone, as it was fitted there: a start for other partners.
@@ -173,41 +238,6 @@ impl Search<'_> {
         self.test(&start, &free, &combination.fitted.initial, keep.to_vec(), FULL, misfit)
     }
 
-    /// Whether the effect can act on this axis and be fitted: a rigid axis has no coupling; rounding has no derivative
-    /// and is judged by its lattice; a torque constant is a common factor of the nominal parameters.
-    fn applies(&self, effect: Effect) -> bool {
-        let rigid = self.nominal.structure == Structure::Rigid;
-        let info = effect.info();
-        let beyond_a_rigid_axis = info.place == Place::Coupling
-            || (info.place == Place::Table && effect != Effect::FlexibleMode)
-            || (info.place == Place::Sensor);
-        let unfit = matches!(effect, Effect::EncoderQuantisation | Effect::TorqueGain);
-        !unfit && (!rigid || !beyond_a_rigid_axis)
-    }
-
-    /// Takes an effect's plain form to its minimum, then tries its richer forms from there.
-    fn best_variant(&self, beside: &Tested, glance: &Tested, candidate: &Candidate, screen: &Screen<'_>) -> Tested {
-        let effect = candidate.effect;
-        let plain = self.refit(beside, &glance.fitted, effect, 0, FULL);
-        let mut forms = vec![plain];
-        for variant in 1..effect.info().variants.len() {
-            let mut starts = vec![forms[0].fitted.model.effects];
-            starts.extend(screen.starts(effect, variant, 1).iter().map(|c| c.settings));
-            let best = starts
-                .iter()
-                .map(|settings| {
-                    let start = Fitted {
-                        model: Model { effects: *settings, ..forms[0].fitted.model },
-                        ..forms[0].fitted.clone()
-                    };
-                    self.refit(beside, &start, effect, variant, FULL)
-                })
-                .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
-            forms.extend(best);
-        }
-        simplest(&forms, self.data.values() as f64).clone()
-    }
-
     fn free(&self, beside: &Tested, effect: Effect, variant: usize) -> Vec<Free> {
         let mut free = self.base();
         for (e, v) in beside.effects.iter().copied().chain([(effect, variant)]) {
@@ -230,6 +260,17 @@ impl Search<'_> {
         let start = Fitted { model: Model { effects, ..base }, initial: self.initial(), ..beside.fitted.clone() };
         self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
     }
+}
+
+/// The settings with the parameters that a form does not free put back.
+fn restricted(settings: &Settings, effect: Effect, form: &Variant, off: &Settings) -> Settings {
+    let mut s = *settings;
+    for i in 0..effect.info().parameters.len() {
+        if !form.free.contains(&i) {
+            s.of_mut(effect)[i] = off.of(effect)[i];
+        }
+    }
+    s
 }
 
 /// Share of the excess over the simplest form's that a richer form must take away to be preferred.

@@ -3,21 +3,39 @@
 //! Savitzky, Golay, Analytical Chemistry 36(8), 1964: the least-squares cubic over `2*HALF + 1` samples gives position,
 //! speed and acceleration at its middle.
 
+use super::location::smooth_states;
 use super::model::Model;
 use super::record::Record;
 use super::response::States;
+use crate::axis::Structure;
 
 /// Half width of the fit, samples.
 const HALF: i64 = 6;
 
 /// The motion along a record of the model's axis.
+///
+/// A side without an encoder is taken from the smoother, which knows the axis and allows for unknown torques.
 #[must_use]
-pub fn along(record: &Record, _model: &Model) -> States {
-    from_positions(record)
+pub fn along(record: &Record, model: &Model) -> States {
+    let mut states = from_positions(record);
+    let unseen: Vec<usize> = [0, 2].into_iter().filter(|c| record.channels[*c].is_none()).collect();
+    if unseen.is_empty() || model.structure == Structure::Rigid {
+        return states;
+    }
+    let smoothed = smooth_states(record, &model.parameters, model.structure).states;
+    let n = record.len();
+    for side in unseen {
+        for k in 0..n {
+            states.motion[k][side..side + 2].copy_from_slice(&smoothed[k][side..side + 2]);
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            let rise = smoothed[b][side + 1] - smoothed[a][side + 1];
+            states.acceleration[k][side / 2] = rise / ((b - a) as f64 * record.dt);
+        }
+    }
+    states
 }
 
 /// The motion at every sample; a side without an encoder moves as the other.
-#[must_use]
 fn from_positions(record: &Record) -> States {
     let n = record.len();
     let m = HALF;

@@ -55,7 +55,7 @@ pub fn steps(model: &Model, record: &Record) -> usize {
 
 /// Runs the model over the windows; `visit(window, sample, reading)` for every compared sample.
 ///
-/// `initial`: angles and speeds at the beginning of each window. `also`: effects taken as on whatever their size.
+/// `initial`: the state at the beginning of each window, see [`Initial`]. `also`: effects taken as on whatever their size.
 /// `forget` drops what internal states know of the window they come from (derivatives to its initial state).
 #[allow(clippy::too_many_arguments)]
 pub fn run<S: Scalar>(
@@ -64,7 +64,7 @@ pub fn run<S: Scalar>(
     per: usize,
     record: &Record,
     windows: &[Window],
-    initial: impl Fn(usize) -> [S; 4],
+    initial: impl Fn(usize) -> Initial<S>,
     forget: impl Fn(S) -> S,
     mut visit: impl FnMut(usize, usize, &Reading<S>),
 ) {
@@ -72,11 +72,16 @@ pub fn run<S: Scalar>(
     let axis = Axis::with_on(model.parameters, model.structure, model.effects, also, Scheme::Exact, h);
     let torque = Torque::new(&axis, record, per);
     let sensed = !axis.on().sensors().is_empty();
+    let flexible = axis.on().forces().contains(&Effect::FlexibleMode);
     let mut memory: Memory<S> = [S::default(); MEMORY];
     for (w, window) in windows.iter().enumerate() {
         let next = windows.get(w + 1).map_or(usize::MAX, |n| n.begin);
         let time = |k: usize| record.start + k as f64 * record.dt;
-        let mut state = axis.resume(initial(w), &memory, time(window.begin));
+        let [theta1, omega1, theta2, omega2, twist, rate] = initial(w);
+        if flexible {
+            model.effects.set_mode(&mut memory, twist, rate);
+        }
+        let mut state = axis.resume([theta1, omega1, theta2, omega2], &memory, time(window.begin));
         let mut history = sensed.then(|| SensorHistory::settled(state.reading(), record.dt));
         for k in window.begin..window.compared.end {
             if k == next {
@@ -147,22 +152,32 @@ impl<'a, S: Scalar> Torque<'a, S> {
     }
 }
 
-/// Numbers of an initial state that are free: a rigid axis has two.
+/// State at the beginning of a window: `[theta1, omega1, theta2, omega2]`, and twist and rate of a third inertia.
+pub type Initial<S = f64> = [S; 6];
+
+/// Which numbers of an initial state are free: a rigid axis has no twist, only a flexible mode has a third inertia.
 #[must_use]
-pub const fn local_count(structure: Structure) -> usize {
-    match structure {
-        Structure::TwoInertia => 4,
-        Structure::Rigid => 2,
+pub const fn local_indices(structure: Structure, flexible: bool) -> &'static [usize] {
+    match (structure, flexible) {
+        (Structure::TwoInertia, false) => &[0, 1, 2, 3],
+        (Structure::TwoInertia, true) => &[0, 1, 2, 3, 4, 5],
+        (Structure::Rigid, false) => &[0, 1],
+        (Structure::Rigid, true) => &[0, 1, 4, 5],
     }
 }
 
-/// The four numbers of an initial state from the free ones: `[theta1, omega1, theta2, omega2]`.
+/// The initial state from its free numbers.
 #[must_use]
-pub fn local_state<S: Scalar>(structure: Structure, free: &[S]) -> [S; 4] {
-    match structure {
-        Structure::TwoInertia => [free[0], free[1], free[2], free[3]],
-        Structure::Rigid => [free[0], free[1], free[0], free[1]],
+pub fn local_state<S: Scalar>(structure: Structure, indices: &[usize], free: &[S]) -> Initial<S> {
+    let mut state = [S::default(); 6];
+    for (i, v) in indices.iter().zip(free) {
+        state[*i] = *v;
     }
+    if structure == Structure::Rigid {
+        state[2] = state[0];
+        state[3] = state[1];
+    }
+    state
 }
 
 #[cfg(test)]

@@ -128,7 +128,7 @@ pub enum Scale {
     Order,
     /// Frequencies in Hz, as the record lets them be seen.
     Frequency,
-    /// Quantile of the table's travel.
+    /// The table's travel: a share of it below the upper end, or (negative) above the lower end.
     Travel,
 }
 

@@ -195,6 +195,15 @@ impl<S: Scalar> Settings<S> {
         sum
     }
 
+    /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
+    pub(crate) fn set_mode(&self, memory: &mut Memory<S>, twist: S, rate: S) {
+        let (p, at) = (self.of(Effect::FlexibleMode), MEMORY_OFFSETS[Effect::FlexibleMode as usize]);
+        let pull = p[1] * twist + p[2] * rate;
+        memory[at] = twist;
+        memory[at + 1] = rate;
+        memory[at + 2] = if p[0].re() > 0.0 { pull / p[0] } else { S::default() };
+    }
+
     /// The torque on the motor over a step, from the torque commanded over it.
     pub fn transform_input(&self, on: &ActiveEffects, ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
         on.inputs.as_slice().iter().fold(ramp, |ramp, &e| e.transform_input(self.of(e), ramp, h, history))
