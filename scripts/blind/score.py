@@ -103,6 +103,8 @@ def judge(seal: dict, answer: dict | None, seconds: float | None) -> dict:
     by_family, proven = confusable(answer, told, same_family)
     by_place, _ = confusable(answer, told, same_place)
     causes = [c["id"] for c in (answer or {}).get("causes") or []] if (answer or {}).get("verdict") == "effect" else []
+    suspects = [family_of(c["id"]) for c in (answer or {}).get("causes") or []] or [family]
+    where = ((answer or {}).get("where") or {}).get("place")
     found = closure(answer)
     best = oracle_closure(seal) if seal["verdict"] == "effect" else None
     return {
@@ -114,6 +116,7 @@ def judge(seal: dict, answer: dict | None, seconds: float | None) -> dict:
         "causes": causes, "family_right": family == true_family, "place_right": place == true_place,
         "id_right": told in ids or (family == true_family and true_family in NOT_AN_EFFECT),
         "family_confusable": family == true_family or by_family, "place_confusable": place == true_place or by_place,
+        "suspect_right": suspects[0] == true_family, "where_right": where == true_place,
         "confusable_proven": proven, "closure": found, "oracle_closure": best,
         "closure_of_oracle": None if best is None else (found or 0.0) / best, "seconds": seconds,
         "pair_named": len(ids) == 2 and {family_of(i) for i in ids} <= {family_of(c) for c in causes},
@@ -153,8 +156,10 @@ def summary(rows: list[dict], without: list[dict]) -> dict:
     pairs = [r for r in rows if r["class"] == "pairs"]
     for r in quiet:
         r["false_alarm"] = r["told"] in effects.FAMILY and r["told_family"] != "parameters"
-    keys = ("family_right", "place_right", "id_right", "family_confusable", "place_confusable", "confusable_proven")
+    keys = ("family_right", "place_right", "id_right", "family_confusable", "place_confusable", "confusable_proven", "suspect_right")
     out = {"cases": len(rows), "singles": {k: proportion(singles, k) for k in keys}}
+    # A parameter error has no place of its own.
+    out["where"] = proportion([r for r in singles if r["true_family"] != "parameters"], "where_right")
     out["by"] = {}
     for axis in ("class", "axis", "sensors"):
         groups = {}
@@ -216,6 +221,8 @@ def markdown(s: dict, rows: list[dict], title: str) -> str:
              f"| family, truth named or named as confusable | {percent(one['family_confusable'])} | 98 % |",
              f"| place, strict | {percent(one['place_right'])} | 98 % |",
              f"| place, truth named or named as confusable | {percent(one['place_confusable'])} | 98 % |",
+             f"| place by the residual alone (`where`) | {percent(s['where'])} | |",
+             f"| family of the strongest cause, also where the verdict is unexplained | {percent(one['suspect_right'])} | |",
              f"| the very effect | {percent(one['id_right'])} | |",
              f"| false alarms, no gap | {percent(s['false_alarms']['none'])} | 1 % |",
              f"| false alarms, parameters wrong | {percent(s['false_alarms']['parameters'])} | 1 % |",

@@ -55,6 +55,12 @@ def test_a_torque_gain_called_parameters_is_right_and_the_other_way_round():
     assert row["family_right"] and row["place_right"]
 
 
+def test_a_cause_named_under_unexplained_counts_as_suspect_only():
+    a = answer("coulomb_motor", verdict="unexplained", where={"place": "motor"})
+    row = score.judge(seal(), a, 1.0)
+    assert not row["family_right"] and row["suspect_right"] and row["where_right"]
+
+
 def test_a_failed_diagnosis_is_wrong():
     row = score.judge(seal(), None, None)
     assert not row["family_right"] and row["told"] == "failed" and row["closure_of_oracle"] == 0.0
