@@ -52,9 +52,9 @@ pub fn estimate(value: f64, std: f64, medium: Medium) -> String {
     };
     let common = if value == 0.0 { exponent_of(std) } else { exponent_of(value.abs().max(std)) };
     let last = exponent_of(std) - 1;
-    // Beyond f64's own digits a standard error says nothing about the estimate's.
-    if common - last > 14 {
-        return format!("{} ± {}", number(value, 15, medium), number(std, 2, medium));
+    // A standard error in the tenth digit is that of rounding: it says nothing of the machine.
+    if common - last > 9 {
+        return number(value, 7, medium);
     }
     if (-2..6).contains(&common) {
         let decimals = usize::try_from(-last).unwrap_or(0);
@@ -234,7 +234,7 @@ mod tests {
             (1.0, 0.0996, "1.00 ± 0.10"),
             (1.0, f64::NAN, "1.0000"),
             (1.0, 0.0, "1.0000"),
-            (1.0, 1e-30, "1.00000000000000 ± 1.0e-30"),
+            (1.0, 1e-30, "1.000000"),
         ];
         for (value, std, expected) in cases {
             assert_eq!(estimate(value, std, Terminal), expected);

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, Shape};
 use super::format::{self, Medium};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
-use crate::identify::result::{Estimate, FrequencyResponse, Identification, MethodResult, ResponseOf, Series as Curve};
-use crate::trace::{Motion, Signal};
+use crate::identify::result::{
+    Estimate, FrequencyResponse, Identification, MethodResult, OutputFit, ResponseOf, Series as Curve,
+};
+use crate::trace::Signal;
 
 /// Dashes of series that may lie on one another.
 const DASHES: [Dash; 3] = [Dash::Solid, Dash::Dashed, Dash::Dotted];
@@ -127,8 +129,16 @@ fn verdict(found: &Identification) -> Verdict {
     });
     let figures =
         best.modal.iter().chain(best.parameters.iter()).take(4).map(|e| (e.name.to_owned(), value(e))).collect();
-    let detail = found.recommended.as_ref().map_or_else(String::new, |r| r.why.clone());
+    let detail = found.recommended.as_ref().map_or_else(String::new, |r| sentence_of(&r.why));
     Verdict { tone, sentence, detail, figures }
+}
+
+/// A remark as a sentence: capital letter, full stop.
+fn sentence_of(text: &str) -> String {
+    let mut chars = text.chars();
+    let head: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    let stop = if text.ends_with(['.', '!', '?']) { "" } else { "." };
+    format!("{head}{}{stop}", chars.as_str())
 }
 
 fn fit_percent(fit: f64) -> String {
@@ -163,30 +173,44 @@ fn estimates(m: &MethodResult) -> Table {
     table
 }
 
+/// One row a method: how well its simulation follows each output, and whether what is left is noise.
 fn fits(found: &Identification) -> Table {
-    let mut table = Table::new(
-        "A simulation with the estimates against the measured outputs",
-        ["method", "output", "fit", "rms error", "residual white", "p value"],
-    );
-    let motion = Motion::Rotary;
-    for m in &found.methods {
-        for o in &m.outputs {
-            table.row(vec![
-                Cell::text(m.method),
-                Cell::text(o.signal.name()),
-                Cell::Percent(o.fit_percent / 100.0),
-                Cell::Number(o.rms_error, 3, unit_of(&o.residual, o.signal, motion).to_owned()),
-                Cell::text(if o.whiteness.white { "yes" } else { "no" }),
-                Cell::Number(o.whiteness.p_value, 2, String::new()),
-            ]);
+    let signals: Vec<Signal> = {
+        let mut all: Vec<Signal> = Vec::new();
+        for o in found.methods.iter().flat_map(|m| &m.outputs) {
+            if !all.contains(&o.signal) {
+                all.push(o.signal);
+            }
         }
+        all
+    };
+    let columns = std::iter::once("method".to_owned())
+        .chain(signals.iter().map(|s| format!("fit of {}", s.name())))
+        .chain(["what is left is white noise".to_owned()]);
+    let mut table = Table::new("A simulation with the estimates against the measured outputs", columns);
+    for m in found.methods.iter().filter(|m| !m.outputs.is_empty()) {
+        let mut cells = vec![Cell::text(&*m.title)];
+        for s in &signals {
+            let fit = m.outputs.iter().find(|o| o.signal == *s);
+            cells.push(fit.map_or(Cell::Empty, |o| Cell::Percent(o.fit_percent / 100.0)));
+        }
+        let coloured: Vec<&str> =
+            m.outputs.iter().filter(|o| !o.whiteness.white && !is_rounding(o)).map(|o| o.signal.name()).collect();
+        cells.push(Cell::text(if m.outputs.iter().all(is_rounding) {
+            "nothing is left but rounding".to_owned()
+        } else if coloured.is_empty() {
+            "yes".to_owned()
+        } else {
+            format!("not of {}", coloured.join(", "))
+        }));
+        table.row(cells);
     }
     table
 }
 
-/// The curve's own unit where it has one.
-fn unit_of(curve: &Curve, signal: Signal, motion: Motion) -> &'static str {
-    if curve.y_unit.is_empty() { signal.unit(motion) } else { curve.y_unit }
+/// Whether what is left is rounding, of which whiteness says nothing.
+fn is_rounding(o: &OutputFit) -> bool {
+    o.rms_error <= 1e-10 * o.rms
 }
 
 fn fit(found: &Identification) -> Vec<Block> {
@@ -203,16 +227,20 @@ fn fit(found: &Identification) -> Vec<Block> {
                 )
                 .with(line("", &o.residual));
                 let w = &o.whiteness;
-                let caption = format!(
-                    "{}: Ljung-Box over {} lags, p = {}.",
-                    if w.white {
-                        "White, as noise is"
-                    } else {
-                        "Not white: the model leaves something out, or the noise is coloured"
-                    },
-                    w.lags,
-                    format::number(w.p_value, 2, Medium::Page)
-                );
+                let caption = if is_rounding(o) {
+                    "Rounding of the simulation: nothing is left.".to_owned()
+                } else {
+                    format!(
+                        "{}: Ljung-Box over {} lags, p = {}.",
+                        if w.white {
+                            "White, as noise is"
+                        } else {
+                            "Not white: the model leaves something out, or the noise is coloured"
+                        },
+                        w.lags,
+                        format::number(w.p_value, 2, Medium::Page)
+                    )
+                };
                 Figure::new(chart, caption)
             })
             .collect::<Vec<_>>();
@@ -307,7 +335,11 @@ fn matrix(found: &Identification, caption: &str, units: bool, cell: impl Fn(&Est
     let methods: Vec<&MethodResult> = found.methods.iter().filter(|m| m.failure.is_none()).collect();
     let mut table = Table::new(caption, std::iter::once("parameter").chain(methods.iter().map(|m| m.method)));
     for (name, unit) in names(found) {
-        let label = if units && !unit.is_empty() && unit != "1" { format!("{name} [{unit}]") } else { name.to_owned() };
+        let label = if units && !unit.is_empty() && unit != "1" {
+            format!("{name} [{}]", format::unit(unit, Medium::Page))
+        } else {
+            name.to_owned()
+        };
         let mut cells = vec![Cell::Text(label)];
         cells.extend(
             methods
@@ -319,14 +351,14 @@ fn matrix(found: &Identification, caption: &str, units: bool, cell: impl Fn(&Est
     table
 }
 
-fn compare(found: &Identification) -> Table {
+pub(super) fn compare(found: &Identification) -> Table {
     matrix(found, "Estimates by method", true, |e| match e.std {
         Some(std) => Cell::Estimate(e.value, std, String::new()),
         None => Cell::Number(e.value, 5, String::new()),
     })
 }
 
-fn errors(found: &Identification) -> Table {
+pub(super) fn errors(found: &Identification) -> Table {
     matrix(found, "Error against the reference", false, |e| {
         e.error_percent.map_or(Cell::Empty, |p| Cell::Percent(p / 100.0))
     })
@@ -381,7 +413,44 @@ pub(super) fn histories(found: &Identification) -> Vec<Block> {
             figures.push(Figure::new(chart, ""));
         }
     }
+    figures.extend(distances(found));
     vec![Block::Figures(figures)]
+}
+
+/// How near each recursive method comes to the reference, where there is one.
+fn distances(found: &Identification) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    for m in &found.methods {
+        let Some(history) = &m.history else { continue };
+        let mut chart = Chart::new(
+            format!("Distance from the reference, {}", m.title),
+            Axis::linear("time", "s"),
+            Axis::log("|estimate/reference - 1|", ""),
+        );
+        for (k, (name, values)) in history.parameters.iter().enumerate() {
+            let reference = m.parameters.iter().find(|e| e.name == *name).and_then(|e| e.reference);
+            if let Some(r) = reference.filter(|r| *r != 0.0) {
+                let distance: Vec<f64> = values.iter().map(|v| (v / r - 1.0).abs()).collect();
+                chart.series.push(Series::line(*name, history.time.as_slice(), distance).with_dash(DASHES[k % 3]));
+            }
+        }
+        if !chart.series.is_empty() {
+            figures.push(Figure::new(chart, ""));
+        }
+    }
+    figures
+}
+
+/// How far each method's parameters lead the torque's estimate astray.
+pub(super) fn excitation_errors(found: &Identification) -> Table {
+    let mut table =
+        Table::new("The torque estimated from the motion", ["method", "equation", "rms error over rms torque"]);
+    for m in &found.methods {
+        if let Some(e) = &m.excitation {
+            table.row(vec![Cell::text(&*m.title), Cell::text(e.formulation), Cell::Percent(e.error_percent / 100.0)]);
+        }
+    }
+    table
 }
 
 /// Excitation, its spectrum, and what each method's parameters make of it (the paper's Figures 4, 5 and 10 to 13).
@@ -390,19 +459,20 @@ fn excitation(found: &Identification) -> Vec<Block> {
         Chart::new("Excitation", Axis::linear("time", found.torque.x_unit), Axis::linear("T", found.torque.y_unit))
             .with(line("", &found.torque).in_colour(Colour::Ink));
     let mut blocks = vec![Block::Figure(Figure::new(torque, ""))];
-    let mut table =
-        Table::new("The torque estimated from the motion", ["method", "equation", "rms error over rms torque"]);
     let measured = line("measured", &found.torque_spectrum).in_colour(Colour::Ink);
     let spectrum = |title: &str| {
         let unit = found.torque_spectrum.y_unit;
-        Chart::new(title, Axis::linear("frequency", "Hz"), Axis::linear("amplitude", unit).over(Range::WithZero))
+        let mut frequency = Axis::linear("frequency", "Hz");
+        if let Some(band) = excited(&found.torque_spectrum) {
+            frequency.range = Range::Fixed(0.0, band);
+        }
+        Chart::new(title, frequency, Axis::linear("amplitude", unit).over(Range::WithZero))
     };
     let own = Series { shape: Shape::Stem, name: String::new(), ..measured.clone() };
     let mut estimated = spectrum("Spectra of the estimated torque").with(measured.with_dash(Dash::Broad));
     let mut errors = Vec::new();
     for (k, m) in found.methods.iter().enumerate() {
         let Some(e) = &m.excitation else { continue };
-        table.row(vec![Cell::text(&*m.title), Cell::text(e.formulation), Cell::Percent(e.error_percent / 100.0)]);
         let colour = Colour::nth(k);
         estimated.series.push(line(&m.title, &e.spectrum).in_colour(colour).with_dash(DASHES[k % 3]));
         let error = Chart::new(
@@ -418,9 +488,18 @@ fn excitation(found: &Identification) -> Vec<Block> {
         figures.push(Figure::new(estimated, ""));
     }
     figures.extend(errors);
+    let table = excitation_errors(found);
     if !table.rows.is_empty() {
         blocks.push(Block::Table(table));
     }
     blocks.push(Block::Figures(figures));
     blocks
+}
+
+/// Where the band of an excitation ends, with a margin; none where it fills the spectrum.
+fn excited(spectrum: &Curve) -> Option<f64> {
+    let largest = spectrum.y.iter().copied().fold(0.0, f64::max);
+    let last = spectrum.x.iter().zip(&spectrum.y).filter(|(_, y)| **y > 1e-2 * largest).map(|(x, _)| *x).next_back()?;
+    let end = spectrum.x.last().copied()?;
+    (1.5 * last < end).then_some(1.5 * last)
 }

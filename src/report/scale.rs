@@ -78,7 +78,7 @@ impl Scale {
         let values: Vec<f64> = (first..=last.min(first + 50)).map(|i| i as f64 * step).collect();
 
         let biggest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let offset = if biggest / step > 2e4 { values[values.len() / 2] } else { 0.0 };
+        let offset = if biggest / step > 2e4 { round_near(values[values.len() / 2], step) } else { 0.0 };
         let shown: Vec<f64> = values.iter().map(|v| ((v - offset) / step).round() * step).collect();
         let (factor_exponent, unit) = factor(shown.iter().fold(0.0, |m: f64, v| m.max(v.abs())), &axis.unit);
         let factor = 10f64.powi(factor_exponent);
@@ -95,9 +95,8 @@ impl Scale {
             .collect();
         let mut label = axis.label.clone();
         if offset != 0.0 {
-            let digits = ((offset / step).abs().log10().floor() as usize + 1).min(16);
             let sign = if offset < 0.0 { '+' } else { '−' };
-            label = format!("{label} {sign} {}", format::number(offset.abs(), digits, Medium::Page));
+            label = format!("{label} {sign} {}", shortest(offset.abs()));
         }
         Self { low, high, log: false, ticks, title: titled(&label, &unit) }
     }
@@ -141,6 +140,18 @@ impl Scale {
         }
         Self { low, high, log: true, ticks, title: titled(&axis.label, &format::unit(&axis.unit, Medium::Page)) }
     }
+}
+
+/// The number with the fewest digits within fifty steps of `value`.
+fn round_near(value: f64, step: f64) -> f64 {
+    let candidates = (0..17).filter_map(|digits| format!("{value:.digits$e}").parse::<f64>().ok());
+    candidates.into_iter().find(|c| (c - value).abs() <= 50.0 * step).unwrap_or(value)
+}
+
+/// A number with just the digits it has.
+fn shortest(value: f64) -> String {
+    let digits = (1..17).find(|d| format!("{value:.*e}", d - 1).parse() == Ok(value)).unwrap_or(17);
+    format::number(value, digits, Medium::Page)
 }
 
 /// The text of a tick at `digit * 10^exponent`.
@@ -256,7 +267,7 @@ mod tests {
     #[test]
     fn a_converged_history_shows_its_last_digits_behind_an_offset() {
         let s = scale(&Axis::linear("K", "N.m/rad"), &[0.0176 - 1e-9, 0.0176 + 1e-9]);
-        assert!(s.title.starts_with("K − 0.0176000"), "{}", s.title);
+        assert!(s.title.starts_with("K − 0.0176 ["), "{}", s.title);
         assert!(s.title.ends_with("[nN·m/rad]"), "{}", s.title);
         let mut seen = labels(&s);
         seen.dedup();
