@@ -313,8 +313,10 @@ impl Kernel {
     pub fn output_derivative(&mut self, index: usize) -> Result<f64, ParameterError> {
         const THETA1: usize = Slot::Theta1 as usize;
         const OMEGA1: usize = Slot::Omega1 as usize;
+        const ALPHA1: usize = Slot::Alpha1 as usize;
         const THETA2: usize = Slot::Theta2 as usize;
         const OMEGA2: usize = Slot::Omega2 as usize;
+        const ALPHA2: usize = Slot::Alpha2 as usize;
         const X2: usize = Slot::X2 as usize;
         self.prepare()?;
         let on = self.axis.on();
@@ -325,15 +327,13 @@ impl Kernel {
             THETA2 => same(Slot::Omega2),
             X2 => same(Slot::Omega2) * self.values.of(Slot::Rho),
             OMEGA2 if on.sensors().is_empty() => same(Slot::Alpha2),
-            _ if on.motion_is_linear() && on.inputs().is_empty() => {
+            ALPHA1 | ALPHA2 if on.motion_is_linear() && on.inputs().is_empty() => {
                 let p = self.values.parameters();
                 let (w, a) = (same(Slot::Omega1) - self.state.omega2(), same(Slot::Alpha1) - same(Slot::Alpha2));
                 match self.values.structure() {
                     Structure::Rigid => self.last_rate / (p.i1 + p.i2),
                     // Eq. 2 of the paper, differentiated.
-                    Structure::TwoInertia if index == Slot::Alpha1 as usize => {
-                        (self.last_rate - p.b * a - p.k * w) / p.i1
-                    }
+                    Structure::TwoInertia if index == ALPHA1 => (self.last_rate - p.b * a - p.k * w) / p.i1,
                     Structure::TwoInertia => (p.b * a + p.k * w) / p.i2,
                 }
             }
