@@ -196,6 +196,7 @@ impl<S: Scalar> Settings<S> {
     }
 
     /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
+    #[cfg(feature = "cli")]
     pub(crate) fn set_mode(&self, memory: &mut Memory<S>, twist: S, rate: S) {
         let (p, at) = (self.of(Effect::FlexibleMode), MEMORY_OFFSETS[Effect::FlexibleMode as usize]);
         let pull = p[1] * twist + p[2] * rate;

@@ -182,7 +182,7 @@ pub struct Row {
     pub strong: bool,
 }
 
-/// A value as data; [`format`] decides how its digits are written.
+/// A value as data; [`mod@format`] decides how its digits are written.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
     /// Nothing.
