@@ -1,6 +1,7 @@
 //! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
 
 pub mod excitation;
+pub mod frequency;
 pub mod instrumental;
 pub mod levenberg;
 pub mod lsq;

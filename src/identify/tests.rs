@@ -195,3 +195,37 @@ fn under_noise_iv_and_oe_stay_within_their_standard_errors_where_ls_is_biased() 
     assert!((wn(&ls.values) / wn(&truth().into()) - 1.0).abs() > 0.05, "LS is known to be biased here");
     assert!((wn(&oe.estimated.values) / wn(&truth().into()) - 1.0).abs() < 0.01);
 }
+
+#[test]
+fn the_frequency_response_of_a_periodic_record_gives_the_parameters() {
+    // A lightly damped axis over eight periods, the first of them settling; exact hold, white noise on the angles.
+    let p = Parameters { i1: 5e-3, i2: 4e-3, b: 0.05, k: 500.0, rho: 1.0 };
+    let period = Multisine::in_band(Kind::Schroeder, 1000, 1e-3, 5.0, 200.0, 1.0, 0.0, 0).unwrap().period();
+    let torque: Vec<f64> = period.iter().cycle().take(8000).copied().collect();
+    let options = SimulateOptions { start: 0.0, dt: 1e-3, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 1 };
+    let response = simulate(&p, Structure::TwoInertia, &Settings::default(), [0.0; 4], &torque, &options);
+    let mut trace = Trace::new(0.0, 1e-3, Hold::Zoh).with(Signal::T, torque).unwrap();
+    trace.set(Signal::Theta1, response.readings.iter().map(|r| r.theta1).collect()).unwrap();
+    trace.set(Signal::Theta2, response.readings.iter().map(|r| r.theta2).collect()).unwrap();
+    disturb(&mut trace, |i, n| lcg(n, 7 + i as u64).into_iter().map(|e| 2e-5 * e).collect());
+    let found = super::record::period(trace.get(Signal::T).unwrap());
+    assert_eq!(found, Some(1000));
+    let measured = super::frequency::measure(&trace, 1000).unwrap();
+    assert_eq!((measured.periods, measured.harmonics.len()), (7, 196));
+    let guess = measured.guess(1.0).unwrap();
+    let fit = measured.fit(&guess, Scheme::Exact);
+    let std = fit.estimated.covariance.unwrap().diagonal().map(f64::sqrt);
+    for (i, truth) in [p.i1, p.i2, p.b, p.k].into_iter().enumerate() {
+        assert!(
+            (fit.estimated.values[i] - truth).abs() < 4.0 * std[i],
+            "{i}: {} +- {}",
+            fit.estimated.values[i],
+            std[i]
+        );
+        assert!(std[i] < 0.02 * truth, "{i}: {}", std[i]);
+    }
+    let against = measured.against(&p, Structure::TwoInertia, Scheme::Exact);
+    // sqrt(K/I2)/(2*pi) = 56.3 Hz and sqrt(K*(1/I1 + 1/I2))/(2*pi) = 75.5 Hz, to a line of 1 Hz.
+    assert!((against.outputs[0].antiresonance.unwrap() - 56.27).abs() <= 1.0);
+    assert!((against.outputs[0].resonance.unwrap() - 75.5).abs() <= 1.0);
+}
