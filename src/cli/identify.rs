@@ -1,15 +1,400 @@
-//! `eixo identify`.
+//! `eixo identify`: the parameters of the axis from a trace.
 
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::FINDINGS;
+use crate::axis::{Scheme, Structure};
+use crate::identify::result::{Estimate, Identification, MethodResult};
+use crate::identify::run::{Method, Request, identify};
+use crate::report::{Block, Cell, Table, terminal};
+use crate::trace::{Hold, Machine, load, write_text};
+
+/// Estimators on offer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Methods {
+    /// Least squares
+    Ls,
+    /// Recursive least squares
+    Rls,
+    /// Extended least squares, recursive and in batches
+    Els,
+    /// Instrumental variables
+    Iv,
+    /// Output error
+    Oe,
+    /// Frequency response of a periodic record
+    Frequency,
+    /// All of them
+    All,
+}
+
+/// Integrations on offer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Integration {
+    /// The one that fits the record better
+    Auto,
+    /// Exact over the sample: a real machine
+    Exact,
+    /// Newmark steps of one sample: a simulation by the paper's method
+    Newmark,
+}
+
+/// Holds on offer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Holds {
+    /// The torque keeps its value over the sample
+    Zoh,
+    /// The torque runs straight from sample to sample
+    Linear,
+}
 
 /// Arguments of `eixo identify`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The trace: CSV with time, T, theta1, theta2 (and omega1, omega2), or a log that --axis maps to them
+    #[arg(required_unless_present = "paper_tables")]
+    trace: Option<PathBuf>,
+    /// The machine: its nominal parameters are the reference, its [signals] map the log's columns
+    #[arg(long, value_name = "FILE")]
+    axis: Option<PathBuf>,
+    /// Which estimators; may be given more than once
+    #[arg(long, value_enum, default_value = "all", value_delimiter = ',')]
+    method: Vec<Methods>,
+    /// The paper's Euler regression for LS, RLS and ELS instead of the consistent one
+    #[arg(long)]
+    paper: bool,
+    /// Reproduce Tables 1 to 5 of the paper beside its own figures, and say what agrees and why
+    #[arg(long, conflicts_with_all = ["trace", "axis", "report"])]
+    paper_tables: bool,
+    /// Forgetting factor of RLS and ELS
+    #[arg(long, default_value_t = 1.0)]
+    forgetting: f64,
+    /// Start P(0) of RLS and ELS, on regressors of unit size
+    #[arg(long, default_value_t = 1e8)]
+    p0: f64,
+    /// Samples of a period, for a periodic record; found from the torque if not given
+    #[arg(long)]
+    period: Option<usize>,
+    /// First time used, s
+    #[arg(long, allow_negative_numbers = true)]
+    from: Option<f64>,
+    /// Last time used, s
+    #[arg(long, allow_negative_numbers = true)]
+    to: Option<f64>,
+    /// What the torque does between samples; the axis file's word if not given
+    #[arg(long, value_enum)]
+    hold: Option<Holds>,
+    /// Integration of the simulations
+    #[arg(long, value_enum, default_value_t = Integration::Auto)]
+    integration: Integration,
+    /// Write the result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the result as one HTML page
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Write the axis file with the recommended estimates as its parameters
+    #[arg(long, value_name = "FILE")]
+    axis_out: Option<PathBuf>,
+}
 
 /// Runs the command.
 ///
 /// # Errors
-/// When the command could not run.
-pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    anyhow::bail!("not built yet")
+/// When a file cannot be read or written, or no method gives an estimate.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.paper_tables {
+        return paper_tables(args.json.as_deref());
+    }
+    anyhow::ensure!(
+        args.forgetting > 0.0 && args.forgetting <= 1.0,
+        "--forgetting is {}: it must be above 0 and at most 1",
+        args.forgetting
+    );
+    anyhow::ensure!(args.p0 > 0.0 && args.p0.is_finite(), "--p0 is {}: it must be greater than zero", args.p0);
+    let path = args.trace.as_deref().context("no trace given")?;
+    let mut machine = match &args.axis {
+        Some(axis) => Machine::read(axis)?,
+        None => Machine { name: "axis".to_owned(), ..Machine::default() },
+    };
+    match args.hold {
+        Some(Holds::Zoh) => machine.signals.hold = Hold::Zoh,
+        Some(Holds::Linear) => machine.signals.hold = Hold::Linear,
+        None => {}
+    }
+    let bar = progress();
+    bar.set_message("reading the trace");
+    let loaded = load(path, &machine.signals)?;
+    let trace = cut(loaded.trace, args.from, args.to, path)?;
+    let request = Request {
+        methods: methods(&args.method),
+        forgetting: args.forgetting,
+        p0: args.p0,
+        paper: args.paper,
+        period: args.period,
+        reference: args.axis.is_some(),
+        scheme: match args.integration {
+            Integration::Auto => None,
+            Integration::Exact => Some(Scheme::Exact),
+            Integration::Newmark => Some(Scheme::NEWMARK),
+        },
+    };
+    let file = path.display().to_string();
+    let mut result =
+        identify(&trace, &machine, &request, &file, &mut |what| bar.set_message(what.to_owned()))
+            .with_context(|| file.clone())?;
+    bar.finish_and_clear();
+    result.warnings.splice(0..0, loaded.warnings);
+
+    print!("{}", terminal::blocks(&blocks(&result), terminal::Layout::default()));
+    if let Some(path) = &args.json {
+        write_text(path, &serde_json::to_vec_pretty(&result)?)?;
+    }
+    if let Some(path) = &args.report {
+        anyhow::bail!("{}: no report yet", path.display());
+    }
+    if let Some(path) = &args.axis_out {
+        write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
+    }
+    anyhow::ensure!(
+        result.methods.iter().any(|m| m.failure.is_none()),
+        "{file}: no method gives an estimate; the reasons stand above"
+    );
+    let sound = result.recommended.is_some();
+    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::from(FINDINGS) })
+}
+
+fn progress() -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(120));
+    bar
+}
+
+fn methods(asked: &[Methods]) -> Vec<Method> {
+    let wanted = |m: Method| {
+        asked.iter().any(|a| match a {
+            Methods::All => true,
+            Methods::Ls => m == Method::Ls,
+            Methods::Rls => m == Method::Rls,
+            Methods::Els => matches!(m, Method::Els | Method::ElsBatch),
+            Methods::Iv => m == Method::Iv,
+            Methods::Oe => m == Method::Oe,
+            Methods::Frequency => m == Method::Frequency,
+        })
+    };
+    Method::ALL.into_iter().filter(|m| wanted(*m)).collect()
+}
+
+fn cut(
+    trace: crate::trace::Trace,
+    from: Option<f64>,
+    to: Option<f64>,
+    path: &Path,
+) -> anyhow::Result<crate::trace::Trace> {
+    if from.is_none() && to.is_none() {
+        return Ok(trace);
+    }
+    let index = |t: f64| ((t - trace.start) / trace.dt).round().clamp(0.0, trace.len() as f64) as usize;
+    let first = from.map_or(0, index);
+    let last = to.map_or(trace.len(), |t| (index(t) + 1).min(trace.len()));
+    anyhow::ensure!(
+        last > first + 16,
+        "{}: --from and --to leave {} samples of {} ({} s to {} s); take a longer part",
+        path.display(),
+        last.saturating_sub(first),
+        trace.len(),
+        trace.start,
+        trace.time(trace.len().saturating_sub(1))
+    );
+    Ok(trace.slice(first..last))
+}
+
+/// The machine with the recommended estimates.
+fn improved(machine: &Machine, result: &Identification) -> anyhow::Result<Machine> {
+    let best = result.recommended.as_ref().context("there is no estimate to write to the axis file")?;
+    let mut machine = machine.clone();
+    for e in &result.methods[best.method].parameters {
+        match (e.name, machine.structure) {
+            ("I1", _) => machine.parameters.i1 = e.value,
+            ("I", Structure::Rigid) => (machine.parameters.i1, machine.parameters.i2) = (e.value, 0.0),
+            ("I2", _) => machine.parameters.i2 = e.value,
+            ("B", _) => machine.parameters.b = e.value.max(0.0),
+            ("K", _) => machine.parameters.k = e.value,
+            (name, _) => {
+                let known = name.split_once('.').and_then(|(id, parameter)| {
+                    let effect = crate::effects::Effect::from_id(id).ok()?;
+                    Some((effect, effect.parameter(parameter).ok()?))
+                });
+                if let Some((effect, index)) = known {
+                    let limits = &effect.info().parameters[index];
+                    machine.effects.of_mut(effect)[index] = e.value.clamp(limits.min, limits.max);
+                }
+            }
+        }
+    }
+    Ok(machine)
+}
+
+/// What the terminal shows.
+fn blocks(result: &Identification) -> Vec<Block> {
+    let t = &result.trace;
+    let mut blocks = vec![Block::Paragraph(format!(
+        "{}: {} samples at dt = {} s ({:.4} s), hold {}{}; signals {}",
+        t.file,
+        t.samples,
+        t.dt,
+        t.duration,
+        t.hold,
+        t.period.map_or_else(String::new, |n| format!(", periodic with {n} samples")),
+        t.signals.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")
+    ))];
+    blocks.extend(result.warnings.iter().cloned().map(Block::Warning));
+    let marked = result.recommended.as_ref().map(|r| r.method);
+    blocks.push(Block::Table(estimates("Parameters", result, marked, |m| &m.parameters)));
+    if result.methods.iter().any(|m| !m.modal.is_empty()) {
+        blocks.push(Block::Table(estimates("Modal parameters", result, marked, |m| &m.modal)));
+    }
+    blocks.push(Block::Table(fits(result, marked)));
+    if let Some(response) = &result.frequency_response {
+        let mut table = Table::new(
+            format!("Frequency response against the model, {} periods, {} lines", response.periods, response.frequency.len()),
+            ["output", "antiresonance [Hz]", "resonance [Hz]", "model's error [%]"],
+        );
+        let hertz = |f: Option<f64>| f.map_or(Cell::Empty, |f| Cell::Number(f, 4, String::new()));
+        for o in &response.outputs {
+            table.row(vec![
+                o.signal.name().into(),
+                hertz(o.antiresonance),
+                hertz(o.resonance),
+                Cell::Number(o.error_percent, 3, String::new()),
+            ]);
+        }
+        blocks.push(Block::Table(table));
+    }
+    for m in &result.methods {
+        if let Some(why) = &m.failure {
+            blocks.push(Block::Warning(format!("{}: {why}", m.title)));
+        }
+        let notes = m.notes.iter().map(|n| Block::Paragraph(format!("{}: {n}", m.title)));
+        blocks.extend(notes);
+    }
+    if let Some(best) = &result.recommended {
+        blocks.push(Block::Paragraph(format!("Trust {}: {}.", result.methods[best.method].title.to_lowercase(), best.why)));
+    }
+    blocks
+}
+
+fn estimates(
+    caption: &str,
+    result: &Identification,
+    marked: Option<usize>,
+    of: impl Fn(&MethodResult) -> &Vec<Estimate>,
+) -> Table {
+    let first = result.methods.iter().map(&of).find(|e| !e.is_empty());
+    let mut columns = vec!["method".to_owned()];
+    let mut referenced = false;
+    for e in first.into_iter().flatten() {
+        columns.push(format!("{} [{}]", e.name, e.unit));
+        if e.reference.is_some() {
+            referenced = true;
+            columns.push("off [%]".to_owned());
+        }
+    }
+    let mut table = Table::new(caption, columns);
+    if referenced {
+        let mut cells = vec![Cell::text("axis file")];
+        for e in first.into_iter().flatten() {
+            cells.push(e.reference.map_or(Cell::Empty, |r| Cell::Number(r, 5, String::new())));
+            if e.reference.is_some() {
+                cells.push(Cell::Empty);
+            }
+        }
+        table.row(cells);
+    }
+    for (i, m) in result.methods.iter().enumerate() {
+        if of(m).is_empty() {
+            continue;
+        }
+        let mut cells = vec![Cell::text(short(m.method))];
+        for e in of(m) {
+            // A standard error of rounding says nothing: the number itself then.
+            cells.push(match e.std {
+                Some(std) if std > 1e-9 * e.value.abs() => Cell::Estimate(e.value, std, String::new()),
+                _ => Cell::Number(e.value, 6, String::new()),
+            });
+            if e.reference.is_some() {
+                cells.push(e.error_percent.map_or(Cell::Empty, |p| Cell::Number(p, 3, String::new())));
+            }
+        }
+        if marked == Some(i) { table.strong_row(cells) } else { table.row(cells) }
+    }
+    table
+}
+
+/// A method's name in a table.
+fn short(method: &str) -> String {
+    match method {
+        "els_batch" => "ELS batch".to_owned(),
+        "frequency" => "frequency".to_owned(),
+        other => other.to_uppercase(),
+    }
+}
+
+fn fits(result: &Identification, marked: Option<usize>) -> Table {
+    let mut columns = vec!["method".to_owned()];
+    let outputs = result.methods.iter().map(|m| &m.outputs).find(|o| !o.is_empty());
+    for o in outputs.into_iter().flatten() {
+        columns.push(format!("{} [%]", o.signal));
+        columns.push("white".to_owned());
+    }
+    columns.push("error of T [%]".to_owned());
+    let mut table = Table::new("Fit of a simulation with the estimates; whether its residual is white; error of the torque estimated from the motion", columns);
+    let width = outputs.map_or(0, Vec::len);
+    for (i, m) in result.methods.iter().enumerate() {
+        if m.failure.is_some() {
+            continue;
+        }
+        let mut cells = vec![Cell::text(short(m.method))];
+        for o in &m.outputs {
+            cells.push(Cell::Number(o.fit_percent, 5, String::new()));
+            cells.push(if o.whiteness.white { "yes" } else { "no" }.into());
+        }
+        for _ in m.outputs.len()..width {
+            cells.extend([Cell::Empty, Cell::Empty]);
+        }
+        cells.push(m.excitation.as_ref().map_or(Cell::Empty, |e| Cell::Number(e.error_percent, 3, String::new())));
+        if marked == Some(i) { table.strong_row(cells) } else { table.row(cells) }
+    }
+    table
+}
+
+fn paper_tables(json: Option<&Path>) -> anyhow::Result<ExitCode> {
+    let tables = crate::identify::tables::reproduce()?;
+    let mut blocks = Vec::new();
+    for t in &tables.tables {
+        let mut table = Table::new(format!("Table {}. {}", t.number, t.title), t.columns.clone());
+        for row in &t.rows {
+            table.row(row.iter().map(|c| Cell::text(c.clone())).collect());
+        }
+        blocks.push(Block::Table(table));
+        blocks.push(Block::Paragraph(t.verdict.clone()));
+    }
+    blocks.extend(tables.words.iter().cloned().map(Block::Paragraph));
+    print!("{}", terminal::blocks(&blocks, terminal::Layout { width: 120, colour: false }));
+    if let Some(path) = json {
+        write_text(path, &serde_json::to_vec_pretty(&tables)?)?;
+    }
+    Ok(ExitCode::SUCCESS)
 }

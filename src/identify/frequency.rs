@@ -16,6 +16,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DVector, Matrix4, SMatrix, Vector4};
+use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::levenberg::{self, Normal, Problem, Termination};
@@ -24,11 +25,11 @@ use super::result::{FrequencyResponse, ResponseOf};
 use super::statistics::dft;
 use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use crate::effects::Settings;
-use crate::trace::{Signal, Trace};
+use crate::trace::{Signal, Trace, TraceError};
 
 type C = Complex<f64>;
 
-/// Lines weaker than this share of the strongest are not excited.
+/// Lines weaker than this share of the strongest are never excited.
 const EXCITED: f64 = 1e-3;
 /// Least ratio of a line's torque to its scatter between periods.
 const CLEAR: f64 = 3.0;
@@ -107,13 +108,25 @@ pub fn measure(trace: &Trace, period: usize) -> Option<Measured> {
     let lines = period.div_ceil(2);
     let mean = |h: usize| input.iter().map(|t| t[h]).sum::<C>() / count;
     let strongest = (1..lines).map(|h| mean(h).norm()).fold(0.0, f64::max);
-    let harmonics: Vec<usize> = (1..lines)
-        .filter(|&h| {
-            let centre = mean(h);
-            let scatter = (input.iter().map(|t| (t[h] - centre).norm_sqr()).sum::<f64>() / count).sqrt();
+    let clear: Vec<(usize, f64)> = (1..lines)
+        .map(|h| (h, mean(h)))
+        .filter(|(h, centre)| {
+            let scatter = (input.iter().map(|t| (t[*h] - centre).norm_sqr()).sum::<f64>() / count).sqrt();
             centre.norm() > EXCITED * strongest && centre.norm() > CLEAR * scatter
         })
+        .map(|(h, centre)| (h, centre.norm()))
         .collect();
+    // A drive's current loop repeats its own errors between the lines of the command: the excited lines are those above
+    // the widest gap of the amplitudes.
+    let mut sizes: Vec<f64> = clear.iter().map(|(_, size)| *size).collect();
+    sizes.sort_by(|a, b| b.total_cmp(a));
+    sizes.push(EXCITED * strongest);
+    let least = sizes
+        .windows(2)
+        .map(|w| (w[0] / w[1], w[0]))
+        .fold((0.0, 0.0), |widest, gap| if gap.0 > widest.0 { gap } else { widest })
+        .1;
+    let harmonics: Vec<usize> = clear.iter().filter(|(_, size)| *size >= least).map(|(h, _)| *h).collect();
     if harmonics.is_empty() {
         return None;
     }
@@ -132,6 +145,45 @@ pub fn measure(trace: &Trace, period: usize) -> Option<Measured> {
         outputs.push((signal, response, variance));
     }
     Some(Measured { period, periods: whole - skip, dt: trace.dt, hold: trace.hold, harmonics, outputs })
+}
+
+/// One period of a periodic trace, averaged over the periods and freed of everything between the excited lines, with
+/// two samples more for the differences; the speeds are derivatives of the angles, line by line. What drifts, what is
+/// not linear and most of the noise is gone from it.
+///
+/// # Errors
+/// None in fact: the signals have one length.
+pub fn average(trace: &Trace, measured: &Measured) -> Result<Trace, TraceError> {
+    let n = measured.period;
+    let mut out = Trace::new(trace.start, trace.dt, trace.hold);
+    let skip = trace.len() / n - measured.periods;
+    let w0 = TAU / (n as f64 * trace.dt);
+    let mut planner = FftPlanner::new();
+    let inverse = planner.plan_fft_inverse(n);
+    let synthesise = |lines: &[(usize, C)]| {
+        let mut spectrum = vec![C::new(0.0, 0.0); n];
+        for (h, x) in lines {
+            spectrum[*h] = x * 0.5;
+            spectrum[n - h] = x.conj() * 0.5;
+        }
+        inverse.process(&mut spectrum);
+        (0..n + 2).map(|k| spectrum[k % n].re).collect::<Vec<f64>>()
+    };
+    for (signal, speed) in
+        [(Signal::T, None), (Signal::Theta1, Some(Signal::Omega1)), (Signal::Theta2, Some(Signal::Omega2))]
+    {
+        let Some(values) = trace.get(signal) else { continue };
+        let spectra = periods(values, n, skip);
+        let count = spectra.len() as f64;
+        let lines: Vec<(usize, C)> =
+            measured.harmonics.iter().map(|h| (*h, spectra.iter().map(|s| s[*h]).sum::<C>() / count)).collect();
+        out.set(signal, synthesise(&lines))?;
+        if let Some(speed) = speed {
+            let rates: Vec<(usize, C)> = lines.iter().map(|(h, x)| (*h, x * C::new(0.0, *h as f64 * w0))).collect();
+            out.set(speed, synthesise(&rates))?;
+        }
+    }
+    Ok(out)
 }
 
 /// The sampled axis: state transition and the two input columns.
@@ -314,18 +366,21 @@ impl FrequencyFit<'_> {
         out.iter().all(|v| v.is_finite()).then_some(out)
     }
 
-    /// The relative error of the model beyond the noise, root mean square over lines and outputs.
+    /// The relative error of the model beyond the noise, root mean square over lines and outputs; by the median, since
+    /// a few lines where the response nearly vanishes must not rule it (for a complex normal error the median of its
+    /// square is ln 2 of the mean).
     fn excess(&self, q: &DVector<f64>) -> Option<f64> {
         let p = self.parameters(q);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut shares = Vec::new();
         for (signal, g, variance) in self.measured.fitted() {
             let model = self.measured.model(&p, Structure::TwoInertia, self.scheme, *signal)?;
             for ((g, m), v) in g.iter().zip(&model).zip(variance) {
-                sum += ((g - m).norm_sqr() - v) / g.norm_sqr();
-                count += 1.0;
+                shares.push(((g - m).norm_sqr() - v) / g.norm_sqr());
             }
         }
-        Some((sum / count).max(0.0).sqrt())
+        shares.sort_by(f64::total_cmp);
+        let median = *shares.get(shares.len() / 2)?;
+        Some((median / std::f64::consts::LN_2).max(0.0).sqrt())
     }
 }
 

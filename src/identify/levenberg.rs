@@ -178,6 +178,9 @@ const RANK: f64 = 1e-13;
 #[must_use]
 pub fn covariance(curvature: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let n = curvature.nrows();
+    if n == 0 {
+        return (curvature.clone(), Vec::new());
+    }
     let scale = DVector::from_fn(n, |i, _| match curvature[(i, i)] {
         d if d > 0.0 => 1.0 / d.sqrt(),
         _ => 0.0,

@@ -6,12 +6,16 @@ pub mod instrumental;
 pub mod levenberg;
 pub mod lsq;
 pub mod output_error;
+pub mod paper;
 pub mod parameters;
 pub mod record;
 pub mod recursive;
 pub mod regression;
 pub mod result;
+pub mod rigid;
+pub mod run;
 pub mod statistics;
+pub mod tables;
 
 #[cfg(test)]
 mod tests;

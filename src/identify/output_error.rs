@@ -15,6 +15,7 @@ use std::borrow::Cow;
 use nalgebra::{DVector, Matrix4, Vector4};
 
 use super::levenberg::{self, Normal, Problem, Termination};
+use super::lsq::triangularise;
 use super::parameters::Estimated;
 use super::statistics::{noise_level, rms};
 use crate::axis::{Parameters, Response, Scheme, SimulateOptions, Structure, simulate, substeps};
@@ -28,6 +29,8 @@ const DERIVED: usize = 8;
 const ALL: usize = DERIVED + 2;
 const OFFSET: usize = 8;
 const BIAS: usize = 9;
+/// Most steps of one fit.
+const ITERATIONS: usize = 60;
 /// Rounds of weighing.
 const ROUNDS: usize = 3;
 
@@ -205,21 +208,42 @@ impl<'a> OutputError<'a> {
         problem.fixed = fixed;
 
         // First what enters linearly, so that the parameters do not run off to mend a wrong initial state.
-        if free.parameters {
+        let linear = self.effects.active().motion_is_linear();
+        if linear {
+            problem.solve_state(&mut q);
+            if !free.parameters {
+                // Nothing else is free, and the linear solution is the whole fit.
+                for _ in 0..ROUNDS {
+                    problem.sigma = problem.levels(&q);
+                    problem.solve_state(&mut q);
+                }
+                problem.sigma = problem.levels(&q);
+                let normal = Normal { cost: 0.5 * problem.degrees(), ..Normal::zeros(0) };
+                let report = levenberg::Report {
+                    parameters: DVector::zeros(0),
+                    cost: normal.cost,
+                    normal,
+                    iterations: 1,
+                    evaluations: 1,
+                    termination: Termination::Gradient,
+                };
+                return problem.finish(&q, &report, 1.0, scheme);
+            }
+        } else if free.parameters {
             let mut state_only = problem.clone();
             for i in 0..4 {
                 state_only.free[i] = false;
             }
             q = state_only.run(&q, 20).0;
         }
-        let mut report = problem.run(&q, 200);
+        let mut report = problem.run(&q, ITERATIONS);
         let mut chi2 = 1.0;
         for _ in 0..ROUNDS {
             let sigma = problem.levels(&report.0);
             chi2 = 2.0 * report.1.cost / problem.degrees();
             let settled = sigma.iter().zip(&problem.sigma).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
             problem.sigma = sigma;
-            report = problem.run(&report.0, 200);
+            report = problem.run(&report.0, ITERATIONS);
             if settled {
                 break;
             }
@@ -238,8 +262,63 @@ impl<'a> OutputError<'a> {
         let x0 = self.first_state();
         let p = [start.i1.ln(), start.i2.ln(), start.b / problem.damping_unit, start.k.ln()];
         let q = [p[0], p[1], p[2], p[3], x0[0], x0[1], x0[2], x0[3], 0.0, 0.0];
-        let report = problem.run(&q, 200);
+        let report = problem.run(&q, ITERATIONS);
         problem.finish(&report.0, &report.1, 1.0, scheme)
+    }
+
+    /// The initial state, offset and bias that fit best with the parameters as they are: on a linear axis the outputs
+    /// are linear in them. Unknowns that the outputs do not determine keep their values.
+    fn solve_state(&self, q: &mut [f64; ALL]) {
+        let unknowns: Vec<usize> = (4..ALL).filter(|i| self.free[*i]).collect();
+        if unknowns.is_empty() {
+            return;
+        }
+        let p: Parameters = self.axis(&q[..DERIVED]);
+        let n = self.torque.len();
+        let run = |initial: [f64; 4], torque: &[f64]| {
+            simulate(&p, self.structure, &Settings::default(), initial, torque, &self.options)
+        };
+        let rest = vec![0.0; n];
+        let mut base = *q;
+        for i in &unknowns {
+            base[*i] = 0.0;
+        }
+        let bias = base[BIAS];
+        let torque: Vec<f64> = self.torque.iter().map(|t| t + bias).collect();
+        let forced = run([base[4], base[5], base[6], base[7]], &torque);
+        let columns: Vec<Option<Response>> = unknowns
+            .iter()
+            .map(|i| match *i {
+                OFFSET => None,
+                BIAS => Some(run([0.0; 4], &vec![1.0; n])),
+                i => {
+                    let mut unit = [0.0; 4];
+                    unit[i - 4] = 1.0;
+                    Some(run(unit, &rest))
+                }
+            })
+            .collect();
+        let width = unknowns.len();
+        let outputs = &self.outputs;
+        let triangle = triangularise(n * outputs.len(), width, 1, |row, out| {
+            let (channel, k) = (row % outputs.len(), row / outputs.len());
+            let (_, c, measured) = &outputs[channel];
+            let weight = 1.0 / self.sigma[channel];
+            for (out, column) in out.iter_mut().zip(&columns) {
+                *out = weight
+                    * match column {
+                        Some(response) => pick(&response.readings[k], *c),
+                        None => f64::from(u8::from(*c == 2)),
+                    };
+            }
+            let offset = if *c == 2 { base[OFFSET] } else { 0.0 };
+            out[width] = weight * (measured[k] - pick(&forced.readings[k], *c) - offset);
+        });
+        if let Ok(solution) = triangle.solve() {
+            for (j, i) in unknowns.iter().enumerate() {
+                q[*i] = solution.phi[(j, 0)];
+            }
+        }
     }
 
     fn degrees(&self) -> f64 {

@@ -1,0 +1,312 @@
+//! The rigid axis: inertia, viscous and dry friction and load from one encoder, in weak form.
+//!
+//! ```text
+//! T = I*a + D*w + F*sign(w) + L
+//! ```
+//!
+//! Multiplied by a test function psi that vanishes with its first derivatives at the ends of a window, and integrated
+//! by parts, no measured signal is differentiated:
+//!
+//! ```text
+//! int psi*T = I*int psi''*th - D*int psi'*th + F*int psi*sign(w) + L*int psi,   psi(s) = (1 - s^2)^4
+//! ```
+//!
+//! The sign is taken from the speed smoothed over the same window; windows in which it changes keep its measured course.
+//! Sources: A. Janot, M. Gautier, M. Brunot, EMPS benchmark, 2019 (model and friction terms); D. A. Messenger,
+//! D. M. Bortz, Weak SINDy, Multiscale Model. Simul. 19 (2021) (test functions).
+
+use nalgebra::{DMatrix, DVector, Vector4};
+
+use super::lsq::triangularise;
+use super::result::{
+    Estimate, ExcitationEstimate, Identification, MethodResult, OutputFit, Recommendation, SCHEMA, Series,
+};
+use super::run::{Request, output_fit, summary};
+use super::statistics::{rms, spectrum};
+use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
+
+/// Least samples of half a window.
+const LEAST_HALF: usize = 12;
+
+/// psi and its first two derivatives on a window of 2*half + 1 samples; the derivatives per sample.
+struct Window {
+    psi: Vec<f64>,
+    first: Vec<f64>,
+    second: Vec<f64>,
+}
+
+impl Window {
+    fn new(half: usize) -> Self {
+        let h = half as f64;
+        let grid = || (0..=2 * half).map(|k| (k as f64 - h) / h);
+        Self {
+            psi: grid().map(|s| (1.0 - s * s).powi(4)).collect(),
+            first: grid().map(|s| -8.0 * s * (1.0 - s * s).powi(3) / h).collect(),
+            second: grid()
+                .map(|s| (-8.0 * (1.0 - s * s).powi(3) + 48.0 * s * s * (1.0 - s * s).powi(2)) / (h * h))
+                .collect(),
+        }
+    }
+
+    fn apply(weights: &[f64], values: &[f64]) -> f64 {
+        weights.iter().zip(values).map(|(w, v)| w * v).sum()
+    }
+}
+
+/// What the regression found: I, D, F, L and their covariance.
+#[derive(Debug, Clone)]
+pub struct Rigid {
+    /// I, D, F, L.
+    pub values: Vector4<f64>,
+    /// Their standard errors.
+    pub std: Vector4<f64>,
+    /// Half a window, samples.
+    pub half: usize,
+    /// Times of the windows' centres, measured and modelled mean torque.
+    pub fit: (Vec<f64>, Vec<f64>, Vec<f64>),
+}
+
+/// Why a rigid axis could not be identified.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RigidError {
+    /// Too few samples.
+    #[error("{samples} samples are too few for windows of {window}: record longer")]
+    TooShort {
+        /// Samples there are.
+        samples: usize,
+        /// Samples of a window.
+        window: usize,
+    },
+    /// A direction without excitation.
+    #[error("the record does not determine {0}: let the axis accelerate, move at different speeds and reverse")]
+    Unexcited(String),
+}
+
+/// Identifies a rigid axis from torque and angle (rad or m), sampled every `dt` s.
+///
+/// # Errors
+/// [`RigidError`].
+pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) -> Result<Rigid, RigidError> {
+    let n = theta.len();
+    if 8 * LEAST_HALF + 2 > n {
+        return Err(RigidError::TooShort { samples: n, window: 2 * LEAST_HALF + 1 });
+    }
+    // Short windows let the noise of the acceleration in, long ones leave few rows: the window with the smallest standard
+    // error of the inertia is taken.
+    let mut best: Option<Rigid> = None;
+    let mut half = LEAST_HALF;
+    let mut failure = None;
+    while 8 * half + 2 <= n {
+        match in_windows(torque, theta, dt, start, half) {
+            Ok(found) => {
+                let share = |r: &Rigid| r.std[0] / r.values[0].abs();
+                if best.as_ref().is_none_or(|b| share(&found) < share(b)) {
+                    best = Some(found);
+                }
+            }
+            Err(e) => failure = Some(e),
+        }
+        half += half / 2;
+    }
+    best.ok_or_else(|| failure.unwrap_or(RigidError::TooShort { samples: n, window: 2 * LEAST_HALF + 1 }))
+}
+
+/// The regression in windows of `2*half + 1` samples.
+fn in_windows(torque: &[f64], theta: &[f64], dt: f64, start: f64, half: usize) -> Result<Rigid, RigidError> {
+    let n = theta.len();
+    let w = Window::new(half);
+    let span = 2 * half + 1;
+    let total: f64 = w.psi.iter().sum();
+    // Speed smoothed by the same test function, for the sign of the dry friction.
+    let speed: Vec<f64> = (0..n)
+        .map(|k| {
+            let first = k.saturating_sub(half).min(n - span);
+            -Window::apply(&w.first, &theta[first..first + span]) / (total * dt)
+        })
+        .collect();
+    let still = 1e-3 * rms(&speed);
+    let sign: Vec<f64> = speed.iter().map(|v| if v.abs() <= still { 0.0 } else { v.signum() }).collect();
+    let step = (half / 2).max(1);
+    let centres: Vec<usize> = (half..n - half).step_by(step).collect();
+    let row = |i: usize| {
+        let range = centres[i] - half..centres[i] + half + 1;
+        let angle = &theta[range.clone()];
+        [
+            Window::apply(&w.second, angle) / (total * dt * dt),
+            -Window::apply(&w.first, angle) / (total * dt),
+            Window::apply(&w.psi, &sign[range.clone()]) / total,
+            1.0,
+            Window::apply(&w.psi, &torque[range]) / total,
+        ]
+    };
+    let names = ["the inertia", "viscous friction", "dry friction", "the load"];
+    let solution = triangularise(centres.len(), 4, 1, |i, out| out.copy_from_slice(&row(i))).solve().map_err(|e| {
+        let which: Vec<&str> = e.columns.iter().filter_map(|c| names.get(*c).copied()).collect();
+        RigidError::Unexcited(which.join(" and "))
+    })?;
+    let values = Vector4::from_fn(|i, _| solution.phi[(i, 0)]);
+    let rows: Vec<[f64; 5]> = (0..centres.len()).map(row).collect();
+    let modelled: Vec<f64> = rows.iter().map(|r| (0..4).map(|j| r[j] * values[j]).sum()).collect();
+    let residual: Vec<f64> = rows.iter().zip(&modelled).map(|(r, m)| r[4] - m).collect();
+    let std = robust(&rows, &residual, &solution.inverse);
+    Ok(Rigid {
+        values,
+        std,
+        half,
+        fit: (centres.iter().map(|k| start + *k as f64 * dt).collect(), rows.iter().map(|r| r[4]).collect(), modelled),
+    })
+}
+
+/// Standard errors that allow for windows that overlap and residuals that last: Newey-West with a lag of eight windows
+/// (W. K. Newey, K. D. West, Econometrica 55, 1987).
+fn robust(rows: &[[f64; 5]], residual: &[f64], inverse: &DMatrix<f64>) -> Vector4<f64> {
+    const LAGS: usize = 8;
+    let score = |k: usize| DVector::from_iterator(4, (0..4).map(|j| rows[k][j] * residual[k]));
+    let scores: Vec<DVector<f64>> = (0..rows.len()).map(score).collect();
+    let mut middle = DMatrix::<f64>::zeros(4, 4);
+    for lag in 0..=LAGS.min(rows.len() - 1) {
+        let weight = 1.0 - lag as f64 / (LAGS + 1) as f64;
+        for k in lag..rows.len() {
+            let product = &scores[k] * scores[k - lag].transpose();
+            if lag == 0 {
+                middle += product;
+            } else {
+                middle += (&product + product.transpose()) * weight;
+            }
+        }
+    }
+    let covariance = inverse * middle * inverse;
+    Vector4::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt())
+}
+
+fn units(motion: Motion) -> [&'static str; 4] {
+    match motion {
+        Motion::Rotary => ["kg.m2", "N.m.s/rad", "N.m", "N.m"],
+        Motion::Linear => ["kg", "N.s/m", "N", "N"],
+    }
+}
+
+/// `eixo identify` for a rigid axis.
+pub(super) fn identify(
+    trace: &Trace,
+    machine: &Machine,
+    request: &Request,
+    file: &str,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Identification, TraceError> {
+    let torque = trace.require(Signal::T)?;
+    let theta = trace.require(Signal::Theta1)?;
+    let motion = machine.signals.motion;
+    progress("weak-form least squares");
+    let mut result = MethodResult {
+        method: "ls",
+        title: "Least squares, weak form".to_owned(),
+        formulation: "T = I*a + D*w + F*sign(w) + L".to_owned(),
+        parameters: Vec::new(),
+        modal: Vec::new(),
+        outputs: Vec::new(),
+        history: None,
+        excitation: None,
+        termination: None,
+        iterations: None,
+        notes: Vec::new(),
+        failure: None,
+    };
+    let unit = Signal::T.unit(motion);
+    let mut recommended = None;
+    match weak_least_squares(torque, theta, trace.dt, trace.start) {
+        Ok(found) => {
+            let window = (2 * found.half + 1) as f64 * trace.dt;
+            result.formulation =
+                format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
+            let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
+            let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
+            for i in 0..4 {
+                let r = if i == 0 { reference } else { None };
+                result.parameters.push(Estimate::new(
+                    names[i],
+                    units(motion)[i],
+                    found.values[i],
+                    Some(found.std[i]),
+                    r,
+                ));
+            }
+            let (time, measured, modelled) = found.fit;
+            let error: Vec<f64> = modelled.iter().zip(&measured).map(|(a, b)| a - b).collect();
+            let dt = time.get(1).map_or(trace.dt, |t| t - time[0]);
+            let percent = 100.0 * rms(&error) / rms(&measured).max(f64::MIN_POSITIVE);
+            result.outputs.push(OutputFit {
+                signal: Signal::T,
+                ..output_fit(Signal::T, &measured, &error.iter().map(|e| -e).collect::<Vec<_>>(), trace, motion)
+            });
+            result.excitation = Some(ExcitationEstimate {
+                formulation: "I*a + D*w + F*sign(w) + L, means over the windows",
+                error_percent: percent,
+                estimate: Series::over_time("estimated T", unit, time[0], dt, &modelled),
+                error: Series::over_time("error of T", unit, time[0], dt, &error),
+                spectrum: spectrum("estimated T", unit, dt, &modelled),
+            });
+            recommended = Some(Recommendation {
+                method: 0,
+                why: "the torque is compared, not the position: in a closed loop the position follows for any model"
+                    .to_owned(),
+            });
+        }
+        Err(e) => result.failure = Some(e.to_string()),
+    }
+    Ok(Identification {
+        schema: SCHEMA,
+        machine: machine.name.clone(),
+        structure: "rigid",
+        trace: summary(trace, file, None),
+        methods: vec![result],
+        recommended,
+        torque: Series::over_time("T", unit, trace.start, trace.dt, torque),
+        torque_spectrum: spectrum("T", unit, trace.dt, torque),
+        frequency_response: None,
+        warnings: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn inertia_and_friction_of_a_rigid_axis_are_found_within_their_standard_errors() {
+        // theta given in closed form, so that the torque follows from it exactly: no simulator is involved.
+        let (i, d, f, l) = (95.0, 200.0, 20.0, -3.0);
+        let dt = 1e-3;
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let (mut torque, mut theta) = (Vec::new(), Vec::new());
+        for k in 0..20_000 {
+            let t = k as f64 * dt;
+            let (mut x, mut v, mut a) = (0.0, 0.0, 0.0);
+            for (amplitude, w) in [(0.05, 2.0), (0.01, 9.0), (0.002, 31.0)] {
+                let (s, c) = f64::sin_cos(w * t);
+                x += amplitude * s;
+                v += amplitude * w * c;
+                a -= amplitude * w * w * s;
+            }
+            let e: f64 = StandardNormal.sample(&mut rng);
+            theta.push(x + 1e-7 * e);
+            let e: f64 = StandardNormal.sample(&mut rng);
+            torque.push(i * a + d * v + f * v.signum() + l + 2.0 * e);
+        }
+        let found = weak_least_squares(&torque, &theta, dt, 0.0).unwrap();
+        for (k, truth) in [i, d, f, l].into_iter().enumerate() {
+            let error = (found.values[k] - truth).abs();
+            assert!(error < 4.0 * found.std[k] + 1e-3 * truth.abs(), "{k}: {} +- {}", found.values[k], found.std[k]);
+        }
+        assert!(found.std[0] < 0.01 * i);
+    }
+
+    #[test]
+    fn an_axis_that_only_stands_is_refused_by_name() {
+        let error = weak_least_squares(&[1.0; 500], &[0.5; 500], 1e-3, 0.0).unwrap_err().to_string();
+        assert!(error.contains("the inertia"), "{error}");
+    }
+}

@@ -1,0 +1,318 @@
+//! `eixo identify` and `eixo excite` as a user runs them: simulated records, real ones, and bad input.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use eixo::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
+use eixo::effects::Settings;
+use eixo::trace::{Mapping, Motion, Signal, Trace, load, write_csv};
+
+fn eixo(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_eixo")).args(arguments).output().expect("the program starts")
+}
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A file of the measured data, or None with a word about it.
+fn data(name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("EIXO_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    let path = folder.join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} is not there; set EIXO_DATA to the folder of measured data", path.display());
+    None
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).expect("the JSON file")).expect("JSON")
+}
+
+fn estimate(result: &serde_json::Value, method: &str, list: &str, name: &str, field: &str) -> f64 {
+    let methods = result["methods"].as_array().expect("methods");
+    let m = methods.iter().find(|m| m["method"] == method).unwrap_or_else(|| panic!("no method {method}"));
+    let estimates = m[list].as_array().expect("estimates");
+    let e = estimates.iter().find(|e| e["name"] == name).unwrap_or_else(|| panic!("{method}: no {name}: {m}"));
+    e[field].as_f64().unwrap_or_else(|| panic!("{method} {name} {field}: {e}"))
+}
+
+/// Excites and simulates the paper's axis: the files of excitation and trace.
+fn experiment(folder: &Path) -> PathBuf {
+    let torque = folder.join("excitation.csv");
+    let out = eixo(&["excite", "-o", text(&torque)]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert!(String::from_utf8_lossy(&out.stdout).contains("crest factor  1.676"));
+    let mut trace = load(&torque, &Mapping::default()).expect("the excitation").trace;
+    let options = SimulateOptions { start: 0.0, dt: trace.dt, hold: Hold::Zoh, scheme: Scheme::NEWMARK, substeps: 1 };
+    let t = trace.get(Signal::T).expect("T").to_vec();
+    let response = simulate(&Parameters::PAPER, Structure::TwoInertia, &Settings::default(), [0.0; 4], &t, &options);
+    let column = |f: fn(&eixo::effects::Reading<f64>) -> f64| response.readings.iter().map(f).collect::<Vec<_>>();
+    trace.set(Signal::Theta1, column(|r| r.theta1)).expect("theta1");
+    trace.set(Signal::Omega1, column(|r| r.omega1)).expect("omega1");
+    trace.set(Signal::Theta2, column(|r| r.theta2)).expect("theta2");
+    trace.set(Signal::Omega2, column(|r| r.omega2)).expect("omega2");
+    let path = folder.join("trace.csv");
+    write_csv(&path, &trace, Motion::Rotary).expect("the trace");
+    path
+}
+
+const AXIS: &str = "[parameters]\nI1 = 2.37e-4\nI2 = 6.07e-6\nB = 5.4e-4\nK = 1.76e-2\nrho = 3.18e-4\n";
+
+#[test]
+fn a_simulated_trace_gives_its_parameters_back_by_every_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = experiment(folder.path());
+    let axis = folder.path().join("axis.toml");
+    std::fs::write(&axis, AXIS).unwrap();
+    let result = folder.path().join("result.json");
+    let improved = folder.path().join("improved.toml");
+    let out = eixo(&[
+        "identify",
+        text(&trace),
+        "--axis",
+        text(&axis),
+        "--json",
+        text(&result),
+        "--axis-out",
+        text(&improved),
+    ]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let printed = String::from_utf8_lossy(&out.stdout);
+    assert!(printed.contains("Modal parameters"), "{printed}");
+    let result = json(&result);
+    assert_eq!(result["schema"], "eixo.identification/1");
+    for (method, limit) in [("ls", 1e-6), ("rls", 1e-4), ("els", 1e-3), ("els_batch", 1e-6), ("iv", 1e-4), ("oe", 1e-5)]
+    {
+        for name in ["I1", "I2", "B", "K"] {
+            let error = estimate(&result, method, "parameters", name, "error_percent");
+            assert!(error.abs() < limit, "{method} {name}: {error} %");
+        }
+        for name in ["wn", "wd", "zeta"] {
+            let error = estimate(&result, method, "modal", name, "error_percent");
+            assert!(error.abs() < limit, "{method} {name}: {error} %");
+        }
+    }
+    let methods = result["methods"].as_array().unwrap();
+    assert!(methods.iter().all(|m| m["excitation"]["error_percent"].as_f64().unwrap() < 1e-3));
+    let history = &methods.iter().find(|m| m["method"] == "rls").unwrap()["history"];
+    assert!(history["time"].as_array().unwrap().len() > 300);
+    let machine = eixo::trace::Machine::read(&improved).unwrap();
+    assert!((machine.parameters.k / 1.76e-2 - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn the_papers_euler_regression_is_far_off_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = experiment(folder.path());
+    let axis = folder.path().join("axis.toml");
+    std::fs::write(&axis, AXIS).unwrap();
+    let result = folder.path().join("result.json");
+    let arguments = ["identify", text(&trace), "--axis", text(&axis), "--paper", "--method", "ls,rls"];
+    let out = eixo(&[&arguments[..], &["--json", text(&result)]].concat());
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert!(String::from_utf8_lossy(&out.stdout).contains("Euler's rule is first order"));
+    let result = json(&result);
+    for name in ["I1", "I2", "B", "K"] {
+        let ls = estimate(&result, "ls", "parameters", name, "error_percent");
+        let rls = estimate(&result, "rls", "parameters", name, "error_percent");
+        assert!(ls.abs() > 1.0, "{name}: {ls} %");
+        // With lambda = 1 they are one estimator.
+        assert!((ls - rls).abs() < 1e-3 * ls.abs(), "{name}: {ls} % and {rls} %");
+    }
+}
+
+#[test]
+fn what_the_paper_tables_say_in_words_is_what_their_figures_show() {
+    let tables = eixo::identify::tables::reproduce().unwrap();
+    let off = |table: usize, row: usize| -> f64 {
+        tables.tables[table].rows[row].last().unwrap().trim_start_matches('+').parse().unwrap()
+    };
+    for (table, rows) in [(0, 5), (2, 7)] {
+        for row in 0..rows {
+            // The digits that the paper prints: four or five.
+            assert!(off(table, row).abs() < 0.01, "table {}, row {row}", table + 1);
+        }
+    }
+    let four = &tables.tables[3];
+    let figure = |row: usize, name: &str| -> f64 {
+        let column = four.columns.iter().position(|c| c == name).unwrap_or_else(|| panic!("{name}"));
+        four.rows[row][column].parse().unwrap()
+    };
+    for row in 0..4 {
+        assert!(figure(row, "LS, Euler") > 1.0);
+        assert!((figure(row, "LS, Euler") - figure(row, "RLS, Euler")).abs() <= 0.01 * figure(row, "LS, Euler"));
+        assert!(figure(row, "LS, F5") < 1e-8 && figure(row, "LS, trapezoidal") < 1e-8);
+        assert!(figure(row, "RLS, F5") < 1e-4 && figure(row, "RLS, F5") > figure(row, "LS, F5"));
+    }
+    // The nearest to the paper's LS column (58.8, -, 8.6, 2.4 %): PAPER.md measured -51, -8 and -2.6 %.
+    for (row, expected) in [(0, 51.0), (2, 8.0), (3, 2.6)] {
+        let found = figure(row, "same, I2 held");
+        assert!((found - expected).abs() < 0.15 * expected, "{row}: {found}");
+    }
+}
+
+#[test]
+fn the_real_two_inertia_bench_has_the_resonances_and_inertias_of_the_outside_analysis() {
+    let Some(log) = data("two_inertia_bench/schroeder.csv") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let result = folder.path().join("bench.json");
+    let axis = root().join("tests/data/two_inertia_bench.toml");
+    let out = eixo(&["identify", text(&log), "--axis", text(&axis), "--json", text(&result)]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let result = json(&result);
+    assert_eq!(result["trace"]["period"], 2500);
+    let response = &result["frequency_response"];
+    // Every line from 11 to 250 Hz is excited.
+    let lines = response["frequency"].as_array().unwrap();
+    assert_eq!((lines.len(), lines[0].as_f64().unwrap().round()), (240, 11.0));
+    let motor = &response["outputs"][0];
+    assert!((motor["antiresonance"].as_f64().unwrap() - 53.0).abs() <= 1.0);
+    assert!((motor["resonance"].as_f64().unwrap() - 77.0).abs() <= 1.0);
+    // "About 11 %": between 8 and 15 for either encoder's own way of counting.
+    let error = motor["error_percent"].as_f64().unwrap();
+    assert!((8.0..15.0).contains(&error), "{error} %");
+    for method in ["ls", "frequency", "iv"] {
+        for name in ["I1", "I2"] {
+            let inertia = estimate(&result, method, "parameters", name, "value");
+            assert!((inertia / 4.8e-3 - 1.0).abs() < 0.05, "{method} {name}: {inertia}");
+        }
+    }
+    let resonance = estimate(&result, "frequency", "modal", "wn", "value") / std::f64::consts::TAU;
+    assert!((resonance - 77.0).abs() < 1.5, "{resonance} Hz");
+}
+
+#[test]
+fn the_real_emps_axis_has_the_published_parameters() {
+    let Some(log) = data("emps/train.csv") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let result = folder.path().join("emps.json");
+    let axis = root().join("tests/data/emps.toml");
+    let out = eixo(&["identify", text(&log), "--axis", text(&axis), "--json", text(&result)]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let result = json(&result);
+    // Janot, Gautier, Brunot 2019 (IDIM-LS): M 95.1 kg, Fv 203.5 N.s/m, Fc 20.4 N, offset -3.16 N.
+    for (name, published) in
+        [("I", 95.1), ("viscous_motor.coefficient", 203.5), ("coulomb_motor.level", 20.4), ("load_motor.torque", -3.16)]
+    {
+        let value = estimate(&result, "ls", "parameters", name, "value");
+        assert!((value / published - 1.0).abs() < 0.03, "{name}: {value} instead of {published}");
+    }
+}
+
+/// Runs identify on a text as trace; it must end with code 2 and say every part, and leave nothing behind.
+fn refused(csv: &str, parts: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, csv).unwrap();
+    let result = folder.path().join("result.json");
+    let out = eixo(&["identify", text(&path), "--json", text(&result)]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    for part in parts {
+        assert!(said.contains(part), "{part:?} is missing in: {said}");
+    }
+    let left = std::fs::read_dir(folder.path()).unwrap().count();
+    assert!(left == 1 || parts.contains(&"no method"), "{left} files");
+}
+
+fn rows(count: usize, row: impl Fn(usize) -> String) -> String {
+    (0..count).map(|k| row(k) + "\n").collect()
+}
+
+#[test]
+fn bad_traces_are_refused_with_file_row_column_and_the_way_out() {
+    let good = |k: usize| format!("{},{},{},{}", k as f64 * 1e-3, (k as f64 * 0.1).sin(), k, k + 1);
+    let head = "time,T,theta1,theta2\n";
+    let gap = rows(40, |k| good(if k < 20 { k } else { k + 5 }));
+    refused(&(head.to_owned() + &gap), &["log.csv", "row 22", "missing samples", "--from"]);
+    let nan = rows(40, |k| if k == 7 { "0.007,nan,1,1".to_owned() } else { good(k) });
+    refused(&(head.to_owned() + &nan), &["row 9", "column T", "nan"]);
+    refused(&("time,T,theta1\n".to_owned() + &rows(40, |k| format!("{k},1,{k}"))), &["theta2", "[signals]"]);
+    refused(&("t,torque\n".to_owned() + &rows(40, |k| format!("{k},1"))), &["time"]);
+    refused(&(head.to_owned() + &rows(5, good)), &["5 samples", "record longer"]);
+    refused(&(head.to_owned() + &rows(40, good) + "0.04,1\n"), &["row 42", "2 fields where the header has 4"]);
+    refused(&rows(40, good), &["header row"]);
+    refused("", &["empty"]);
+}
+
+#[test]
+fn a_record_that_does_not_move_names_what_it_cannot_determine() {
+    let still = rows(200, |k| format!("{},{},0,0", k as f64 * 1e-3, (k as f64 * 0.1).sin()));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("still.csv");
+    std::fs::write(&path, "time,T,theta1,theta2\n".to_owned() + &still).unwrap();
+    let out = eixo(&["identify", text(&path), "--method", "ls"]);
+    assert_eq!(out.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+    assert!(said.contains("does not determine K, B") && said.contains("Excite the axis"), "{said}");
+}
+
+#[test]
+fn an_unreadable_trace_and_an_unwritable_result_end_with_two() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = eixo(&["identify", text(&folder.path().join("none.csv"))]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("none.csv"));
+    let trace = experiment(folder.path());
+    let target = folder.path().join("no/such/place.json");
+    let out = eixo(&["identify", text(&trace), "--method", "ls", "--json", text(&target)]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("cannot write"));
+}
+
+#[test]
+fn the_same_trace_gives_the_same_bytes_whatever_the_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = experiment(folder.path());
+    let run = |threads: &str| {
+        let path = folder.path().join(format!("{threads}.json"));
+        let out = Command::new(env!("CARGO_BIN_EXE_eixo"))
+            .args(["identify", text(&trace), "--json", text(&path)])
+            .env("RAYON_NUM_THREADS", threads)
+            .output()
+            .unwrap();
+        assert!(out.status.success());
+        std::fs::read(path).unwrap()
+    };
+    assert_eq!(run("1"), run("3"));
+}
+
+#[test]
+fn an_odd_multisine_is_written_for_the_periods_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("odd.csv");
+    let out = eixo(&[
+        "excite",
+        "-o",
+        text(&path),
+        "--kind",
+        "odd",
+        "--samples",
+        "1000",
+        "--dt",
+        "1e-3",
+        "--band",
+        "1:100",
+        "--rms",
+        "2",
+        "--periods",
+        "3",
+        "--seed",
+        "5",
+    ]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let trace: Trace = load(&path, &Mapping::default()).unwrap().trace;
+    let t = trace.get(Signal::T).unwrap();
+    assert_eq!(t.len(), 3000);
+    assert!((0..2000).all(|k| t[k] == t[k + 1000]));
+    assert!((t.iter().map(|v| v * v).sum::<f64>() / 3000.0 - 4.0).abs() < 1e-9);
+    let out = eixo(&["excite", "-o", text(&path), "--band", "1:5000"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("Nyquist"));
+}
