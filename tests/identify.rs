@@ -1,5 +1,7 @@
 //! `eixo identify` and `eixo excite` as a user runs them: simulated records, real ones, and bad input.
 
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -84,7 +86,7 @@ fn a_simulated_trace_gives_its_parameters_back_by_every_method() {
     ]);
     assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
     let printed = String::from_utf8_lossy(&out.stdout);
-    assert!(printed.contains("Modal parameters"), "{printed}");
+    assert!(printed.contains("Output error identifies the axis"), "{printed}");
     let result = json(&result);
     assert_eq!(result["schema"], "eixo.identification/1");
     for (method, limit) in [("ls", 1e-6), ("rls", 1e-4), ("els", 1e-3), ("els_batch", 1e-6), ("iv", 1e-4), ("oe", 1e-5)]
@@ -116,9 +118,10 @@ fn the_papers_euler_regression_is_far_off_and_says_so() {
     let arguments = ["identify", text(&trace), "--axis", text(&axis), "--paper", "--method", "ls,rls"];
     let out = eixo(&[&arguments[..], &["--json", text(&result)]].concat());
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    assert!(String::from_utf8_lossy(&out.stdout).contains("Euler's rule is first order"));
     let result = json(&result);
-    for name in ["I1", "I2", "B", "K"] {
+    assert!(result["methods"][0]["notes"][0].as_str().unwrap().contains("first order"));
+    // Under a held torque the row of I1 alone is nearly right: T(k) is then what acts over the whole sample.
+    for name in ["I2", "B", "K"] {
         let ls = estimate(&result, "ls", "parameters", name, "error_percent");
         let rls = estimate(&result, "rls", "parameters", name, "error_percent");
         assert!(ls.abs() > 1.0, "{name}: {ls} %");

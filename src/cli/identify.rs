@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::FINDINGS;
 use crate::axis::{Scheme, Structure};
-use crate::identify::result::{Estimate, Identification, MethodResult};
+use crate::identify::result::Identification;
 use crate::identify::run::{Method, Request, identify};
 use crate::report::{Block, Cell, Table, terminal};
 use crate::trace::{Hold, Machine, load, write_text};
@@ -157,7 +157,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
     if let Some(path) = &args.report {
-        anyhow::bail!("{}: no report yet", path.display());
+        write_text(path, crate::report::html::page(&crate::report::identify::report(&result)).as_bytes())?;
     }
     if let Some(path) = &args.axis_out {
         write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
@@ -247,7 +247,7 @@ fn improved(machine: &Machine, result: &Identification) -> anyhow::Result<Machin
     Ok(machine)
 }
 
-/// What the terminal shows.
+/// What the terminal shows: the short report, then what each method has to say.
 fn blocks(result: &Identification) -> Vec<Block> {
     let t = &result.trace;
     let mut blocks = vec![Block::Paragraph(format!(
@@ -260,124 +260,14 @@ fn blocks(result: &Identification) -> Vec<Block> {
         t.period.map_or_else(String::new, |n| format!(", periodic with {n} samples")),
         t.signals.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")
     ))];
-    blocks.extend(result.warnings.iter().cloned().map(Block::Warning));
-    let marked = result.recommended.as_ref().map(|r| r.method);
-    blocks.push(Block::Table(estimates("Parameters", result, marked, |m| &m.parameters)));
-    if result.methods.iter().any(|m| !m.modal.is_empty()) {
-        blocks.push(Block::Table(estimates("Modal parameters", result, marked, |m| &m.modal)));
-    }
-    blocks.push(Block::Table(fits(result, marked)));
-    if let Some(response) = &result.frequency_response {
-        let mut table = Table::new(
-            format!("Frequency response against the model, {} periods, {} lines", response.periods, response.frequency.len()),
-            ["output", "antiresonance [Hz]", "resonance [Hz]", "model's error [%]"],
-        );
-        let hertz = |f: Option<f64>| f.map_or(Cell::Empty, |f| Cell::Number(f, 4, String::new()));
-        for o in &response.outputs {
-            table.row(vec![
-                o.signal.name().into(),
-                hertz(o.antiresonance),
-                hertz(o.resonance),
-                Cell::Number(o.error_percent, 3, String::new()),
-            ]);
-        }
-        blocks.push(Block::Table(table));
-    }
+    blocks.extend(crate::report::identify::short(result));
     for m in &result.methods {
         if let Some(why) = &m.failure {
             blocks.push(Block::Warning(format!("{}: {why}", m.title)));
         }
-        let notes = m.notes.iter().map(|n| Block::Paragraph(format!("{}: {n}", m.title)));
-        blocks.extend(notes);
-    }
-    if let Some(best) = &result.recommended {
-        blocks.push(Block::Paragraph(format!("Trust {}: {}.", result.methods[best.method].title.to_lowercase(), best.why)));
+        blocks.extend(m.notes.iter().map(|n| Block::Paragraph(format!("{}: {n}", m.title))));
     }
     blocks
-}
-
-fn estimates(
-    caption: &str,
-    result: &Identification,
-    marked: Option<usize>,
-    of: impl Fn(&MethodResult) -> &Vec<Estimate>,
-) -> Table {
-    let first = result.methods.iter().map(&of).find(|e| !e.is_empty());
-    let mut columns = vec!["method".to_owned()];
-    let mut referenced = false;
-    for e in first.into_iter().flatten() {
-        columns.push(format!("{} [{}]", e.name, e.unit));
-        if e.reference.is_some() {
-            referenced = true;
-            columns.push("off [%]".to_owned());
-        }
-    }
-    let mut table = Table::new(caption, columns);
-    if referenced {
-        let mut cells = vec![Cell::text("axis file")];
-        for e in first.into_iter().flatten() {
-            cells.push(e.reference.map_or(Cell::Empty, |r| Cell::Number(r, 5, String::new())));
-            if e.reference.is_some() {
-                cells.push(Cell::Empty);
-            }
-        }
-        table.row(cells);
-    }
-    for (i, m) in result.methods.iter().enumerate() {
-        if of(m).is_empty() {
-            continue;
-        }
-        let mut cells = vec![Cell::text(short(m.method))];
-        for e in of(m) {
-            // A standard error of rounding says nothing: the number itself then.
-            cells.push(match e.std {
-                Some(std) if std > 1e-9 * e.value.abs() => Cell::Estimate(e.value, std, String::new()),
-                _ => Cell::Number(e.value, 6, String::new()),
-            });
-            if e.reference.is_some() {
-                cells.push(e.error_percent.map_or(Cell::Empty, |p| Cell::Number(p, 3, String::new())));
-            }
-        }
-        if marked == Some(i) { table.strong_row(cells) } else { table.row(cells) }
-    }
-    table
-}
-
-/// A method's name in a table.
-fn short(method: &str) -> String {
-    match method {
-        "els_batch" => "ELS batch".to_owned(),
-        "frequency" => "frequency".to_owned(),
-        other => other.to_uppercase(),
-    }
-}
-
-fn fits(result: &Identification, marked: Option<usize>) -> Table {
-    let mut columns = vec!["method".to_owned()];
-    let outputs = result.methods.iter().map(|m| &m.outputs).find(|o| !o.is_empty());
-    for o in outputs.into_iter().flatten() {
-        columns.push(format!("{} [%]", o.signal));
-        columns.push("white".to_owned());
-    }
-    columns.push("error of T [%]".to_owned());
-    let mut table = Table::new("Fit of a simulation with the estimates; whether its residual is white; error of the torque estimated from the motion", columns);
-    let width = outputs.map_or(0, Vec::len);
-    for (i, m) in result.methods.iter().enumerate() {
-        if m.failure.is_some() {
-            continue;
-        }
-        let mut cells = vec![Cell::text(short(m.method))];
-        for o in &m.outputs {
-            cells.push(Cell::Number(o.fit_percent, 5, String::new()));
-            cells.push(if o.whiteness.white { "yes" } else { "no" }.into());
-        }
-        for _ in m.outputs.len()..width {
-            cells.extend([Cell::Empty, Cell::Empty]);
-        }
-        cells.push(m.excitation.as_ref().map_or(Cell::Empty, |e| Cell::Number(e.error_percent, 3, String::new())));
-        if marked == Some(i) { table.strong_row(cells) } else { table.row(cells) }
-    }
-    table
 }
 
 fn paper_tables(json: Option<&Path>) -> anyhow::Result<ExitCode> {

@@ -300,7 +300,10 @@ impl Measured {
                     model_magnitude: model.iter().map(|g| g.norm()).collect(),
                     model_phase: model.iter().map(|g| g.arg()).collect(),
                     error_percent: 100.0 * (error / g.len() as f64).sqrt(),
-                    antiresonance: interior(&flat, |a, b| a < b).map(|i| frequency[i]),
+                    // The table's side has none: what is smallest there is noise.
+                    antiresonance: interior(&flat, |a, b| a < b)
+                        .filter(|_| matches!(signal, Signal::Theta1 | Signal::Omega1))
+                        .map(|i| frequency[i]),
                     resonance: interior(&flat, |a, b| a > b).map(|i| frequency[i]),
                 })
             })

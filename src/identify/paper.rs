@@ -112,7 +112,7 @@ pub fn least_squares(record: &Record, rule: Rule) -> Result<Estimated, Regressio
     Ok(states.parameters(&solve(&states)?))
 }
 
-/// [`least_squares`] with I2 held at a known value: `K = A41*I2`, `B = A42*I2`, `I1 = -K/A21`.
+/// [`least_squares`] with I2 held at a known value: `K = A41*I2`, `I1 = -K/A21`, `B = -A22*I1`.
 ///
 /// # Errors
 /// As [`least_squares`].
@@ -120,7 +120,8 @@ pub fn least_squares_with_i2(record: &Record, rule: Rule, i2: f64) -> Result<Est
     let states = States::new(record, rule)?;
     let (a, _) = states.matrices(&solve(&states)?);
     let k = a[(3, 0)] * i2;
-    Ok(Estimated { values: Vector4::new(-k / a[(1, 0)], i2, a[(3, 1)] * i2, k), covariance: None })
+    let i1 = -k / a[(1, 0)];
+    Ok(Estimated { values: Vector4::new(i1, i2, -a[(1, 1)] * i1, k), covariance: None })
 }
 
 fn solve(states: &States) -> Result<SMatrix<f64, 5, 4>, RegressionError> {

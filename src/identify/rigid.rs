@@ -222,15 +222,9 @@ pub(super) fn identify(
                 format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
-            for i in 0..4 {
+            for (i, name) in names.into_iter().enumerate() {
                 let r = if i == 0 { reference } else { None };
-                result.parameters.push(Estimate::new(
-                    names[i],
-                    units(motion)[i],
-                    found.values[i],
-                    Some(found.std[i]),
-                    r,
-                ));
+                result.parameters.push(Estimate::new(name, units(motion)[i], found.values[i], Some(found.std[i]), r));
             }
             let (time, measured, modelled) = found.fit;
             let error: Vec<f64> = modelled.iter().zip(&measured).map(|(a, b)| a - b).collect();

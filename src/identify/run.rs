@@ -161,13 +161,6 @@ pub fn identify(
             Signal::Theta2.unit(machine.signals.motion)
         ));
     }
-    if record.omega.is_none() {
-        warnings.push(
-            "speeds are not measured on both sides: the regressions work on differences of positions and are easily \
-             biased by noise; trust output error"
-                .to_owned(),
-        );
-    }
     let samples = request.period.or_else(|| period(record.torque));
     let measured = samples.and_then(|n| frequency::measure(trace, n));
     // On a measured record of several periods the regressions work on the average of the periods: drift, most of the
@@ -189,6 +182,13 @@ pub fn identify(
         }
         None => record,
     };
+    if record.omega.is_none() {
+        warnings.push(
+            "speeds are not measured on both sides: the regressions work on differences of positions and are easily \
+             biased by noise; trust output error"
+                .to_owned(),
+        );
+    }
     // The derived speeds say nothing that the angles do not.
     let angles = averaged.as_ref().map(|average| {
         let mut angles = average.clone();
