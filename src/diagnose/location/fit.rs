@@ -31,6 +31,8 @@ pub struct Setting<'a> {
     pub structure: Structure,
     /// What is known before the record.
     pub prior: Prior,
+    /// A torque at the first port that is known by now.
+    pub known: Option<Vec<f64>>,
 }
 
 /// The axis with unknown inputs, fitted to a record.
@@ -85,7 +87,13 @@ impl<'a> Setting<'a> {
     /// The setting of a record.
     #[must_use]
     pub fn new(record: &'a Record, parameters: &Parameters, structure: Structure) -> Self {
-        Self { record, parameters: *parameters, structure, prior: Prior::new(record, parameters, structure) }
+        Self {
+            record,
+            parameters: *parameters,
+            structure,
+            prior: Prior::new(record, parameters, structure),
+            known: None,
+        }
     }
 
     /// The plant of a hypothesis.
@@ -107,7 +115,7 @@ impl<'a> Setting<'a> {
     }
 
     fn likelihood(&self, h: &Fitted) -> f64 {
-        let data = with_states!(h.ports.len(), N => kalman::log_likelihood(&self.plant::<N>(h), self.record));
+        let data = with_states!(h.ports.len(), N => kalman::log_likelihood(&self.plant::<N>(h), self.record, self.known.as_deref()));
         data - self.penalty(h)
     }
 
@@ -278,36 +286,60 @@ impl<'a> Setting<'a> {
     fn newton_step<const N: usize>(&self, best: &Fitted) -> Option<Vec<(usize, f64)>> {
         let track = self.track::<N>(best);
         let base = track.whitened();
-        let free = self.free(best);
-        let columns: Vec<Vec<f64>> = free
-            .iter()
-            .map(|&i| {
-                let delta = 1e-4;
-                let mut column = track.whitened_as(&self.plant::<N>(&self.moved(best.clone(), i, delta)), self.record);
-                for (c, b) in column.iter_mut().zip(&base) {
-                    *c = (*c - b) / delta;
-                }
-                column
-            })
-            .collect();
+        let (columns, priors) = self.directions(best, &track, &base);
         let mut normal = SMatrix::<f64, 6, 6>::identity();
         let mut right = SVector::<f64, 6>::zeros();
         for (a, ca) in columns.iter().enumerate() {
             for (b, cb) in columns.iter().enumerate() {
-                normal[(a, b)] = ca.iter().zip(cb).map(|(x, y)| x * y).sum::<f64>();
+                normal[(a, b)] = kalman::dot(ca, cb);
             }
-            let (value, std) = self.value(best, free[a]);
+            let (value, std) = priors[a];
             normal[(a, a)] += std.powi(-2);
-            right[a] = -ca.iter().zip(&base).map(|(x, y)| x * y).sum::<f64>() - value * std.powi(-2);
+            right[a] = -kalman::dot(ca, &base) - value * std.powi(-2);
         }
         let solution = normal.cholesky()?.solve(&right);
-        Some(free.iter().enumerate().map(|(a, i)| (*i, solution[a])).collect())
+        Some(self.free(best).into_iter().zip(solution.iter().copied()).collect())
+    }
+
+    /// How the whitened innovations change with each free value, the gains held; and where each value stands with the
+    /// standard deviation it had before the record.
+    pub(super) fn directions<const N: usize>(
+        &self,
+        h: &Fitted,
+        track: &Track<N>,
+        base: &[f64],
+    ) -> (Vec<Vec<f64>>, Vec<(f64, f64)>) {
+        const DELTA: f64 = 1e-4;
+        let free = self.free(h);
+        let column = |i: &usize| {
+            let mut column = track.whitened_as(
+                &self.plant::<N>(&self.moved(h.clone(), *i, DELTA)),
+                self.record,
+                self.known.as_deref(),
+            );
+            for (c, b) in column.iter_mut().zip(base) {
+                *c = (*c - b) / DELTA;
+            }
+            column
+        };
+        (free.iter().map(column).collect(), free.iter().map(|i| self.value(h, *i)).collect())
+    }
+
+    /// The hypothesis with its free values moved.
+    pub(super) fn stepped(&self, h: &Fitted, steps: &[f64]) -> Fitted {
+        self.free(h).into_iter().zip(steps).fold(h.clone(), |h, (i, s)| self.moved(h, i, s.clamp(-0.5, 0.5)))
+    }
+
+    /// The most likely walks of a hypothesis that was changed, its parameters kept.
+    pub(super) fn settle(&self, h: &mut Fitted) {
+        h.log_likelihood = self.likelihood(h);
+        self.search_walks(h, true);
     }
 
     /// The filter of a fitted hypothesis along the record.
     #[must_use]
     pub fn track<const N: usize>(&self, fitted: &Fitted) -> Track<N> {
-        kalman::track(&self.plant::<N>(fitted), self.record)
+        kalman::track(&self.plant::<N>(fitted), self.record, self.known.as_deref())
     }
 
     /// Smoothed states and unknown inputs of a fitted hypothesis.

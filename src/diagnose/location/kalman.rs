@@ -42,6 +42,9 @@ pub struct Track<const N: usize> {
     pub log_likelihood: f64,
 }
 
+/// A torque at the first port that is known by now, one value a sample, held: the unknown input is what comes on top.
+pub type Known<'a> = Option<&'a [f64]>;
+
 /// The variance of a channel's noise; a channel said to be without noise has that of its rounding.
 fn noise_variance(record: &Record, channel: usize) -> f64 {
     let scale = record.channels[channel].as_ref().map_or(0.0, |y| y.iter().fold(0.0_f64, |m, v| m.max(v.abs())));
@@ -50,13 +53,13 @@ fn noise_variance(record: &Record, channel: usize) -> f64 {
 
 /// Log-likelihood of the record, without keeping anything.
 #[must_use]
-pub fn log_likelihood<const N: usize>(plant: &Plant<N>, record: &Record) -> f64 {
-    run(plant, record, None)
+pub fn log_likelihood<const N: usize>(plant: &Plant<N>, record: &Record, known: Known<'_>) -> f64 {
+    run(plant, record, known, None)
 }
 
 /// The filter along the record, ready to smooth.
 #[must_use]
-pub fn track<const N: usize>(plant: &Plant<N>, record: &Record) -> Track<N> {
+pub fn track<const N: usize>(plant: &Plant<N>, record: &Record, known: Known<'_>) -> Track<N> {
     let mut track = Track {
         plant: *plant,
         measured: record.channels.each_ref().map(Option::is_some),
@@ -65,11 +68,12 @@ pub fn track<const N: usize>(plant: &Plant<N>, record: &Record) -> Track<N> {
         innovations: Vec::with_capacity(record.len()),
         log_likelihood: 0.0,
     };
-    track.log_likelihood = run(plant, record, Some(&mut track));
+    track.log_likelihood = run(plant, record, known, Some(&mut track));
     track
 }
 
-fn run<const N: usize>(plant: &Plant<N>, record: &Record, mut keep: Option<&mut Track<N>>) -> f64 {
+fn run<const N: usize>(plant: &Plant<N>, record: &Record, known: Known<'_>, mut keep: Option<&mut Track<N>>) -> f64 {
+    let port = plant.port();
     let noise: [f64; 4] = std::array::from_fn(|c| noise_variance(record, c));
     let channels: Vec<(usize, &[f64])> =
         record.channels.iter().enumerate().filter_map(|(c, y)| y.as_deref().map(|y| (c, y))).collect();
@@ -107,8 +111,10 @@ fn run<const N: usize>(plant: &Plant<N>, record: &Record, mut keep: Option<&mut 
             track.states.push(x);
             track.innovations.push(innovation);
         }
-        let (t0, t1) = (record.torque[k], record.torque.get(k + 1).copied().unwrap_or(record.torque[k]));
-        x = plant.f * x + plant.torque[0] * t0 + plant.torque[1] * t1;
+        x = plant.step(&x, record, k);
+        if let Some(known) = known {
+            x += port * known[k];
+        }
     }
     let count = (record.len() * channels.len()) as f64;
     -0.5 * (count * std::f64::consts::TAU.ln() + sum_log + sum_square)
@@ -232,7 +238,8 @@ impl<const N: usize> Track<N> {
 
     /// Whitened innovations of another plant with the gains and variances of this one.
     #[must_use]
-    pub fn whitened_as(&self, plant: &Plant<N>, record: &Record) -> Vec<f64> {
+    pub fn whitened_as(&self, plant: &Plant<N>, record: &Record, known: Known<'_>) -> Vec<f64> {
+        let port = plant.port();
         let mut out = Vec::with_capacity(4 * self.innovations.len());
         let mut x = plant.mean;
         for k in 0..record.len() {
@@ -244,11 +251,49 @@ impl<const N: usize> Track<N> {
                     out.push(e / gains.variance[c].sqrt());
                 }
             }
-            let (t0, t1) = (record.torque[k], record.torque.get(k + 1).copied().unwrap_or(record.torque[k]));
-            x = plant.f * x + plant.torque[0] * t0 + plant.torque[1] * t1;
+            x = plant.step(&x, record, k);
+            if let Some(known) = known {
+                x += port * known[k];
+            }
         }
         out
     }
+
+    /// How the whitened innovations answer to a torque at the first port, `n` values held over their samples, or, when
+    /// `commanded`, to one added to the torque recorded.
+    ///
+    /// The reading of what the axis does under it is not in the record: the innovation is its negative.
+    #[must_use]
+    pub fn answer(&self, torque: &[f64], commanded: bool) -> Vec<f64> {
+        let mut out = Vec::with_capacity(4 * self.innovations.len());
+        let port = self.plant.port();
+        let mut x = SVector::<f64, N>::zeros();
+        for (k, t0) in torque.iter().enumerate() {
+            let gains = self.gains(k);
+            for c in (0..4).filter(|c| self.measured[*c]) {
+                let e = -self.plant.read[c].dot(&x);
+                x += gains.gain[c] * e;
+                out.push(e / gains.variance[c].sqrt());
+            }
+            let t1 = torque.get(k + 1).copied().unwrap_or(*t0);
+            x = self.plant.f * x;
+            x += if commanded { self.plant.torque[0] * *t0 + self.plant.torque[1] * t1 } else { port * *t0 };
+        }
+        out
+    }
+}
+
+/// Scalar product, in four sums side by side.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (fours_a, fours_b) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = fours_a.remainder().iter().zip(fours_b.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in fours_a.zip(fours_b) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]
@@ -279,8 +324,8 @@ mod tests {
         let transition = Transition::new(&Parameters::PAPER, Structure::TwoInertia, record.hold, record.dt);
         let prior = Prior { mean: [0.05, 0.0, 0.0, 0.0], std: [0.2, 3.0, 0.5, 10.0], torque: 0.02 / 3.0, angle: 0.1 };
         let plant = Plant::<6>::new(&transition, &prior, &[Port::Motor, Port::Table], &[3e-4, 1e-4]);
-        let track = track(&plant, &record);
-        assert_eq!(log_likelihood(&plant, &record), track.log_likelihood);
+        let track = track(&plant, &record, None);
+        assert_eq!(log_likelihood(&plant, &record, None), track.log_likelihood);
         assert!((track.log_likelihood - oracle[0]).abs() < 1e-7 * oracle[0].abs(), "{}", track.log_likelihood);
         let smoothed = track.smooth();
         for (i, k) in [0, 20, 39].into_iter().enumerate() {

@@ -9,6 +9,7 @@ mod by_frequency;
 mod by_state;
 mod by_time;
 mod fit;
+mod follows;
 mod kalman;
 mod places;
 mod plant;

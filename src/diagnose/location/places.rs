@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 use super::fit::{Fitted, Setting};
+use super::follows::{follow, of_the_command, of_the_motion};
 use super::plant::Port;
 use crate::axis::Structure;
 use crate::effects::Place;
@@ -56,7 +57,7 @@ pub fn evidence(setting: &Setting<'_>) -> Vec<PlaceEvidence> {
     let nowhere = setting.fit(&[]);
     let fit = |(place, ports): &(Option<Place>, Vec<Port>)| {
         let fitted = setting.fit(ports);
-        if *place == Some(Place::Sensor) {
+        if matches!(place, Some(Place::Sensor | Place::Coupling)) {
             let other = setting.fit_slow(ports);
             if other.log_likelihood > fitted.log_likelihood {
                 return other;
@@ -74,8 +75,43 @@ pub fn evidence(setting: &Setting<'_>) -> Vec<PlaceEvidence> {
     for ((place, _), fitted) in hypotheses.into_iter().zip(fits) {
         all.push(PlaceEvidence { place, log_likelihood: fitted.log_likelihood - price(&fitted), share: 0.0, fitted });
     }
+    follow_torques(setting, &mut all, samples);
     share(&mut all, samples);
     all
+}
+
+/// Lets dictionaries explain the unknown torques of the likeliest places, and splits the one on the motor into one that
+/// follows the command (the input) and one that follows the motion.
+fn follow_torques(setting: &Setting<'_>, all: &mut Vec<PlaceEvidence>, samples: f64) {
+    let best = all.iter().map(|e| e.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+    let near = |e: &&PlaceEvidence| e.log_likelihood > best - 5.0 * TEMPER * samples;
+    let mut work: Vec<(Place, Fitted, bool)> = Vec::new();
+    for e in all.iter().filter(near) {
+        match e.place {
+            Some(Place::Motor) => {
+                work.push((Place::Input, e.fitted.clone(), true));
+                work.push((Place::Motor, e.fitted.clone(), false));
+            }
+            Some(place @ (Place::Coupling | Place::Table)) => work.push((place, e.fitted.clone(), false)),
+            _ => {}
+        }
+    }
+    let value = |(_, plain, commanded): &(Place, Fitted, bool)| {
+        let words = if *commanded {
+            of_the_command(&setting.record.torque)
+        } else {
+            of_the_motion(&setting.smooth(plain).states, plain.ports[0], setting.prior.torque)
+        };
+        let followed = follow(setting, plain, &words, *commanded);
+        followed.fitted.log_likelihood - 0.5 * (2.0 + followed.words as f64) * samples.ln()
+    };
+    let values: Vec<f64> = work.par_iter().map(value).collect();
+    for ((place, plain, _), value) in work.into_iter().zip(values) {
+        match all.iter_mut().find(|e| e.place == Some(place)) {
+            Some(e) => e.log_likelihood = e.log_likelihood.max(value),
+            None => all.push(PlaceEvidence { place: Some(place), log_likelihood: value, share: 0.0, fitted: plain }),
+        }
+    }
 }
 
 /// Shares from the log-likelihoods, tempered.

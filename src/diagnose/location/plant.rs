@@ -216,6 +216,20 @@ impl<const N: usize> Plant<N> {
         }
         Self { f, torque: transition.torque.each_ref().map(widen), walk, read, mean, std }
     }
+
+    /// What a unit of the first unknown input, held over a sample, adds to the state; zero where there is none.
+    #[must_use]
+    pub fn port(&self) -> SVector<f64, N> {
+        SVector::from_fn(|i, _| if N > 4 && i < 4 { self.f[(i, 4)] } else { 0.0 })
+    }
+
+    /// The state after sample `k` under the torque recorded.
+    #[inline]
+    #[must_use]
+    pub fn step(&self, x: &SVector<f64, N>, record: &Record, k: usize) -> SVector<f64, N> {
+        let (t0, t1) = (record.torque[k], record.torque.get(k + 1).copied().unwrap_or(record.torque[k]));
+        self.f * x + self.torque[0] * t0 + self.torque[1] * t1
+    }
 }
 
 #[cfg(test)]

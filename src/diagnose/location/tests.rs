@@ -152,3 +152,30 @@ fn encoders_with_their_own_zeros_change_nothing() {
     let found = locate(&record, &near(), Structure::TwoInertia);
     assert_eq!(found.place, Some(Place::Motor), "{}", found.summary);
 }
+
+#[test]
+fn an_error_of_the_command_is_told_from_a_torque_on_the_motor_by_what_it_follows() {
+    for (effect, values) in
+        [(Effect::Delay, &[2.4 * DT][..]), (Effect::ActuatorLag, &[4e-3]), (Effect::Saturation, &[0.045])]
+    {
+        let found = located(effect, values);
+        assert_eq!(found.place, Some(Place::Input), "{effect:?}: {}", found.summary);
+        assert!(found.summary.contains("between the command and the motor"), "{}", found.summary);
+    }
+    for (effect, values) in
+        [(Effect::ViscousMotor, &[2e-4][..]), (Effect::TorqueRipple, &[2e-3, 3.0]), (Effect::LoadMotor, &[2e-3])]
+    {
+        let found = located(effect, values);
+        assert_eq!(found.place, Some(Place::Motor), "{effect:?}: {}", found.summary);
+    }
+}
+
+#[test]
+fn the_same_record_gives_the_same_answer_to_the_bit_on_any_number_of_threads() {
+    let (record, _) = record(Some((Effect::CoulombTable, &[1e-3])), true);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| serde_json::to_string(&locate(&record, &near(), Structure::TwoInertia)).expect("plain data"))
+    };
+    assert_eq!(on(1), on(3));
+}

@@ -10,6 +10,10 @@ use crate::effects::Place;
 
 /// A curve or a part of the spectrum is named from this share of the residual on.
 const NAMED: f64 = 0.5;
+/// A residual whose mean is this share of its rms is a constant: nine tenths of its energy.
+const CONSTANT: f64 = 0.95;
+/// Of two variables that explain alike to within this share, the earlier in the list is named.
+const ALIKE: f64 = 0.03;
 /// A place is sure from this share of the evidence on.
 const SURE: f64 = 0.9;
 
@@ -76,7 +80,11 @@ fn located(f: &Findings<'_>, place: Place) -> String {
         Place::Sensor => ("sensor", "rad", "in the table's encoder, not in the motion"),
     };
     let mut text = format!("The gap lies {acts} ({} {unit} rms)", significant(super::plant::rms(&f.residual.at_place)));
-    if let Some(curve) = against(f.state, name) {
+    let mean = f.residual.at_place.iter().sum::<f64>() / f.residual.at_place.len().max(1) as f64;
+    let constant = mean.abs() > CONSTANT * super::plant::rms(&f.residual.at_place);
+    if constant {
+        text.push_str(&format!(", nearly constant at {} {unit}", significant(mean)));
+    } else if let Some(curve) = against(f.state, name) {
         text.push_str(", ");
         text.push_str(&curve);
     }
@@ -100,8 +108,18 @@ fn located(f: &Findings<'_>, place: Place) -> String {
 
 /// What the residual depends on, by the curve that explains most of it.
 fn against(curves: &[StateCurve], residual: &str) -> Option<String> {
-    let own = curves.iter().filter(|c| c.residual == residual);
-    let best = own.max_by(|a, b| a.explained.total_cmp(&b.explained))?;
+    let own = || curves.iter().filter(|c| c.residual == residual);
+    let most = own().map(|c| c.explained).fold(0.0, f64::max);
+    // The residual's own side of the chain comes first.
+    let natural = |c: &&StateCurve| {
+        let side = match residual {
+            "r1" => ["omega1", "theta1 within the turn", "theta1", "T"],
+            "coupling" => ["twist", "twist rate", "omega1", "T"],
+            _ => ["omega2", "theta2 within the turn", "theta2", "twist"],
+        };
+        side.iter().position(|s| *s == c.against).unwrap_or(side.len())
+    };
+    let best = own().filter(|c| c.explained >= most - ALIKE).min_by_key(natural)?;
     if best.explained < NAMED {
         return None;
     }
