@@ -281,7 +281,8 @@ def plain(value):
 def write_case(out: pathlib.Path, case, name: str, half: str, seed) -> None:
     rng = case["rng"]
     quantised = any("step2" in d.sensor for d in case["draws"])
-    light = case["noise"] * rng.uniform(0.3, 1.0) if not quantised and rng.random() < 0.1 else 0.0
+    # A nuisance of the effect cases only: on a trace without any other cause even a step below the noise would be a true answer.
+    light = case["noise"] * rng.uniform(0.3, 1.0) if case["draws"] and not quantised and rng.random() < 0.1 else 0.0
     folder = out / "cases" / name
     folder.mkdir(parents=True, exist_ok=True)
     figures = {}

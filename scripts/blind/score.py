@@ -122,7 +122,9 @@ def judge(seal: dict, answer: dict | None, seconds: float | None) -> dict:
         "pair_named": len(ids) == 2 and {family_of(i) for i in ids} <= {family_of(c) for c in causes},
         "pair_ids_named": len(ids) == 2 and set(ids) <= set(causes),
         "pair_hits": sum(family_of(i) in {family_of(c) for c in causes} for i in ids) if len(ids) == 2 else None,
-        "extra": len([c for c in causes if family_of(c) not in {family_of(i) for i in ids}]),
+        # A step below the noise is there in some cases, beside the hidden effect: naming it too is not wrong.
+        "extra": len([c for c in causes if family_of(c) not in {family_of(i) for i in ids}
+                      and not (c == "encoder_quantisation" and seal.get("light_step_rad"))]),
     }
 
 
