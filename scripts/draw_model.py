@@ -1,6 +1,6 @@
 """Draws modelDescription/model.png, the picture of the axis that every exported FMU carries.
 
-Run by hand after a change: .venv/bin/python scripts/draw_model.py (needs matplotlib; see scripts/requirements.txt).
+Run by hand after a change, with a Python that has matplotlib 3.11.2: python scripts/draw_model.py
 """
 
 from pathlib import Path

@@ -1,0 +1,41 @@
+//! The exported FMU through importers that share no code with eixo: `scripts/importers.py` and its table.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::Path;
+use std::process::Command;
+
+#[test]
+fn other_importers_give_the_harnesss_trace() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let python = root.join(".venv/bin/python");
+    if !python.is_file() {
+        eprintln!("SKIPPED: no .venv in {}; scripts/venv.sh makes it", root.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).into_os_string().into_string().unwrap();
+    let eixo = |args: &[&str]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_eixo")).args(args).output().unwrap();
+        assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
+    };
+    let (fmu, input) = (path("axis.fmu"), path("u.csv"));
+    eixo(&["export", &fmu]);
+    // Half a millisecond: a whole number of libcosim's nanoseconds.
+    eixo(&["excite", "-o", &input, "--samples", "2000", "--dt", "0.0005"]);
+    for settings in [&[][..], &["coulomb_motor.level=0.008", "backlash.half_gap=0.01", "delay.time=0.0012"]] {
+        let trace = path("trace.csv");
+        let sets: Vec<&str> = settings.iter().flat_map(|s| ["--set", s]).collect();
+        eixo(&[&["simulate", &fmu, "-i", &input, "-o", &trace, "--step-end"][..], &sets].concat());
+        let done = Command::new(&python)
+            .arg(root.join("scripts/importers.py"))
+            .args([&fmu, &trace])
+            .args(settings)
+            .output()
+            .unwrap();
+        let table = String::from_utf8_lossy(&done.stdout);
+        eprintln!("{table}");
+        assert!(done.status.success(), "{table}{}", String::from_utf8_lossy(&done.stderr));
+        assert!(table.contains("FMPy simulate_fmu"), "{table}");
+    }
+}
