@@ -5,6 +5,8 @@
 //! System Identification, 1999, ch. 7): Gauss-Newton on the whitened innovations with the gains held, between searches
 //! for the walks.
 
+use std::ops::Range;
+
 use nalgebra::{SMatrix, SVector};
 
 use super::kalman::{self, Track};
@@ -51,7 +53,7 @@ pub struct Fitted {
 }
 
 /// States and unknown inputs given the whole record, by sample.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Motion {
     /// `[theta1, omega1, theta2, omega2]`.
     pub states: Vec<[f64; 4]>,
@@ -61,6 +63,20 @@ pub struct Motion {
     pub inputs: Vec<Vec<f64>>,
     /// Their standard deviations.
     pub input_std: Vec<Vec<f64>>,
+}
+
+impl Motion {
+    /// Appends the samples in `range` of another.
+    pub(super) fn append(&mut self, other: &Self, range: Range<usize>) {
+        self.states.extend_from_slice(&other.states[range.clone()]);
+        self.state_std.extend_from_slice(&other.state_std[range.clone()]);
+        for (own, other) in [(&mut self.inputs, &other.inputs), (&mut self.input_std, &other.input_std)] {
+            own.resize(other.len(), Vec::new());
+            for (own, other) in own.iter_mut().zip(other) {
+                own.extend_from_slice(&other[range.clone()]);
+            }
+        }
+    }
 }
 
 /// Calls a function generic over the number of states for as many ports as there are.
@@ -217,6 +233,13 @@ impl<'a> Setting<'a> {
         let mut best = self.at(ports, steps, self.parameters);
         self.search_walks(&mut best, true);
         best
+    }
+
+    /// Log-likelihood of the record with the parameters given and walks of a usual size.
+    #[must_use]
+    pub fn likelihood_at_default(&self, ports: &[Port]) -> f64 {
+        let steps = ports.iter().map(|p| 1e-2 * self.scale(*p)).collect();
+        self.at(ports, steps, self.parameters).log_likelihood
     }
 
     fn at(&self, ports: &[Port], steps: Vec<f64>, parameters: Parameters) -> Fitted {

@@ -24,11 +24,19 @@ pub use fit::{Fitted, Motion};
 pub use places::PlaceEvidence;
 pub use plant::Port;
 
+use std::ops::Range;
+
 use super::noise::{find_period, quantum};
 use super::record::Record;
 use crate::axis::{Parameters, Structure};
 use crate::effects::Place;
 use fit::Setting;
+
+/// Samples that are filtered at one time: the evidence of a longer record is that of its worst section of so many, and
+/// its residual torques are those of its sections, one after the other. Keeps time and memory of a long record in bounds.
+const SECTION: usize = 32_768;
+/// Samples that a section is smoothed beyond its ends.
+const MARGIN: usize = 1024;
 
 /// Where the gap lies.
 #[derive(Debug, Clone, Serialize)]
@@ -83,11 +91,13 @@ pub struct Residual {
 #[must_use]
 pub fn locate(record: &Record, parameters: &Parameters, structure: Structure) -> Location {
     let record = &without_offset(record, parameters, structure);
-    let setting = Setting::new(record, parameters, structure);
+    let section = worst_section(record, parameters, structure);
+    let part = section.map(|s| cut(record, s));
+    let setting = Setting::new(part.as_ref().unwrap_or(record), parameters, structure);
     let by_place = places::evidence(&setting);
     let best = by_place.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
     let place = best.and_then(|e| e.place);
-    let residual = residual_torques(&setting, &by_place, place);
+    let residual = residual_torques(&setting, record, &by_place, place);
     let flexible = structure == Structure::TwoInertia;
     let slots = by_time::by_time(
         record.start,
@@ -123,8 +133,55 @@ pub fn locate(record: &Record, parameters: &Parameters, structure: Structure) ->
 #[must_use]
 pub fn smooth_states(record: &Record, parameters: &Parameters, structure: Structure) -> Motion {
     let record = &without_offset(record, parameters, structure);
-    let setting = Setting::new(record, parameters, structure);
-    setting.smooth(&setting.walks(&both(structure)))
+    let section = worst_section(record, parameters, structure);
+    let part = section.map(|s| cut(record, s));
+    let setting = Setting::new(part.as_ref().unwrap_or(record), parameters, structure);
+    smooth(&setting, record, &setting.walks(&both(structure)))
+}
+
+/// The samples in `range`, with noise and hold as they are.
+fn cut(record: &Record, range: Range<usize>) -> Record {
+    Record {
+        start: record.time(range.start),
+        torque: record.torque[range.clone()].to_vec(),
+        channels: record.channels.each_ref().map(|c| c.as_ref().map(|c| c[range.clone()].to_vec())),
+        ..*record
+    }
+}
+
+/// Equal sections of at most [`SECTION`] samples.
+fn sections(n: usize) -> Vec<Range<usize>> {
+    let count = n.div_ceil(SECTION).max(1);
+    (0..count).map(|i| i * n / count..(i + 1) * n / count).collect()
+}
+
+/// The section of a long record that the axis without effects explains worst, by likelihood with default walks.
+fn worst_section(record: &Record, parameters: &Parameters, structure: Structure) -> Option<Range<usize>> {
+    let all = sections(record.len());
+    if all.len() < 2 {
+        return None;
+    }
+    let value = |range: &Range<usize>| {
+        let part = cut(record, range.clone());
+        Setting::new(&part, parameters, structure).likelihood_at_default(&both(structure)) / range.len() as f64
+    };
+    all.into_iter().map(|r| (value(&r), r)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, r)| r)
+}
+
+/// Smoothed motion along the whole record, section by section.
+fn smooth(setting: &Setting<'_>, record: &Record, fitted: &Fitted) -> Motion {
+    if setting.record.len() == record.len() {
+        return setting.smooth(fitted);
+    }
+    let mut whole = Motion::default();
+    for range in sections(record.len()) {
+        let wide = range.start.saturating_sub(MARGIN)..(range.end + MARGIN).min(record.len());
+        let part = cut(record, wide.clone());
+        let prior = plant::Prior::new(&part, &setting.parameters, setting.structure);
+        let motion = Setting { record: &part, prior, ..setting.clone() }.smooth(fitted);
+        whole.append(&motion, range.start - wide.start..range.end - wide.start);
+    }
+    whole
 }
 
 /// The ports of the residual torques.
@@ -154,7 +211,12 @@ fn without_offset(record: &Record, p: &Parameters, structure: Structure) -> Reco
     record
 }
 
-fn residual_torques(setting: &Setting<'_>, by_place: &[PlaceEvidence], place: Option<Place>) -> Residual {
+fn residual_torques(
+    setting: &Setting<'_>,
+    record: &Record,
+    by_place: &[PlaceEvidence],
+    place: Option<Place>,
+) -> Residual {
     let ports = both(setting.structure);
     let fit_of = |place: Place| by_place.iter().find(|e| e.place == Some(place)).map(|e| &e.fitted);
     // Start from the walks of the single places, and from the parameters of the best.
@@ -172,8 +234,8 @@ fn residual_torques(setting: &Setting<'_>, by_place: &[PlaceEvidence], place: Op
         _ => vec![of(Place::Motor, motor || !table), of(Place::Table, table)],
     };
     let fitted = setting.fit_at(&ports, steps, &parameters);
-    let motion = setting.smooth(&fitted);
-    let n = setting.record.len();
+    let motion = smooth(setting, record, &fitted);
+    let n = record.len();
     let mut inputs = motion.inputs.into_iter();
     let mut stds = motion.input_std.into_iter();
     let mut residual = Residual {
@@ -186,7 +248,7 @@ fn residual_torques(setting: &Setting<'_>, by_place: &[PlaceEvidence], place: Op
         parameters: Some(fitted.parameters),
     };
     if let Some(best) = best.filter(|f| !f.ports.is_empty()) {
-        let motion = setting.smooth(best);
+        let motion = smooth(setting, record, best);
         residual.at_place = motion.inputs.into_iter().next().unwrap_or_default();
         if best.ports[0] == Port::TableAngle {
             // The whole error of the encoder: its pitch and its delay beside the walk.

@@ -179,3 +179,35 @@ fn the_same_record_gives_the_same_answer_to_the_bit_on_any_number_of_threads() {
     };
     assert_eq!(on(1), on(3));
 }
+
+#[test]
+fn a_record_longer_than_a_section_is_smoothed_as_one() {
+    let torque: Vec<f64> = torque().into_iter().cycle().take(super::SECTION + 4000).collect();
+    let mut effects = Settings::default();
+    effects.of_mut(Effect::CoulombMotor)[0] = 3e-3;
+    let options = SimulateOptions { start: 0.0, dt: DT, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 1 };
+    let response = simulate(&P, Structure::TwoInertia, &effects, [0.0, 1.0, 0.0, 1.0], &torque, &options);
+    let mut rng = ChaCha8Rng::seed_from_u64(18);
+    let mut read = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let noise: Vec<f64> = (0..torque.len()).map(|_| StandardNormal.sample(&mut rng)).collect();
+        noise.iter().enumerate().map(|(k, e)| f(k) + NOISE * e).collect()
+    };
+    let channels =
+        [Some(read(&|k| response.readings[k].theta1)), None, Some(read(&|k| response.readings[k].theta2)), None];
+    let record = Record {
+        start: 0.0,
+        dt: DT,
+        hold: Hold::Zoh,
+        torque: torque.clone(),
+        channels,
+        noise: [NOISE, 0.0, NOISE, 0.0],
+    };
+    let motion = smooth_states(&record, &P, Structure::TwoInertia);
+    assert_eq!(motion.states.len(), torque.len());
+    // Where two sections meet the state is as good as elsewhere.
+    let meet = torque.len() / 2;
+    for k in meet - 5..meet + 5 {
+        let error = (motion.states[k][0] - response.readings[k].theta1).abs();
+        assert!(error < 5.0 * motion.state_std[k][0] && motion.state_std[k][0] < NOISE, "{k}: {error}");
+    }
+}
