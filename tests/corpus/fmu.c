@@ -30,7 +30,7 @@ enum {
     RESET_PARAMETER, RESET_CRASH, STATE_FORGETS, STATE_INPUT, STATE_SHARED, STATE_HANDLE, SERIALISE, SERIALISE_POINTER,
     STEP_IGNORED, CONVERGENCE, VARIABLE, NEGATIVE, ZERO, WRONG_POINT, EARLY, EARLY_CRASH, LATE, INIT_ORDER, NAN_INPUT,
     NAN_HANG, CANCEL, TIME, DERIVATIVE, INPUT_DERIVATIVE, OUTPUT_DERIVATIVE, DIRECTIONAL, DEPENDENCY, GLOBAL, THREADS,
-    HANDOVER, LEAK, LEAK_FILE, LEAK_THREAD, STEP_LEAK, CALLBACKS, NAME_KEPT, ALLOCATION, DEBUG_LOGGING, LOG_CATEGORY,
+    HANDOVER, LEAK, LEAK_LARGE, NULL_CRASH, LEAK_FILE, LEAK_THREAD, STEP_LEAK, CALLBACKS, NAME_KEPT, ALLOCATION, DEBUG_LOGGING, LOG_CATEGORY,
     DIRECTORY, ROUNDING, DENORMALS, STDOUT, SIGNALS, ENVIRONMENT, LOCALE, FILES
 };
 #ifndef DEFECT
@@ -154,6 +154,7 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
         free(noise);
     }
     if (IS(LEAK)) i->leaks = malloc(1000);
+    if (IS(LEAK_LARGE)) i->leaks = malloc(100000);
     if (IS(LEAK_FILE)) i->leaks = fopen("/dev/null", "r");
     if (IS(LEAK_THREAD)) {
         pthread_t thread;
@@ -198,12 +199,16 @@ EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const char 
     return OK;
 }
 
-static Status in(Instance *i, int phases, const char *call) { return i->values.phase & phases ? OK : fail(i, call); }
+static Status in(Instance *i, int phases, const char *call) {
+    if (!i && !IS(NULL_CRASH)) return ERROR;
+    return i->values.phase & phases ? OK : fail(i, call);
+}
 
 EXPORT Status fmi2SetupExperiment(Component c, int has_tolerance, double tolerance, double begin, int has_stop,
                                   double stop) {
     Instance *i = c;
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    if (!i) return ERROR;
     if (!IS(INIT_ORDER) && in(i, INSTANTIATED, "fmi2SetupExperiment")) return ERROR;
     i->values.time = begin;
     return OK;
@@ -228,7 +233,7 @@ EXPORT Status fmi2ExitInitializationMode(Component c) {
 
 EXPORT Status fmi2Terminate(Component c) {
     Instance *i = c;
-    if (IS(TERMINATE)) return fail(i, "cannot end");
+    if (IS(TERMINATE) && i) return fail(i, "cannot end");
     if (in(i, STEPPING, "fmi2Terminate")) return ERROR;
     log_text(i, OK, "logEvents", "terminated", i->values.time);
     i->values.phase = TERMINATED;
@@ -238,6 +243,7 @@ EXPORT Status fmi2Terminate(Component c) {
 #if !DEFECT_SYMBOL_MISSING
 EXPORT Status fmi2Reset(Component c) {
     Instance *i = c;
+    if (!i) return ERROR;
     double w = i->values.w, k = i->values.k;
     if (IS(RESET_CRASH)) *(volatile int *)8 = 1;
     start(&i->values);
@@ -286,7 +292,7 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
     Instance *i = c;
     Values *s = &i->values;
     (void)no_set_prior;
-    if (IS(EARLY_CRASH) && s->phase == INSTANTIATED) *(volatile int *)8 = 1;
+    if (IS(EARLY_CRASH) && i && s->phase == INSTANTIATED) *(volatile int *)8 = 1;
     int phases = STEPPING | (IS(EARLY) ? INSTANTIATED | INITIALIZING : 0) | (IS(LATE) ? TERMINATED : 0);
     if (in(i, phases, "fmi2DoStep")) return ERROR;
     if (step < 0 && !IS(NEGATIVE)) return fail(i, "negative step");
@@ -423,6 +429,7 @@ EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const
 
 EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const double value[]) {
     Instance *i = c;
+    if (!i) return ERROR;
     Values *s = &i->values;
     size_t n;
     for (n = 0; n < count; n++) {

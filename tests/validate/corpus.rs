@@ -70,7 +70,7 @@ pub fn description(replacements: &[(&str, &str)]) -> String {
 pub fn compiler() -> bool {
     let there = Command::new("cc").arg("--version").output().is_ok_and(|o| o.status.success());
     if !there {
-        eprintln!("skipped: there is no C compiler `cc`");
+        eprintln!("SKIPPED: there is no C compiler `cc`");
     }
     there && cfg!(target_os = "linux")
 }

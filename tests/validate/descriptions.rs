@@ -266,6 +266,11 @@ const MUTATIONS: &[Mutation] = &[
         &[("<InitialUnknowns>\n      <Unknown index=\"4\" dependencies=\"3\"/>", "<InitialUnknowns>")],
     ),
     (
+        "no initial unknowns",
+        "structure-initial-unknowns-absent",
+        &[("<InitialUnknowns>", "<!--"), ("</InitialUnknowns>", "-->")],
+    ),
+    (
         "parameter among the initial unknowns",
         "structure-initial-unknowns",
         &[(

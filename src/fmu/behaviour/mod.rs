@@ -130,6 +130,8 @@ pub(crate) fn behaviour(id: &str) -> Option<Behaviour> {
         "instances-threads" => Loaded(lifecycle::threads),
         "thread-handover" => Loaded(lifecycle::handover),
         "instance-leak" => Loaded(lifecycle::instance_leak),
+        "instance-leak-large" => Loaded(lifecycle::instance_leak_large),
+        "null-component" => Loaded(lifecycle::null_component),
         "step-leak" => Loaded(lifecycle::step_leak),
         "callbacks-copied" => Loaded(effects::callbacks),
         "allocation-failure" => Loaded(effects::allocation),

@@ -156,44 +156,113 @@ fn responses(p: &Probe, references: &[u32], change: Option<(u32, f64)>) -> Resul
     Ok(rows)
 }
 
-pub(super) fn dependencies(p: &Probe) -> Tested {
-    let listed: Vec<(&Unknown, &Variable)> = real(&p.d, &p.d.structure.outputs)
+/// Unknowns whose dependencies are declared, with their variables.
+fn declared<'a>(p: &Probe, d: &'a Description, unknowns: &'a [Unknown]) -> Vec<(&'a Unknown, &'a Variable)> {
+    real(d, unknowns)
         .filter(|(u, v)| u.dependencies.is_some() && !p.learned.masked.contains(&(0, v.value_reference)))
         .take(MOST)
-        .collect();
+        .collect()
+}
+
+fn lists(d: &Description, unknown: &Unknown, known: &Variable) -> bool {
+    let same = |v: &Variable| v.base() == BaseType::Real && v.value_reference == known.value_reference;
+    unknown.dependencies.iter().flatten().any(|&i| d.by_index(i).is_some_and(same))
+}
+
+fn left_out(unknown: &Variable, known: &Variable, how: &str) -> String {
+    format!("\"{}\" depends on \"{}\"{how}, which its dependencies leave out", unknown.name, known.name)
+}
+
+pub(super) fn dependencies(p: &Probe) -> Tested {
+    let outputs = declared(p, &p.d, &p.d.structure.outputs);
+    let initial = declared(p, &p.d, &p.d.structure.initial_unknowns);
+    if outputs.is_empty() && initial.is_empty() {
+        return not_applicable("no Real output or initial unknown has declared dependencies");
+    }
+    super::steps::size_counts(p)?;
+    let mut problems = at_initialisation(p, &initial, |_, v| {
+        v.causality == Causality::Input || v.initial() == Some(Initial::Exact) && super::probe::settable(v)
+    })?;
+    problems.extend(at_initialisation(p, &outputs, |d, v| {
+        v.causality == Causality::Input || knowns(d, true).iter().any(|k| k.name == v.name)
+    })?);
+    if problems.is_empty() {
+        problems = at_steps(p, &outputs)?;
+    }
+    problems.sort();
+    problems.dedup();
+    Ok(problems)
+}
+
+/// Perturbs knowns in initialisation mode, where the unknowns answer at once if at all.
+fn at_initialisation(
+    p: &Probe,
+    unknowns: &[(&Unknown, &Variable)],
+    is_known: impl Fn(&Description, &Variable) -> bool,
+) -> Result<Vec<String>, Stop> {
+    let mut problems = Vec::new();
+    if unknowns.is_empty() {
+        return Ok(problems);
+    }
+    let references: Vec<u32> = unknowns.iter().map(|(_, v)| v.value_reference).collect();
+    let mut instance = p.initializing()?;
+    let base = instance.get_real(&references)?;
+    for known in p.d.variables.iter().filter(|v| v.base() == BaseType::Real && is_known(&p.d, v)).take(MOST) {
+        let r = [known.value_reference];
+        let attempt = |instance: &mut Instance| -> Result<Vec<f64>, HostError> {
+            let at = instance.get_real(&r)?[0];
+            instance.set_real(&r, &[at + delta(&p.d, known, at)])?;
+            let moved = instance.get_real(&references)?;
+            instance.set_real(&r, &[at])?;
+            Ok(moved)
+        };
+        let Ok(moved) = attempt(&mut instance) else {
+            // Not to be set here; a fresh instance for the next.
+            instance = p.initializing()?;
+            continue;
+        };
+        // An FMU that does not come back to where it was shows nothing by moving.
+        if instance.get_real(&references)? != base {
+            instance = p.initializing()?;
+            continue;
+        }
+        for (((unknown, v), base), moved) in unknowns.iter().zip(&base).zip(moved) {
+            let changed = (moved - base).abs() > 1e-12 * base.abs();
+            if changed && !lists(&p.d, unknown, known) && v.value_reference != known.value_reference {
+                problems.push(left_out(v, known, " at initialisation"));
+            }
+        }
+    }
+    Ok(problems)
+}
+
+/// Perturbs inputs at a communication point.
+fn at_steps(p: &Probe, listed: &[(&Unknown, &Variable)]) -> Tested {
+    let mut problems = Vec::new();
     let inputs: Vec<(usize, &Variable)> =
         p.inputs().enumerate().filter(|(_, v)| v.base() == BaseType::Real).take(MOST).collect();
     if listed.is_empty() || inputs.is_empty() {
-        return not_applicable("no Real output with declared dependencies, or no Real input");
+        return Ok(problems);
     }
-    super::steps::size_counts(p)?;
+    p.affordable(6 * (inputs.len() + 1))?;
     let references: Vec<u32> = listed.iter().map(|(_, v)| v.value_reference).collect();
     let base = match responses(p, &references, None) {
         Ok(base) => base,
         Err(error) => return not_tested(format!("the FMU refuses a thousandth of the step size: {error}")),
     };
-    let mut problems = Vec::new();
     for (order, input) in inputs {
         let value = if p.learned.stimulus { p.input(input, order, p.time(1)) } else { start(input) };
         let r = p.d.resolved(input);
         let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
         let changed = (value + 100.0 * delta(&p.d, input, value)).clamp(low.min(high), high);
-        let rows = responses(p, &references, Some((input.value_reference, changed)))?;
+        let Ok(rows) = responses(p, &references, Some((input.value_reference, changed))) else { continue };
         for (at, (unknown, variable)) in listed.iter().enumerate() {
             let [now, soon, later] = [0, 1, 2].map(|row| (rows[row][at] - base[row][at]).abs());
-            let declared = unknown
-                .dependencies
-                .iter()
-                .flatten()
-                .any(|&i| p.d.by_index(i).is_some_and(|v| v.value_reference == input.value_reference));
             // An output that answers at once, or as much after a thousandth of a step as after a whole one, depends on
             // the input itself; what comes through the state grows with the time.
             let direct = now > 0.0 || soon > 0.5 * later && soon > 1e-9 * changed.abs();
-            if direct && !declared {
-                problems.push(format!(
-                    "\"{}\" depends on \"{}\" directly, which its dependencies leave out",
-                    variable.name, input.name
-                ));
+            if direct && !lists(&p.d, unknown, input) {
+                problems.push(left_out(variable, input, " directly"));
             }
         }
     }

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
 
@@ -23,8 +24,10 @@ pub struct Learned {
     pub observe_all: bool,
     /// Variables that differ between equal runs, by type and value reference: compared no more.
     pub masked: Vec<(u8, u32)>,
-    /// Communication steps that fit into a comparison of a slow FMU.
+    /// Communication steps that fit into a comparison of a slow FMU, or one that ends early; 0 is not known.
     pub steps: usize,
+    /// Wall time of a step, in s.
+    pub cost: f64,
 }
 
 /// Why a rule ended without a result.
@@ -40,6 +43,9 @@ pub(crate) enum Stop {
 
 impl From<HostError> for Stop {
     fn from(error: HostError) -> Self {
+        if matches!(error, HostError::OnlyOnce) {
+            return Self::NotApplicable(error.to_string());
+        }
         Self::Host(error)
     }
 }
@@ -81,6 +87,8 @@ pub(crate) struct Probe {
     pub stop: Option<f64>,
     pub step: f64,
     pub learned: Learned,
+    /// Instances made so far in this process.
+    pub instances: AtomicUsize,
     /// Observed variables: Real, Integer and Enumeration, Boolean, String.
     pub(super) observed: [Vec<Observed>; 4],
 }
@@ -111,7 +119,18 @@ impl Probe {
         let start = e.start_time.unwrap_or(0.0);
         let stop = e.stop_time.filter(|&stop| stop > start);
         let step = e.step_size.filter(|&h| h > 0.0).or_else(|| stop.map(|stop| (stop - start) / 500.0)).unwrap_or(0.01);
-        let mut probe = Self { observed: Default::default(), folder, library, d, binary, start, stop, step, learned };
+        let mut probe = Self {
+            observed: Default::default(),
+            instances: AtomicUsize::new(0),
+            folder,
+            library,
+            d,
+            binary,
+            start,
+            stop,
+            step,
+            learned,
+        };
         probe.choose_observed();
         probe
     }
@@ -150,6 +169,9 @@ impl Probe {
     }
 
     pub fn instantiate(&self) -> Result<Instance, HostError> {
+        if self.instances.fetch_add(1, Ordering::Relaxed) > 0 && self.interface().only_once {
+            return Err(HostError::OnlyOnce);
+        }
         Instance::new(Arc::clone(&self.binary), None, &self.options())
     }
 
@@ -161,7 +183,8 @@ impl Probe {
     }
 
     pub fn enter(&self, instance: &mut Instance) -> Result<(), HostError> {
-        instance.setup_experiment(None, self.start, self.stop)?;
+        // No stop time: comparisons may run past the default experiment.
+        instance.setup_experiment(None, self.start, None)?;
         instance.enter_initialization()?;
         self.drive(instance, self.start)
     }
@@ -179,6 +202,12 @@ impl Probe {
 
     pub fn steps(&self) -> usize {
         if self.learned.steps == 0 { STEPS } else { self.learned.steps.min(STEPS) }
+    }
+
+    /// Stops a rule that would take too long on a slow FMU.
+    pub fn affordable(&self, steps: usize) -> Result<(), Stop> {
+        let seconds = self.learned.cost * steps as f64;
+        if seconds > 3.0 { not_tested(format!("{steps} steps would take {seconds:.0} s")) } else { Ok(()) }
     }
 
     pub fn inputs(&self) -> impl Iterator<Item = &Variable> {

@@ -272,27 +272,54 @@ pub(super) fn unchanging(p: &Probe) -> Tested {
     Ok(problems)
 }
 
+/// Looks at an instance before each step of the default experiment, as far as time allows, until there is something to
+/// say; `driven` with varying inputs, and then as long as a comparison.
+fn watch(
+    p: &Probe,
+    driven: bool,
+    mut look: impl FnMut(&mut Instance, f64) -> Result<Option<String>, HostError>,
+) -> Result<Option<String>, HostError> {
+    let mut instance = if driven { p.ready()? } else { p.instantiate()? };
+    if !driven {
+        instance.initialize(p.start, None)?;
+    }
+    let stop = p.stop.filter(|_| !driven).unwrap_or_else(|| p.time(p.steps()));
+    let steps = ((stop - p.start) / p.step * (1.0 - 1e-12)).ceil() as usize;
+    let end = std::time::Instant::now() + std::time::Duration::from_millis(150);
+    for k in 0..=steps {
+        let said = look(&mut instance, p.time(k))?;
+        if said.is_some() || k == steps || std::time::Instant::now() > end {
+            return Ok(said);
+        }
+        if driven {
+            p.drive(&mut instance, p.time(k))?;
+        }
+        // A run that ends early has shown what it has.
+        if !instance.do_step_status(p.time(k), p.step, true)?.is_ok() {
+            return Ok(None);
+        }
+    }
+    Ok(None)
+}
+
 pub(super) fn finite(p: &Probe) -> Tested {
     let outputs: Vec<&Variable> =
         p.d.variables.iter().filter(|v| v.causality == Causality::Output && v.base() == BaseType::Real).collect();
     if outputs.is_empty() {
         return not_applicable("there is no Real output");
     }
-    let mut instance = p.ready()?;
     let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
-    for k in 0..=p.steps() {
+    let look = |instance: &mut Instance, time: f64| {
         let values = instance.get_real(&references)?;
-        if let Some((v, value)) = outputs.iter().zip(values).find(|(_, value)| !value.is_finite()) {
-            return Ok(vec![format!("the output \"{}\" is {value} at t = {}", v.name, p.time(k))]);
-        }
-        p.run(&mut instance, k, k + 1)?;
-    }
-    Ok(vec![])
+        let bad = outputs.iter().zip(values).find(|(_, value)| !value.is_finite());
+        Ok(bad.map(|(v, value)| format!("the output \"{}\" is {value} at t = {time}", v.name)))
+    };
+    let found = watch(p, false, look)?;
+    let found = if found.is_none() && p.learned.stimulus { watch(p, true, look)? } else { found };
+    Ok(found.into_iter().collect())
 }
 
 pub(super) fn range(p: &Probe) -> Tested {
-    let mut instance = p.instantiate()?;
-    instance.initialize(p.start, p.stop)?;
     let watched: Vec<(&Variable, f64, f64, Vec<i32>)> =
         p.d.variables
             .iter()
@@ -308,12 +335,12 @@ pub(super) fn range(p: &Probe) -> Tested {
     if watched.is_empty() {
         return not_applicable("no calculated variable has a min, a max or items");
     }
-    for k in 0..=p.steps() {
+    let found = watch(p, false, |instance, time| {
         for (v, low, high, items) in &watched {
-            let value = match get(&mut instance, v)? {
+            let value = match get(instance, v)? {
                 Value::Real(x) => x,
                 Value::Integer(i) if !items.is_empty() && !items.contains(&i) => {
-                    return Ok(vec![format!("\"{}\" is {i} at t = {}, no item of its enumeration", v.name, p.time(k))]);
+                    return Ok(Some(format!("\"{}\" is {i} at t = {time}, no item of its enumeration", v.name)));
                 }
                 Value::Integer(i) => f64::from(i),
                 _ => continue,
@@ -321,12 +348,12 @@ pub(super) fn range(p: &Probe) -> Tested {
             // A rounding error beyond the limit is none of the user's concern.
             let slack = 1e-9 * value.abs().max(1.0);
             if value < low - slack || value > high + slack {
-                return Ok(vec![format!("\"{}\" is {value} at t = {}, outside {low} to {high}", v.name, p.time(k))]);
+                return Ok(Some(format!("\"{}\" is {value} at t = {time}, outside {low} to {high}", v.name)));
             }
         }
-        instance.do_step(p.time(k), p.step)?;
-    }
-    Ok(vec![])
+        Ok(None)
+    })?;
+    Ok(found.into_iter().collect())
 }
 
 fn other(p: &Probe, v: &Variable) -> Option<Value> {

@@ -55,6 +55,33 @@ pub(crate) fn free_null(binary: &Binary) -> Result<(), HostError> {
     Ok(())
 }
 
+/// Functions that change an instance, of no instance.
+pub(crate) fn null_component(binary: &Binary) {
+    let c = std::ptr::null_mut();
+    let f = &binary.functions;
+    macro_rules! call {
+        ($($function:ident ($($arg:expr),*)),*) => {$(
+            if let Some(function) = f.$function {
+                note(Call::$function);
+                // SAFETY: none is promised; the validator's child process exists to find out.
+                let _ = unsafe { function(c, $($arg),*) };
+                note(Call::None);
+            }
+        )*};
+    }
+    let (reference, mut value) = (0_u32, 0.0);
+    call!(
+        setup_experiment(0, 0.0, 0.0, 0, 0.0),
+        enter_initialization(),
+        exit_initialization(),
+        get_real(&raw const reference, 1, &raw mut value),
+        set_real(&raw const reference, 1, &raw const value),
+        do_step(0.0, 0.01, 1),
+        reset(),
+        terminate()
+    );
+}
+
 impl Instance {
     /// Whatever the FMU needs after instantiation it must have copied: overwrites the callbacks structure with
     /// functions that count their calls, and the three texts with rubbish.

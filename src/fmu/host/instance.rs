@@ -464,8 +464,15 @@ impl Instance {
     pub fn serialize_state(&mut self, state: &StateHandle) -> Result<Vec<u8>, HostError> {
         let mut size = 0;
         checked!(self, serialized_size(state.0, &raw mut size))?;
-        let mut bytes = vec![0; size];
-        checked!(self, serialize(state.0, bytes.as_mut_ptr(), size)).map(|()| bytes)
+        // A strip behind the bytes shows whether the FMU keeps to its own size.
+        const STRIP: usize = 64;
+        let mut bytes = vec![0xA5; size + STRIP];
+        checked!(self, serialize(state.0, bytes.as_mut_ptr(), size))?;
+        if bytes[size..].iter().any(|&byte| byte != 0xA5) {
+            return Err(HostError::Overrun("fmi2SerializeFMUstate"));
+        }
+        bytes.truncate(size);
+        Ok(bytes)
     }
 
     /// `fmi2DeSerializeFMUstate`.

@@ -121,6 +121,12 @@ pub enum HostError {
         /// What it returned.
         status: Status,
     },
+    /// A second instance of an FMU that allows one.
+    #[error("canBeInstantiatedOnlyOncePerProcess is true")]
+    OnlyOnce,
+    /// A call wrote past the memory it was given.
+    #[error("{0} wrote past the end of the memory it was given")]
+    Overrun(&'static str),
     /// A text with a NUL byte.
     #[error("the text {0:?} holds a NUL byte, which C strings cannot")]
     Nul(String),

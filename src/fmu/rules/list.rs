@@ -3,7 +3,7 @@
 //! Sections are those of FMI 2.0.4. What the standard leaves undefined is robustness, never conformance.
 
 use super::Kind::{Conformance, Quality, Robustness};
-use super::Severity::{Error, Warning};
+use super::Severity::{Error, Note, Warning};
 use super::{Check, Rule};
 
 macro_rules! rules {
@@ -118,6 +118,8 @@ rules! {
         "Derivatives lists derivatives", "Add the derivative attribute to the variable, or remove the Unknown.";
     "structure-initial-unknowns" Error Conformance "2.2.8" Check::Static;
         "InitialUnknowns is complete", "List outputs with initial approx or calculated, calculated parameters, and states and derivatives with initial approx or calculated; nothing else.";
+    "structure-initial-unknowns-absent" Warning Conformance "2.2.8" Check::Static;
+        "InitialUnknowns are there when something is calculated at initialisation", "List outputs with initial approx or calculated, calculated parameters, and states and derivatives with initial approx or calculated. The schema lets the element be left out, and some exporters always do; some importers refuse that.";
     "structure-order" Error Conformance "2.2.8" Check::Static;
         "InitialUnknowns goes by index", "Sort the list.";
     "dependencies-index" Error Conformance "2.2.8" Check::Static;
@@ -246,8 +248,12 @@ rules! {
         "Instances on several threads do not affect each other", "Keep scratch memory in the component, and lock what is shared.";
     "thread-handover" Error Robustness "2.1.5" Check::Behaviour;
         "An instance goes on when another thread calls it", "Keep state in the component, not in thread-local storage.";
-    "instance-leak" Error Robustness "2.1.5" Check::Behaviour;
-        "Freed instances leave no memory, files or threads behind", "Free in fmi2FreeInstance all that fmi2Instantiate and the steps took.";
+    "instance-leak" Warning Robustness "2.1.5" Check::Behaviour;
+        "Freed instances leave no memory behind", "Free in fmi2FreeInstance all that fmi2Instantiate and the steps took.";
+    "instance-leak-large" Error Robustness "2.1.5" Check::Behaviour;
+        "Freed instances leave no large memory, files or threads behind", "Free, close and join in fmi2FreeInstance all that fmi2Instantiate and the steps took: hosts that vary parameters make thousands of instances.";
+    "null-component" Note Robustness "2.1" Check::Behaviour;
+        "Calls without an instance are survived", "Return fmi2Error when the component is null.";
     "step-leak" Warning Robustness "2.1.5" Check::Behaviour;
         "Steps do not use up memory", "Free or reuse what each fmi2DoStep allocates.";
     "callbacks-copied" Warning Robustness "2.1.5" Check::Behaviour;
@@ -264,7 +270,7 @@ rules! {
         "The floating-point environment stays", "Restore rounding, exception masks and flush-to-zero before returning; -ffast-math changes them when the library is loaded.";
     "side-stdout" Warning Robustness "2.1.5" Check::Behaviour;
         "Nothing is printed to standard output", "Use the logger callback.";
-    "side-signals" Error Robustness "2.1" Check::Behaviour;
+    "side-signals" Warning Robustness "2.1" Check::Behaviour;
         "Signal handlers stay", "Leave signals to the host.";
     "side-environment" Warning Robustness "2.1" Check::Behaviour;
         "Environment variables stay", "Pass settings inside the FMU.";

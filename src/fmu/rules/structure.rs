@@ -107,6 +107,12 @@ fn initial_unknowns(d: &Description, findings: &mut Findings) {
     let present: HashSet<u32> = list.iter().map(|u| u.index).collect();
     let output = |i: &u32| d.by_index(*i).is_some_and(|v| v.causality == Causality::Output);
     must.retain(|i| present.contains(i) || output(i) || !listed.contains(&key(i)));
+    if list.is_empty() && !must.is_empty() {
+        let names: Vec<&str> = must.iter().map(|&i| name(d, i)).collect();
+        let message = format!("there are no InitialUnknowns; {} belong there", shorten(&names));
+        findings.at("structure-initial-unknowns-absent", d.structure.position, message);
+        return;
+    }
     compare(d, "InitialUnknowns", "structure-initial-unknowns", list, &must, findings);
     if let Some(pair) = list.windows(2).find(|pair| pair[0].index > pair[1].index) {
         let message = format!(
@@ -144,10 +150,7 @@ fn dependencies(d: &Description, section: &str, unknown: &Unknown, findings: &mu
             findings.at("dependencies-index", unknown.position, format!("{who}: dependency {index} is listed twice"));
             return;
         }
-        let constant = known.variability == Variability::Constant
-            || section != "InitialUnknowns"
-                && matches!(known.causality, Causality::Parameter | Causality::CalculatedParameter);
-        if constant {
+        if !is_known(d, section, index, known) {
             let message = format!("{who}: \"{}\" is {} and no known of this section", known.name, known.causality);
             findings.at("dependencies-known", unknown.position, message);
         }
@@ -179,5 +182,23 @@ fn kind_of_type(
             continue;
         };
         f.at("dependencies-kind", unknown.position, message);
+    }
+}
+
+/// Whether a variable may stand among the dependencies of a section.
+fn is_known(d: &Description, section: &str, index: u32, known: &Variable) -> bool {
+    match known.causality {
+        Causality::Input | Causality::Independent => true,
+        _ if known.variability == Variability::Constant => false,
+        _ if section == "InitialUnknowns" => known.initial() == Some(Initial::Exact),
+        Causality::Parameter | Causality::CalculatedParameter => false,
+        // States are known where they are exposed; else any variable may stand for one.
+        _ => {
+            let is_state = |state: u32| {
+                state == index || d.by_index(state).is_some_and(|x| x.value_reference == known.value_reference)
+            };
+            let mut states = d.structure.derivatives.iter().filter_map(|u| d.by_index(u.index)?.derivative);
+            d.structure.derivatives.is_empty() || states.any(is_state)
+        }
     }
 }
