@@ -1,5 +1,6 @@
 //! `eixo diagnose`.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -7,8 +8,11 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::axis::Structure;
-use crate::diagnose::{Case, Model, NoiseEstimate, Outcome, Record, diagnose, estimate_noise};
+use crate::diagnose::{Case, Model, NoiseEstimate, Record, diagnose, estimate_noise};
 use crate::effects::{EFFECTS, Effect};
+use crate::report::diagnose::{Findings, report, short};
+use crate::report::format::{Medium, number};
+use crate::report::{html, terminal};
 use crate::trace::{Machine, Signal, load, write_text};
 
 /// Arguments of `eixo diagnose`.
@@ -29,6 +33,9 @@ pub struct Args {
     /// Write the diagnosis as JSON (schema eixo.diagnosis/1)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write the report as one HTML page
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -54,11 +61,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         bar.tick();
     });
     bar.finish_and_clear();
-    print(&outcome);
+    let described = format!(
+        "{}: {} samples at {} Hz{}",
+        args.trace.display(),
+        train.len(),
+        number(1.0 / train.dt, 4, Medium::Page),
+        args.holdout.as_ref().map_or_else(String::new, |p| format!("; held out: {}", p.display()))
+    );
+    let findings = Findings {
+        diagnosis: &outcome.diagnosis,
+        evidence: Some(&outcome.evidence),
+        trace: &described,
+        motion: machine.signals.motion,
+    };
+    let colour = std::io::stdout().is_terminal();
+    print!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }));
     if let Some(path) = &args.json {
         let mut text = serde_json::to_string_pretty(&outcome.diagnosis)?;
         text.push('\n');
         write_text(path, text.as_bytes())?;
+    }
+    if let Some(path) = &args.report {
+        write_text(path, html::page(&report(&findings)).as_bytes())?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -102,26 +126,4 @@ fn record(path: &Path, machine: &Machine) -> anyhow::Result<(Record, NoiseEstima
         noise.std[i].max(1e-9 * span).max(1e-12)
     });
     Ok((Record { start: trace.start, dt: trace.dt, hold: trace.hold, torque, channels, noise: std }, noise))
-}
-
-fn print(outcome: &Outcome) {
-    let d = &outcome.diagnosis;
-    println!("{}", d.sentence);
-    for c in &d.causes {
-        let parameters: Vec<String> = c
-            .parameters
-            .iter()
-            .map(|(name, v)| {
-                let number = |key: &str| v[key].as_f64().unwrap_or(f64::NAN);
-                format!("{name} {:.4e} +- {:.1e} {}", number("value"), number("std"), v["unit"].as_str().unwrap_or(""))
-            })
-            .collect();
-        println!("  {} [{}] share {:.3}: {}", c.id, c.place, c.share_of_gap, parameters.join(", "));
-    }
-    for r in d.ranking.iter().take(8) {
-        println!(
-            "  {:40} p {:.3}  dBIC {:12.1}  chi2 {:12.4}  closure {:.4}",
-            r.id, r.probability, r.delta_bic, r.chi2, r.closure_holdout
-        );
-    }
 }

@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::decide::{Decision, Verdict, decide};
 use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
+use super::evidence::{self, Evidence};
 use super::fit::Data;
 use super::gap::{self, Gap};
 use super::lattice;
@@ -45,6 +46,8 @@ pub struct Outcome {
     pub models: [Model; 3],
     /// The decision with its fits.
     pub decision: Decision,
+    /// What the report draws.
+    pub evidence: Evidence,
 }
 
 /// Diagnoses a record.
@@ -81,7 +84,8 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let mut diagnosis = build(case, &decision, &held, on_train, on_held, &located);
     lattice::judge(case, &decision, &mut diagnosis);
     words::fill(&mut diagnosis, &decision);
-    Outcome { diagnosis, improved: models[2], models, decision }
+    let evidence = evidence::gather(located, held.record, held.windows, &initial(&held.states, held.windows), &models);
+    Outcome { diagnosis, improved: models[2], models, decision, evidence }
 }
 
 fn initial(states: &super::response::States, windows: &[Window]) -> Vec<Initial> {

@@ -3,6 +3,7 @@
 mod assess;
 mod decide;
 mod diagnosis;
+mod evidence;
 mod features;
 mod fit;
 mod gap;
@@ -21,6 +22,7 @@ mod words;
 pub use assess::{Case, Outcome, diagnose};
 pub use decide::{Decision, Verdict};
 pub use diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
+pub use evidence::{Evidence, Overlay};
 pub use fit::{Data, predict};
 pub use gap::{Figures, Levels};
 pub use location::Location;

@@ -16,6 +16,7 @@ pub mod terminal;
 
 mod decimate;
 mod plot;
+mod residual;
 mod scale;
 
 pub use chain::{ChainDiagram, Place, Symbol};

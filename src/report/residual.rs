@@ -1,0 +1,183 @@
+//! What a diagnosis leaves, in pictures: the held-out signals with the models' runs, and the residual torques in time,
+//! frequency and state.
+
+use std::sync::Arc;
+
+use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series};
+use super::{Block, Cell, Figure, Table};
+use crate::diagnose::location::{FrequencyPart, StateCurve};
+use crate::diagnose::{Diagnosis, Location, Overlay};
+use crate::trace::{Motion, Signal};
+
+/// Most plots of a residual against a state.
+const CURVES: usize = 4;
+
+/// A held-out signal, the models' runs over it, and what they leave.
+pub(super) fn overlay(o: &Overlay, after_name: &str, motion: Motion) -> Vec<Block> {
+    let unit = Signal::from_name(o.channel).map_or("", |s| s.unit(motion));
+    let time: Arc<[f64]> = o.time.as_slice().into();
+    let chart =
+        Chart::new(format!("{} on held-out data", o.channel), Axis::linear("time", "s"), Axis::linear(o.channel, unit))
+            .with(
+                Series::line("measured", time.clone(), o.measured.as_slice())
+                    .in_colour(Colour::Ink)
+                    .with_dash(Dash::Broad),
+            )
+            .with(
+                Series::line("model as given", time.clone(), o.before.as_slice())
+                    .in_colour(Colour::Vermillion)
+                    .with_dash(Dash::Dashed),
+            )
+            .with(Series::line(after_name, time.clone(), o.after.as_slice()).in_colour(Colour::Blue));
+    let minus = |model: &[f64]| -> Vec<f64> { o.measured.iter().zip(model).map(|(y, m)| y - m).collect() };
+    let error = |title: &str| {
+        Chart::new(
+            format!("{title} of {}", o.channel),
+            Axis::linear("time", "s"),
+            Axis::linear(format!("measured minus model, {}", o.channel), unit),
+        )
+    };
+    let left = Series::line(after_name, time.clone(), minus(&o.after)).in_colour(Colour::Blue);
+    let both = error("Error")
+        .with(Series::line("model as given", time.clone(), minus(&o.before)).in_colour(Colour::Vermillion))
+        .with(left.clone());
+    let remainder = error("What is left")
+        .with(left)
+        .mark(Mark::Y(2.0 * o.noise, "2 standard deviations of the noise".into()))
+        .mark(Mark::Y(-2.0 * o.noise, String::new()));
+    let caption = "Each window starts from its own fitted state, so that an error does not run on into the next.";
+    vec![
+        Block::Figure(Figure::new(chart, caption)),
+        Block::Figures(vec![Figure::new(both, ""), Figure::new(remainder, "")]),
+    ]
+}
+
+/// A residual's name in words.
+fn words(residual: &str) -> &str {
+    match residual {
+        "r1" => "residual torque on the motor",
+        "r2" => "residual torque on the table",
+        "coupling" => "residual torque in the coupling",
+        "sensor" => "error of the table's encoder",
+        other => other,
+    }
+}
+
+/// The residual that belongs to a place.
+fn at(place: &str) -> &'static str {
+    match place {
+        "coupling" => "coupling",
+        "table" => "r2",
+        "sensor" => "sensor",
+        _ => "r1",
+    }
+}
+
+/// Pictures of where the gap shows.
+pub(super) fn blocks(located: &Location, d: &Diagnosis, motion: Motion) -> Vec<Block> {
+    let wanted = at(&d.location.place);
+    let has = |name: &str| located.by_frequency.iter().any(|p| p.residual == name);
+    let name = if has(wanted) { wanted } else { "r1" };
+    let unit = match (name, motion) {
+        ("sensor", Motion::Rotary) => "rad",
+        ("sensor", Motion::Linear) => "m",
+        (_, Motion::Rotary) => "N.m",
+        (_, Motion::Linear) => "N",
+    };
+    let mut figures = vec![along_time(located, name, unit)];
+    figures.extend(over_frequency(&located.by_frequency, name, unit));
+    let mut curves: Vec<&StateCurve> = located.by_state.iter().filter(|c| c.residual == name).collect();
+    curves.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+    figures.extend(curves.into_iter().take(CURVES).map(|c| against_state(c, unit)));
+    let mut blocks = vec![Block::Figures(figures)];
+    let parts = parts(&located.by_frequency, name, unit);
+    if !parts.rows.is_empty() {
+        blocks.push(Block::Table(parts));
+    }
+    if let Some(weak) = &located.weak {
+        blocks.push(Block::Warning(weak.clone()));
+    }
+    blocks
+}
+
+fn along_time(located: &Location, name: &str, unit: &str) -> Figure {
+    let middle: Vec<f64> = located.by_time.iter().map(|s| 0.5 * (s.start + s.end)).collect();
+    let rms: Vec<f64> = located
+        .by_time
+        .iter()
+        .map(|s| match name {
+            "r1" => s.r1,
+            "r2" => s.r2.unwrap_or(f64::NAN),
+            _ => s.at_place,
+        })
+        .collect();
+    let chart = Chart::new(
+        "Along the record",
+        Axis::linear("time", "s"),
+        Axis::linear(format!("{}, rms", words(name)), unit).over(Range::WithZero),
+    )
+    .with(Series::line("", middle.clone(), rms.clone()).in_colour(Colour::Vermillion))
+    .with(Series::points("", middle, rms).in_colour(Colour::Vermillion));
+    Figure::new(chart, "Level: always there. Rising or falling: a drift. One peak: an event.")
+}
+
+/// The bands of a spectrum without lines; with lines the table of parts says more.
+fn over_frequency(parts: &[FrequencyPart], name: &str, unit: &str) -> Option<Figure> {
+    let bands: Vec<&FrequencyPart> = parts.iter().filter(|p| p.residual == name && p.kind == "band").collect();
+    if bands.len() < 3 {
+        return None;
+    }
+    let x: Vec<f64> = bands.iter().map(|p| (p.from.max(0.1 * p.to) * p.to).sqrt()).collect();
+    let y: Vec<f64> = bands.iter().map(|p| p.rms).collect();
+    let chart = Chart::new(
+        "Over frequency",
+        Axis::log("frequency", "Hz"),
+        Axis::linear(format!("{}, rms", words(name)), unit).over(Range::WithZero),
+    )
+    .with(Series::line("", x.clone(), y.clone()).in_colour(Colour::Vermillion))
+    .with(Series::points("", x, y).in_colour(Colour::Vermillion));
+    Some(Figure::new(chart, ""))
+}
+
+fn against_state(c: &StateCurve, unit: &str) -> Figure {
+    let x: Arc<[f64]> = c.bins.iter().map(|b| b.x).collect();
+    let mean: Arc<[f64]> = c.bins.iter().map(|b| b.mean).collect();
+    let low: Vec<f64> = c.bins.iter().map(|b| b.mean - b.std).collect();
+    let high: Vec<f64> = c.bins.iter().map(|b| b.mean + b.std).collect();
+    let chart = Chart::new(
+        format!("Against {}", c.against),
+        Axis::linear(c.against, c.against_unit),
+        Axis::linear(words(c.residual), unit),
+    )
+    .with(Series::band("± 1 standard deviation", x.clone(), low, high).in_colour(Colour::Orange))
+    .with(Series::line("mean", x.clone(), mean.clone()).in_colour(Colour::Vermillion))
+    .with(Series::points("", x, mean).in_colour(Colour::Vermillion));
+    Figure::new(chart, format!("Explains {:.0} % of the residual's variance.", 100.0 * c.explained.clamp(0.0, 1.0)))
+}
+
+/// The parts of the residual by lines of the excitation and of the turn.
+fn parts(all: &[FrequencyPart], name: &str, unit: &str) -> Table {
+    let mut table = Table::new(format!("The {} by frequency", words(name)), ["part", "share", "rms", "largest line"]);
+    let mut chosen: Vec<&FrequencyPart> =
+        all.iter().filter(|p| p.residual == name && p.kind != "band" && p.share >= 5e-3).collect();
+    chosen.sort_by(|a, b| b.share.total_cmp(&a.share));
+    for p in chosen {
+        let kind = match p.kind.as_str() {
+            "mean" => "mean: a constant torque".to_owned(),
+            "excited_lines" => "lines of the excitation".to_owned(),
+            "even_lines" => "even lines that were not excited: asymmetry, offsets".to_owned(),
+            "odd_lines" => "odd lines that were not excited: friction, play".to_owned(),
+            "foreign" => "foreign frequencies: disturbance, noise".to_owned(),
+            other => {
+                other.strip_prefix("turn_order_").map_or_else(|| other.to_owned(), |n| format!("order {n} of the turn"))
+            }
+        };
+        table.row(vec![
+            Cell::Text(kind),
+            Cell::Bar(p.share),
+            Cell::quantity(p.rms, unit),
+            Cell::quantity(p.peak, "Hz"),
+        ]);
+    }
+    table
+}
