@@ -383,9 +383,9 @@ fn next(f: &Findings) -> Vec<String> {
     let d = f.diagnosis;
     match d.verdict {
         Answer::NoGap => steps.push("Use the model as it is. A gap that this excitation does not show may still be there: repeat with the amplitudes and speeds of the real work.".to_owned()),
-        Answer::Parameters => steps.push("Put the re-identified parameters into the model: --fmu writes it.".to_owned()),
+        Answer::Parameters => steps.push("Put the re-identified parameters into the model.".to_owned()),
         Answer::Effect => {
-            steps.push("Put the effect into the model: --fmu writes it with the parameters above.".to_owned());
+            steps.push("Put the effect into the model: the table above has its parameters for [effects] of axis.toml.".to_owned());
             if !d.confusable.is_empty() {
                 steps.push("Before you change the machine, tell the confusable causes apart.".to_owned());
             }

@@ -7,6 +7,7 @@
 pub mod chain;
 pub mod chart;
 pub mod circle;
+pub mod demo;
 pub mod diagnose;
 pub mod format;
 pub mod html;
