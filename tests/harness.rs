@@ -140,3 +140,98 @@ fn what_the_fmu_or_its_user_refuses_is_said_with_names() {
     assert!(fails(vec![set("delay.time", "9")], vec![]).contains("delay.time = 9"));
     assert!(fails(vec![set("I2", "0")], vec![]).contains("I2"));
 }
+
+/// Runs the program; gives exit code and what it said on standard error.
+fn eixo(folder: &std::path::Path, args: &[&str]) -> (i32, String) {
+    let done = std::process::Command::new(env!("CARGO_BIN_EXE_eixo")).current_dir(folder).args(args).output().unwrap();
+    (done.status.code().unwrap_or(-1), String::from_utf8_lossy(&done.stderr).into_owned())
+}
+
+#[test]
+fn bad_input_ends_with_two_a_reason_and_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    assert_eq!(eixo(dir, &["export", "axis.fmu"]).0, 0);
+    let write = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
+    write("u.csv", "time [s],T [N.m]\n0,0\n0.001,0.01\n0.002,0.02\n0.003,0.01\n");
+    write("gap.csv", "time,T\n0,0\n0.001,0.01\n0.002,x\n");
+    write("back.csv", "time,T\n0,0\n0.002,0.01\n0.001,0\n");
+    write("unit.csv", "time,T [deg]\n0,0\n0.001,0.01\n0.002,0\n");
+    write("other.csv", "time,torque\n0,0\n0.001,0.01\n0.002,0\n");
+    write("notime.csv", "T\n0\n1\n2\n");
+    write("bad.toml", "[parameters]\nI1 = 2e-4\n");
+    write("bad.fmu", "no archive");
+    let run = ["simulate", "axis.fmu", "-o", "out.csv", "-i"];
+    let with = |more: &[&'static str]| [&run[..], more].concat();
+    let cases: [(Vec<&str>, &str); 13] = [
+        (with(&["gap.csv"]), "row 4, column T"),
+        (with(&["back.csv"]), "row 4"),
+        (with(&["unit.csv"]), "[deg]"),
+        (with(&["other.csv"]), "torque"),
+        (with(&["notime.csv"]), "time"),
+        (with(&["missing.csv"]), "missing.csv"),
+        (with(&["u.csv", "--set", "I1=0"]), "I1 = 0"),
+        (with(&["u.csv", "--noise", "theta9=1"]), "theta9"),
+        (with(&["u.csv", "--step", "0"]), "step"),
+        (vec!["simulate", "bad.fmu", "-o", "out.csv"], "bad.fmu"),
+        (vec!["simulate", "axis.fmu", "-o", "no/such/out.csv", "-i", "u.csv"], "cannot write"),
+        (vec!["export", "out.fmu", "--axis", "bad.toml"], "bad.toml"),
+        (vec!["export", "no/such/axis.fmu"], "cannot write"),
+    ];
+    let files = || std::fs::read_dir(dir).unwrap().count();
+    let before = files();
+    for (args, reason) in cases {
+        let (code, said) = eixo(dir, &args);
+        assert!(code == 2 && said.contains(reason), "{args:?}: {code} {said}");
+        assert_eq!(files(), before, "{args:?} left a file behind");
+    }
+    assert_eq!(eixo(dir, &with(&["u.csv"])), (0, String::new()));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_noise_and_a_columns_noise_is_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    assert_eq!(eixo(dir, &["export", "axis.fmu"]).0, 0);
+    assert_eq!(eixo(dir, &["excite", "-o", "u.csv", "--samples", "4096"]).0, 0);
+    let run = |out: &str, more: &[&str]| {
+        let args = [&["simulate", "axis.fmu", "-i", "u.csv", "-o", out][..], more].concat();
+        assert_eq!(eixo(dir, &args), (0, String::new()));
+        eixo::trace::load(&dir.join(out), &eixo::trace::Mapping::default()).unwrap().trace
+    };
+    let clean = run("a.csv", &[]);
+    let noisy = run("b.csv", &["--noise", "theta1=1e-4", "--seed", "7"]);
+    assert_eq!(noisy, run("c.csv", &["--noise", "theta1=1e-4", "--seed", "7"]));
+    assert_ne!(noisy, run("d.csv", &["--noise", "theta1=1e-4", "--seed", "8"]));
+    let both = run("e.csv", &["--noise", "theta1=1e-4,omega2=0.1", "--seed", "7"]);
+    assert_eq!(noisy.get(Signal::Theta1), both.get(Signal::Theta1));
+    assert_eq!(noisy.get(Signal::T), clean.get(Signal::T));
+    let rms =
+        |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt();
+    let (a, b) = (clean.get(Signal::Theta1).unwrap(), noisy.get(Signal::Theta1).unwrap());
+    // The standard error of a standard deviation over n samples is 1/sqrt(2*n) of it.
+    assert!((rms(a, b) / 1e-4 - 1.0).abs() < 4.0 / (2.0 * a.len() as f64).sqrt());
+    let ratio = run("f.csv", &["--noise", "40dB"]);
+    let (a, b) = (clean.get(Signal::Omega1).unwrap(), ratio.get(Signal::Omega1).unwrap());
+    let zero = vec![0.0; a.len()];
+    let decibel = 20.0 * (rms(a, &zero) / rms(a, b)).log10();
+    assert!((decibel - 40.0).abs() < 0.5, "{decibel}");
+}
+
+#[test]
+fn an_axis_file_runs_as_the_fmu_it_exports_linear_and_rigid_ones_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let text = "structure = \"rigid\"\n[parameters]\nI1 = 90.0\n[units]\nmotion = \"linear\"\n[effects.viscous_motor]\n\
+                coefficient = 200.0\n";
+    std::fs::write(dir.join("axis.toml"), text).unwrap();
+    let rows: String = (0..20).map(|k| format!("{},{}\n", f64::from(k) * 1e-3, 5 * k)).collect();
+    std::fs::write(dir.join("u.csv"), format!("time [s],T [N]\n{rows}")).unwrap();
+    assert_eq!(eixo(dir, &["simulate", "axis.toml", "-i", "u.csv", "-o", "a.csv"]).0, 0);
+    assert_eq!(eixo(dir, &["export", "axis.fmu", "--axis", "axis.toml"]).0, 0);
+    assert_eq!(eixo(dir, &["simulate", "axis.fmu", "-i", "u.csv", "-o", "b.csv"]).0, 0);
+    let read = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap();
+    assert_eq!(read("a.csv"), read("b.csv"));
+    assert!(read("a.csv").starts_with("time [s],T [N],theta1 [m],"), "{}", read("a.csv"));
+    assert_eq!(eixo(dir, &["validate", "axis.fmu"]).0, 0);
+}

@@ -315,3 +315,56 @@ pub(super) unsafe fn text<'a>(text: super::abi::Text) -> &'a str {
     // SAFETY: not null, and a C string as the caller vouches.
     unsafe { CStr::from_ptr(text) }.to_str().unwrap_or("")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quiet() -> Log {
+        let callbacks = Callbacks {
+            logger: None,
+            allocate: None,
+            free: None,
+            step_finished: None,
+            environment: std::ptr::null_mut(),
+        };
+        Log { name: CString::default(), callbacks, on: [true; 4] }
+    }
+
+    #[test]
+    fn a_panic_becomes_fatal_and_only_freeing_is_left() {
+        let c = create(Starts::default(), quiet());
+        // SAFETY: a live instance, freed at the end.
+        unsafe {
+            assert_eq!(enter(c, Function::fmi2Reset, |_| panic!("a fault on purpose")), Status::Fatal);
+            assert_eq!(enter(c, Function::fmi2Reset, |_| Ok(Status::Ok)), Status::Fatal);
+            assert_eq!(enter(c, Function::fmi2GetFMUstate, |_| Ok(Status::Ok)), Status::Fatal);
+            destroy(c);
+        }
+    }
+
+    #[test]
+    fn the_logger_cannot_call_back_into_a_busy_instance() {
+        let c = create(Starts::default(), quiet());
+        // SAFETY: a live instance, freed at the end; the inner calls are what is tested.
+        unsafe {
+            let outer = enter(c, Function::fmi2Reset, |_| {
+                assert_eq!(enter(c, Function::fmi2Reset, |_| Ok(Status::Ok)), Status::Error);
+                destroy(c);
+                Ok(Status::Ok)
+            });
+            assert_eq!(outer, Status::Ok);
+            assert_eq!(enter(c, Function::fmi2Reset, |_| Ok(Status::Ok)), Status::Ok);
+            destroy(c);
+        }
+    }
+
+    #[test]
+    fn a_long_message_is_cut_and_ends_in_zero() {
+        let mut message = Message { bytes: [0; 480], len: 0 };
+        assert!(write!(message, "{}\0{}", "a".repeat(300), "b".repeat(300)).is_ok());
+        assert_eq!(message.len, 479);
+        assert_eq!(message.bytes[479], 0);
+        assert_eq!(message.bytes[300], b'b');
+    }
+}

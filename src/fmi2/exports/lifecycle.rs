@@ -1,0 +1,164 @@
+//! Making, initialising, resetting and freeing an instance, and its log.
+
+use std::ffi::{CStr, c_int};
+use std::panic::catch_unwind;
+
+use super::super::abi::{Callbacks, Component, LOG_CATEGORIES, Status, Text};
+use super::super::baked;
+use super::super::fault::Fault;
+use super::super::gate::{self, Function, Log, Mode};
+use super::super::kernel::Kernel;
+use super::{array, call, typed};
+use crate::variables::guid;
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetTypesPlatform() -> Text {
+    c"default".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetVersion() -> Text {
+    c"2.0".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Instantiate(
+    name: Text,
+    kind: c_int,
+    given_guid: Text,
+    _resources: Text,
+    callbacks: *const Callbacks,
+    _visible: c_int,
+    logging: c_int,
+) -> Component {
+    let made = catch_unwind(|| {
+        if callbacks.is_null() {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: not null, and a callbacks structure by the standard's contract. Copied, because the importer need not
+        // keep it where it is.
+        let callbacks = unsafe { *callbacks };
+        // SAFETY: null or a C string by the standard's contract. The name is copied for the same reason.
+        let (name, given) = unsafe {
+            let name = if name.is_null() { c"" } else { CStr::from_ptr(name) };
+            (name.to_owned(), gate::text(given_guid))
+        };
+        // Errors always, the rest on request.
+        let on = logging != 0;
+        let log = Log { name, callbacks, on: [on, on, true, true] };
+        let refuse = |why: std::fmt::Arguments<'_>| {
+            log.send(Status::Error, format_args!("fmi2Instantiate: {why}"));
+            std::ptr::null_mut()
+        };
+        if log.name.is_empty() {
+            return refuse(format_args!("instanceName is empty"));
+        }
+        if kind != 1 {
+            return refuse(format_args!("fmuType = {kind}: this FMU is for co-simulation (1)"));
+        }
+        let starts = baked::starts();
+        let own = guid(&starts);
+        if !own.is(given) {
+            return refuse(format_args!(
+                "the GUID {given} is not this binary's, {own}: modelDescription.xml belongs to another binary"
+            ));
+        }
+        gate::create(starts, log)
+    });
+    made.unwrap_or(std::ptr::null_mut())
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2FreeInstance(c: Component) {
+    // SAFETY: the importer's, see the module's head. Freeing cannot panic; were it to, it must not unwind into C.
+    let _ = catch_unwind(|| unsafe { gate::destroy(c) });
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetDebugLogging(c: Component, on: c_int, count: usize, categories: *const Text) -> c_int {
+    call!(c, fmi2SetDebugLogging, |body| {
+        // SAFETY: the importer's.
+        let categories = unsafe { array(categories, count, "categories") }?;
+        let mut chosen = [categories.is_empty(); 4];
+        for &category in categories {
+            // SAFETY: null or a C string by the standard's contract.
+            let category = unsafe { gate::text(category) };
+            match LOG_CATEGORIES.iter().position(|(name, _)| *name == category) {
+                Some(i) if i < 4 => chosen[i] = true,
+                Some(_) => chosen = [true; 4],
+                None => return Err(Fault::Category),
+            }
+        }
+        for (now, _) in body.log.on.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
+            *now = on != 0;
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetupExperiment(
+    c: Component,
+    tolerance_defined: c_int,
+    tolerance: f64,
+    start: f64,
+    stop_defined: c_int,
+    stop: f64,
+) -> c_int {
+    call!(c, fmi2SetupExperiment, |body| {
+        // The tolerance has no meaning here: the internal step is fixed.
+        if tolerance_defined != 0 {
+            finite("tolerance", tolerance)?;
+        }
+        finite("startTime", start)?;
+        let stop = if stop_defined != 0 { finite("stopTime", stop)? } else { f64::INFINITY };
+        if stop <= start {
+            return Err(Fault::Number { name: "stopTime", value: stop, must_be: "after startTime" });
+        }
+        body.kernel.set_experiment(start, stop);
+        body.set_up = true;
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2EnterInitializationMode(c: Component) -> c_int {
+    call!(c, fmi2EnterInitializationMode, |body| {
+        if !body.set_up {
+            return Err(Fault::NotSetUp);
+        }
+        body.mode = Mode::Initialization;
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2ExitInitializationMode(c: Component) -> c_int {
+    call!(c, fmi2ExitInitializationMode, |body| {
+        body.kernel.initialise()?;
+        body.mode = Mode::Step;
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Terminate(c: Component) -> c_int {
+    call!(c, fmi2Terminate, |body| {
+        body.mode = Mode::Terminated;
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Reset(c: Component) -> c_int {
+    call!(c, fmi2Reset, |body| {
+        body.kernel = Kernel::new(&body.starts);
+        body.mode = Mode::Instantiated;
+        body.set_up = false;
+        Ok(Status::Ok)
+    })
+}
+
+fn finite(name: &'static str, value: f64) -> Result<f64, Fault> {
+    if value.is_finite() { Ok(value) } else { Err(Fault::Number { name, value, must_be: "a finite number" }) }
+}

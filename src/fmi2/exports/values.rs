@@ -1,0 +1,238 @@
+//! Getting and setting values, and derivatives.
+
+use std::ffi::{c_int, c_uint};
+
+use super::super::abi::{Component, Status, Text};
+use super::super::fault::Fault;
+use super::super::gate::{self, Body, Function, Mode};
+use super::super::kernel::may_be_known;
+use super::{array, array_mut, call, typed};
+use crate::variables::{Causality, Slot, Type, Variability, at, index_of};
+
+/// Index of the Real variable, or of the Enumeration, with a value reference.
+#[inline]
+fn resolve(reference: c_uint, real: bool) -> Result<usize, Fault> {
+    let wanted = if real { "Real" } else { "Integer or Enumeration" };
+    // The fixed variables up to the structure are Reals with their index as reference: no table needed.
+    if real && reference < Slot::Structure as u32 {
+        return Ok(reference as usize);
+    }
+    index_of(reference).filter(|&i| (at(i).kind == Type::Real) == real).ok_or(Fault::Reference { reference, wanted })
+}
+
+/// Checks that a value may be set now.
+fn settable(body: &Body, index: usize, value: f64) -> Result<(), Fault> {
+    let v = at(index);
+    let allowed = match v.causality {
+        Causality::Input => true,
+        Causality::Output => false,
+        Causality::Parameter => body.mode != Mode::Step || v.variability == Variability::Tunable,
+    };
+    if !allowed {
+        return Err(Fault::NotSettable { index, mode: body.mode });
+    }
+    if !value.is_finite() {
+        return Err(Fault::NotFinite { index, value });
+    }
+    if v.min.is_some_and(|m| value < m) || v.max.is_some_and(|m| value > m) {
+        return Err(Fault::Bounds { index, value });
+    }
+    Ok(())
+}
+
+/// Sets values: all, or none of them where one is refused.
+fn set(body: &mut Body, references: &[c_uint], real: bool, value: impl Fn(usize) -> f64) -> Result<Status, Fault> {
+    for (i, &reference) in references.iter().enumerate() {
+        settable(body, resolve(reference, real)?, value(i))?;
+    }
+    for (i, &reference) in references.iter().enumerate() {
+        body.kernel.set(resolve(reference, real)?, value(i));
+    }
+    Ok(Status::Ok)
+}
+
+/// Refuses every value reference: there is no variable of that type.
+fn none_of(references: &[c_uint], wanted: &'static str) -> Result<Status, Fault> {
+    match references.first() {
+        None => Ok(Status::Ok),
+        Some(&reference) => Err(Fault::Reference { reference, wanted }),
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetReal(c: Component, vr: *const c_uint, count: usize, value: *mut f64) -> c_int {
+    call!(c, fmi2GetReal, |body| {
+        // SAFETY: the importer's.
+        let (vr, value) = unsafe { (array(vr, count, "vr")?, array_mut(value, count, "value")?) };
+        for (out, &reference) in value.iter_mut().zip(vr) {
+            *out = body.kernel.get(resolve(reference, true)?)?;
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetInteger(c: Component, vr: *const c_uint, count: usize, value: *mut c_int) -> c_int {
+    call!(c, fmi2GetInteger, |body| {
+        // SAFETY: the importer's.
+        let (vr, value) = unsafe { (array(vr, count, "vr")?, array_mut(value, count, "value")?) };
+        for (out, &reference) in value.iter_mut().zip(vr) {
+            *out = body.kernel.get(resolve(reference, false)?)? as c_int;
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetBoolean(c: Component, vr: *const c_uint, count: usize, _value: *mut c_int) -> c_int {
+    call!(c, fmi2GetBoolean, |_| {
+        // SAFETY: the importer's.
+        none_of(unsafe { array(vr, count, "vr") }?, "Boolean")
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetString(c: Component, vr: *const c_uint, count: usize, _value: *mut Text) -> c_int {
+    call!(c, fmi2GetString, |_| {
+        // SAFETY: the importer's.
+        none_of(unsafe { array(vr, count, "vr") }?, "String")
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetReal(c: Component, vr: *const c_uint, count: usize, value: *const f64) -> c_int {
+    call!(c, fmi2SetReal, |body| {
+        // SAFETY: the importer's.
+        let (vr, value) = unsafe { (array(vr, count, "vr")?, array(value, count, "value")?) };
+        set(body, vr, true, |i| value[i])
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetInteger(c: Component, vr: *const c_uint, count: usize, value: *const c_int) -> c_int {
+    call!(c, fmi2SetInteger, |body| {
+        // SAFETY: the importer's.
+        let (vr, value) = unsafe { (array(vr, count, "vr")?, array(value, count, "value")?) };
+        set(body, vr, false, |i| f64::from(value[i]))
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetBoolean(c: Component, vr: *const c_uint, count: usize, _value: *const c_int) -> c_int {
+    call!(c, fmi2SetBoolean, |_| {
+        // SAFETY: the importer's.
+        none_of(unsafe { array(vr, count, "vr") }?, "Boolean")
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetString(c: Component, vr: *const c_uint, count: usize, _value: *const Text) -> c_int {
+    call!(c, fmi2SetString, |_| {
+        // SAFETY: the importer's.
+        none_of(unsafe { array(vr, count, "vr") }?, "String")
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
+    c: Component,
+    unknown: *const c_uint,
+    unknowns: usize,
+    known: *const c_uint,
+    knowns: usize,
+    seed: *const f64,
+    result: *mut f64,
+) -> c_int {
+    call!(c, fmi2GetDirectionalDerivative, |body| {
+        // SAFETY: the importer's.
+        let (unknown, known) =
+            unsafe { (array(unknown, unknowns, "vUnknown_ref")?, array(known, knowns, "vKnown_ref")?) };
+        // SAFETY: the importer's.
+        let (seed, result) = unsafe { (array(seed, knowns, "dvKnown")?, array_mut(result, unknowns, "dvUnknown")?) };
+        for &reference in unknown {
+            let index = resolve(reference, true)?;
+            if at(index).causality != Causality::Output {
+                return Err(Fault::Not { index, what: "output" });
+            }
+        }
+        let initialising = body.mode == Mode::Initialization;
+        for (&reference, &value) in known.iter().zip(seed) {
+            let index = resolve(reference, true)?;
+            if !may_be_known(index, initialising) {
+                return Err(Fault::Not { index, what: "known of the outputs here" });
+            }
+            if !value.is_finite() {
+                return Err(Fault::NotFinite { index, value });
+            }
+        }
+        // Every reference has just been resolved once.
+        let index = |reference: c_uint| resolve(reference, true).unwrap_or(0);
+        let seeds = known.iter().zip(seed).map(|(&reference, &value)| (index(reference), value));
+        body.kernel.directional(seeds, |derivative| {
+            for (out, &reference) in result.iter_mut().zip(unknown) {
+                *out = derivative(index(reference));
+            }
+        })?;
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
+    c: Component,
+    vr: *const c_uint,
+    count: usize,
+    order: *const c_int,
+    value: *const f64,
+) -> c_int {
+    call!(c, fmi2SetRealInputDerivatives, |body| {
+        // SAFETY: the importer's.
+        let (vr, order) = unsafe { (array(vr, count, "vr")?, array(order, count, "order")?) };
+        // SAFETY: the importer's.
+        let value = unsafe { array(value, count, "value") }?;
+        for ((&reference, &order), &value) in vr.iter().zip(order).zip(value) {
+            let index = resolve(reference, true)?;
+            if at(index).causality != Causality::Input {
+                return Err(Fault::Not { index, what: "input" });
+            }
+            if order != 1 {
+                return Err(Fault::Order(order));
+            }
+            if !value.is_finite() {
+                return Err(Fault::NotFinite { index, value });
+            }
+        }
+        // There is one input.
+        if let Some(&last) = value.last() {
+            body.kernel.set_rate(last);
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    c: Component,
+    vr: *const c_uint,
+    count: usize,
+    order: *const c_int,
+    value: *mut f64,
+) -> c_int {
+    call!(c, fmi2GetRealOutputDerivatives, |body| {
+        // SAFETY: the importer's.
+        let (vr, order) = unsafe { (array(vr, count, "vr")?, array(order, count, "order")?) };
+        // SAFETY: the importer's.
+        let value = unsafe { array_mut(value, count, "value") }?;
+        for ((&reference, &order), out) in vr.iter().zip(order).zip(value) {
+            let index = resolve(reference, true)?;
+            if at(index).causality != Causality::Output {
+                return Err(Fault::Not { index, what: "output" });
+            }
+            if order != 1 {
+                return Err(Fault::Order(order));
+            }
+            *out = body.kernel.output_derivative(index)?;
+        }
+        Ok(Status::Ok)
+    })
+}
