@@ -8,7 +8,7 @@ use super::evidence::{self, Evidence};
 use super::fit::Data;
 use super::gap::{self, Gap};
 use super::lattice;
-use super::location::{Location, locate};
+use super::location::{Location, locate, without_offset};
 use super::model::{BaseParameter, Free, Model};
 use super::noise::NoiseEstimate;
 use super::record::Record;
@@ -19,6 +19,9 @@ use crate::effects::{Effect, Place};
 
 /// Share of a single record that is held out.
 const HELD_OUT: f64 = 1.0 / 3.0;
+
+/// Samples of a record that are worked on at most: what a longer one adds to the naming of a cause is time.
+const LONGEST: usize = 16_384;
 
 /// What is diagnosed.
 pub struct Case<'a> {
@@ -53,8 +56,10 @@ pub struct Outcome {
 /// Diagnoses a record.
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
-    let record = case.train;
-    let (train, held) = match case.holdout {
+    let p = &case.nominal.parameters;
+    let record = &without_offset(case.train, p, case.nominal.structure);
+    let other = case.holdout.map(|other| without_offset(other, p, case.nominal.structure));
+    let (train, held) = match &other {
         Some(other) => (cut(0..record.len()), (other, cut(0..other.len()))),
         None => {
             let split = record.len() - (record.len() as f64 * HELD_OUT) as usize;

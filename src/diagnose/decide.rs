@@ -15,9 +15,9 @@ const AT_FLOOR: f64 = 1.1;
 /// Share of the gap that a single effect must close to be named while a remainder stays.
 const CLOSES: f64 = 0.95;
 /// Share of the remainder that a further effect must close.
-const FURTHER: f64 = 0.4;
+const FURTHER: f64 = 0.5;
 /// Share of the whole gap that a further effect must close.
-const FURTHER_OF_ALL: f64 = 1e-3;
+const FURTHER_OF_ALL: f64 = 2e-3;
 /// Most effects at once.
 const MOST: usize = 4;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -111,7 +111,7 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
             shares = shares_of(&chosen, &singles, search);
         }
     }
-    let verdict = verdict(&given, &parameters, &chosen, values);
+    let verdict = verdict(&given, &parameters, singles.first(), &chosen, values);
     let ranking = rank(&given, &parameters, &singles, &chosen, values);
     let confusable = confusable(&chosen, &singles, values);
     Decision { verdict, given, parameters, chosen, ranking, shares, confusable }
@@ -187,7 +187,7 @@ fn shares_of(chosen: &Tested, singles: &[Tested], search: &Search<'_>) -> Vec<f6
     back.iter().map(|b| if sum > 0.0 { b / sum } else { 1.0 / back.len() as f64 }).collect()
 }
 
-fn verdict(given: &Tested, parameters: &Tested, chosen: &Tested, values: f64) -> Verdict {
+fn verdict(given: &Tested, parameters: &Tested, single: Option<&Tested>, chosen: &Tested, values: f64) -> Verdict {
     let left = unexplained_part(chosen, values);
     if chosen.effects.is_empty() {
         return if left > 0.0 {
@@ -199,10 +199,11 @@ fn verdict(given: &Tested, parameters: &Tested, chosen: &Tested, values: f64) ->
         };
     }
     let gap = (parameters.fitted.chi2 - values).max(f64::MIN_POSITIVE);
-    let closes = 1.0 - (chosen.fitted.chi2 - values).max(0.0) / gap;
-    // Several effects fit anything better than one: they must come closer.
-    let asked = 1.0 - (1.0 - CLOSES) / (chosen.effects.len() * chosen.effects.len()) as f64;
-    if left > 0.0 && closes < asked { Verdict::Unexplained } else { Verdict::Effect }
+    let closes = |t: &Tested| 1.0 - (t.fitted.chi2 - values).max(0.0) / gap;
+    // Several effects fit anything better than one: where no single one closes the gap, together they must come closer.
+    let alone = single.is_some_and(|t| closes(t) >= CLOSES);
+    let together = closes(chosen) >= 1.0 - (1.0 - CLOSES) / (chosen.effects.len() as f64).powi(2);
+    if left > 0.0 && !alone && !together { Verdict::Unexplained } else { Verdict::Effect }
 }
 
 fn rank(given: &Tested, parameters: &Tested, singles: &[Tested], chosen: &Tested, values: f64) -> Vec<Weighed> {

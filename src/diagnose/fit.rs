@@ -213,11 +213,9 @@ impl Problem for Shooting<'_> {
     fn linearise(&self, p: &DVector<f64>) -> Option<Normal> {
         // The derivative directions are a compile-time number: the next size up.
         match self.coordinates.len() + self.locals.len() {
-            0..=4 => Some(self.linearise_with::<4>(p)),
-            5..=8 => Some(self.linearise_with::<8>(p)),
-            9..=12 => Some(self.linearise_with::<12>(p)),
-            13..=16 => Some(self.linearise_with::<16>(p)),
-            17..=24 => Some(self.linearise_with::<24>(p)),
+            0..=8 => Some(self.linearise_with::<8>(p)),
+            9..=14 => Some(self.linearise_with::<14>(p)),
+            15..=24 => Some(self.linearise_with::<24>(p)),
             _ => None,
         }
     }

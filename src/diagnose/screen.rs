@@ -128,11 +128,8 @@ impl<'a> Screen<'a> {
         let mut settings = self.model.effects;
         settings.of_mut(effect).copy_from_slice(trial.settings.of(effect));
         if nonlinear {
-            let c = sizes[0];
-            // A start in the wrong direction, or far off, is none; its neighbour on the grid will do.
-            if !(0.05..=20.0).contains(&c) {
-                return None;
-            }
+            // A factor far off says that the regression cannot tell this size; the grid's own stands.
+            let c = Some(sizes[0]).filter(|c| (0.05..=20.0).contains(c)).unwrap_or(1.0);
             trial.rescale(effect, &mut settings, c, &self.scales);
         } else {
             let p = settings.of_mut(effect);

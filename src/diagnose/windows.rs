@@ -18,7 +18,7 @@ pub const LENGTH: usize = 512;
 /// Samples before them.
 const WARM: usize = 12;
 /// Windows fitted at most: a longer record is sampled by so many, spread evenly.
-const MOST: usize = 64;
+const MOST: usize = 32;
 
 /// One window.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -23,9 +23,13 @@ impl Force for FlexibleMode {
         parameters: &[
             ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia behind the table")
                 .nominal(1e-6)
-                .start(Start::Grid(Scale::Inertia, &[0.03, 0.15, 0.5])),
-            ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the table and it")
-                .start(Start::Grid(Scale::Mode, &[0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 3.0])),
+                .start(Start::Grid(Scale::Inertia, &[0.03, 0.3])),
+            ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the table and it").start(
+                Start::Grid(
+                    Scale::Mode,
+                    &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0],
+                ),
+            ),
             ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the table and it")
                 .start(Start::Grid(Scale::One, &[0.05])),
         ],

@@ -194,7 +194,8 @@ fn both(structure: Structure) -> Vec<Port> {
 
 /// The record with the table's angle moved to the motor's, where the two start farther apart than the coupling could
 /// twist: encoders have their own zeros.
-fn without_offset(record: &Record, p: &Parameters, structure: Structure) -> Record {
+#[must_use]
+pub fn without_offset(record: &Record, p: &Parameters, structure: Structure) -> Record {
     let mut record = record.clone();
     if let [Some(motor), _, Some(table), _] = &mut record.channels {
         let n = motor.len().max(1) as f64;
