@@ -15,6 +15,7 @@ use super::record::Record;
 use super::search::{Search, Tested};
 use super::windows::{Initial, Window, cut};
 use super::{states, words};
+use crate::axis::Structure;
 use crate::effects::{Effect, Place};
 
 /// Share of a single record that is held out.
@@ -56,16 +57,10 @@ pub struct Outcome {
 /// Diagnoses a record.
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
-    let p = &case.nominal.parameters;
-    let record = &without_offset(case.train, p, case.nominal.structure);
-    let other = case.holdout.map(|other| without_offset(other, p, case.nominal.structure));
-    let (train, held) = match &other {
-        Some(other) => (cut(0..record.len()), (other, cut(0..other.len()))),
-        None => {
-            let split = record.len() - (record.len() as f64 * HELD_OUT) as usize;
-            (cut(0..split), (record, cut(split..record.len())))
-        }
-    };
+    let (record, other) = split(case);
+    let record = &record;
+    let train = cut(0..record.len());
+    let held_windows = cut(0..other.len());
     let data = Data { record, windows: &train };
     let search = Search {
         data,
@@ -78,7 +73,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     progress("where");
     let located = locate(record, &case.nominal.parameters, case.nominal.structure);
     progress("held-out data");
-    let held = Held { record: held.0, windows: &held.1, states: states::along(held.0, &case.nominal) };
+    let held = Held { record: &other, windows: &held_windows, states: states::along(&other, &case.nominal) };
     let models = [case.nominal, decision.parameters.fitted.model, decision.chosen.fitted.model];
     let on_train = {
         let initial = initial(&search.states, &train);
@@ -91,6 +86,23 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     words::fill(&mut diagnosis, &decision);
     let evidence = evidence::gather(located, held.record, held.windows, &initial(&held.states, held.windows), &models);
     Outcome { diagnosis, improved: models[2], models, decision, evidence }
+}
+
+/// The record that the fits see, and the one that they do not; encoders with zeros of their own are brought together.
+fn split(case: &Case<'_>) -> (Record, Record) {
+    let whole = without_offset(case.train, &case.nominal.parameters, case.nominal.structure);
+    let n = whole.len();
+    match case.holdout {
+        Some(other) => {
+            let other = without_offset(other, &case.nominal.parameters, case.nominal.structure);
+            let last = other.len().min(LONGEST);
+            (whole.part(0..n.min(LONGEST)), other.part(0..last))
+        }
+        None => {
+            let split = n - (n as f64 * HELD_OUT) as usize;
+            (whole.part(0..split.min(LONGEST)), whole.part(split..n.min(split + LONGEST)))
+        }
+    }
 }
 
 fn initial(states: &super::response::States, windows: &[Window]) -> Vec<Initial> {
@@ -124,7 +136,7 @@ fn build(
     holdout: Gap,
     located: &Location,
 ) -> Diagnosis {
-    let values = held_free_values(case, decision);
+    let values = decision.values;
     let best = decision.ranking.first().map_or(0.0, |w| w.bic);
     let before = held.errors(&decision.given.fitted.model);
     let ranking = decision
@@ -167,20 +179,21 @@ fn build(
                 .to_owned(),
         },
         parameters: parameters(case, decision),
-        warnings: Vec::new(),
+        warnings: warnings(case),
     }
 }
 
-fn held_free_values(case: &Case<'_>, decision: &Decision) -> f64 {
-    // Values compared per unit chi2: the ranking quotes squared residual per value.
-    let channels = case.train.channels.iter().flatten().count() as f64;
-    let samples: f64 = decision.given.fitted.initial.len() as f64;
-    let _ = samples;
-    let windows = match case.holdout {
-        Some(_) => cut(0..case.train.len()),
-        None => cut(0..case.train.len() - (case.train.len() as f64 * HELD_OUT) as usize),
-    };
-    windows.iter().map(|w| w.compared.len()).sum::<usize>() as f64 * channels
+fn warnings(case: &Case<'_>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let n = case.train.len();
+    let used = if case.holdout.is_some() { n } else { n - (n as f64 * HELD_OUT) as usize };
+    if used > LONGEST {
+        warnings.push(format!("The record is long: causes were searched in its first {LONGEST} samples."));
+    }
+    if !(case.train.sees_motor() && case.train.sees_table()) && case.nominal.structure == Structure::TwoInertia {
+        warnings.push("One encoder only: which side of the coupling a force acts on is known less well.".to_owned());
+    }
+    warnings
 }
 
 /// Id, family and place of a hypothesis.

@@ -65,6 +65,8 @@ pub struct Decision {
     pub ranking: Vec<Weighed>,
     /// Share of the gap of each effect of the chosen hypothesis.
     pub shares: Vec<f64>,
+    /// Number of values that the fits compared.
+    pub values: f64,
     /// Hypotheses that the record cannot tell from the chosen one.
     pub confusable: Vec<(Tested, f64)>,
 }
@@ -114,7 +116,7 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
     let verdict = verdict(&given, &parameters, singles.first(), &chosen, values);
     let ranking = rank(&given, &parameters, &singles, &chosen, values);
     let confusable = confusable(&chosen, &singles, values);
-    Decision { verdict, given, parameters, chosen, ranking, shares, confusable }
+    Decision { verdict, given, parameters, chosen, ranking, shares, values, confusable }
 }
 
 /// No gap, or parameters only.

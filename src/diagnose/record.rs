@@ -29,6 +29,19 @@ impl Record {
         self.torque.len()
     }
 
+    /// The samples of a range as a record of their own, at the same times.
+    #[must_use]
+    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
+        Self {
+            start: self.time(range.start),
+            dt: self.dt,
+            hold: self.hold,
+            torque: self.torque[range.clone()].to_vec(),
+            channels: std::array::from_fn(|c| self.channels[c].as_ref().map(|v| v[range.clone()].to_vec())),
+            noise: self.noise,
+        }
+    }
+
     /// Whether there is no sample.
     #[must_use]
     pub fn is_empty(&self) -> bool {
