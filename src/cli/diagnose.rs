@@ -97,7 +97,7 @@ fn library(without: &[String]) -> anyhow::Result<Vec<Effect>> {
 }
 
 /// Reads a trace as the diagnosis needs it.
-fn record(path: &Path, machine: &Machine) -> anyhow::Result<(Record, NoiseEstimate)> {
+pub(super) fn record(path: &Path, machine: &Machine) -> anyhow::Result<(Record, NoiseEstimate)> {
     let loaded = load(path, &machine.signals)?;
     for warning in &loaded.warnings {
         eprintln!("warning: {}: {warning}", path.display());
