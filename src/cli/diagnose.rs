@@ -92,7 +92,7 @@ fn library(without: &[String]) -> anyhow::Result<Vec<Effect>> {
         .iter()
         .map(|id| Effect::from_id(id.trim()))
         .collect::<Result<_, _>>()
-        .context("--without names effects of `eixo diagnose --help`")?;
+        .context("--without names effects of `eixo effects`")?;
     Ok(EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect())
 }
 

@@ -59,6 +59,12 @@ commands! {
     Diagnose => diagnose,
     /// Circular test (ISO 230-4) in simulation: what the axes' effects do to a circle
     Circle => circle,
+    /// List the effects that a nominal axis leaves out: place, equation, parameters, signature
+    Effects => effects,
+    /// Write a completion script for a shell
+    Completions => completions,
+    /// Write the manual page
+    Man => man,
 }
 
 /// Parses the arguments, runs the command, prints an error with its causes, and gives the exit code.

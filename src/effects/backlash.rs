@@ -19,6 +19,7 @@ impl Force for Backlash {
         family: Family::Backlash,
         title: "Play in coupling or nut: a dead zone of the spring; contact cannot pull",
         equation: "f = max(0, K*(d - g) + B*d') at d > g, mirrored at d < -g, else 0",
+        signature: "r1 = -r2, flat over the middle of the twist; odd lines; its share falls as the amplitude grows",
         reference: "Nordin, Gutman, Automatica 38(10), 2002",
         parameters: &[ParameterInfo::size("half_gap", "rad", 0.0, 1e3, "Half of the play, on the motor side")
             .nominal(1e-3)

@@ -42,6 +42,7 @@ impl Force for CouplingHysteresis {
         family: Family::Hysteresis,
         title: "A loop in the spring's characteristic that speed does not open",
         equation: "f = level*z; reach*dz = dd*(1 - |z|^sharpness*(1 + sgn(dd*z))/2)",
+        signature: "r1 = -r2, a loop over the twist that slow motion does not close; odd lines",
         reference: "Wen, J. Eng. Mech. 102(2), 1976; Ikhouane, Rodellar, Systems with Hysteresis, 2007",
         parameters: &[
             ParameterInfo::size("level", "N.m", 0.0, 1e6, "Torque of the loop when it has closed").nominal(1e-2),

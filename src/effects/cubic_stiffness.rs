@@ -14,6 +14,7 @@ impl Force for CubicStiffness {
         family: Family::NonlinearStiffness,
         title: "A spring that hardens or softens with the twist",
         equation: "f = K*k3*d^3",
+        signature: "r1 = -r2 with the cube of the twist; odd lines; its share grows with the amplitude squared",
         reference: "Kovacic, Brennan, The Duffing Equation, Wiley 2011",
         parameters: &[ParameterInfo::size("k3", "1/rad2", -1e9, 1e9, "Cubic term as a share of K").nominal(1.0)],
         memory: 0,

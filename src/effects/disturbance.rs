@@ -16,6 +16,7 @@ impl Force for Disturbance {
         family: Family::Disturbance,
         title: "External periodic torque on the table at a fixed frequency",
         equation: "f = -amplitude*sin(2*pi*frequency*t + phase)",
+        signature: "r2 at a fixed frequency, on or off the excitation's lines, whatever the motion does",
         reference: "Bodson, Douglas, Automatica 33(12), 1997",
         parameters: &[
             ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude of the torque").nominal(1e-2),

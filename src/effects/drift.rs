@@ -14,6 +14,7 @@ impl Force for StiffnessDrift {
         family: Family::Drift,
         title: "A stiffness that changes slowly over the record",
         equation: "f = K*rate*t*d",
+        signature: "r1 = -r2 proportional to the twist, growing over the record; lines split",
         reference: "First-order term of any slow change of K",
         parameters: &[ParameterInfo::size("rate", "1/s", -1e3, 1e3, "Relative change of K per second").nominal(1e-2)],
         memory: 0,
@@ -37,6 +38,7 @@ impl DryFriction for FrictionDrift {
         family: Family::Drift,
         title: "A friction of the motor that changes slowly over the record",
         equation: "f = sgn(v)*(level_rate*t + viscous_rate*t*|v|)",
+        signature: "r1 a square of the sign of omega1 that grows over the record",
         reference: "First-order term of any slow change of friction",
         parameters: &[
             ParameterInfo::size("level_rate", "N.m/s", -1e6, 1e6, "Change of the Coulomb level per second")

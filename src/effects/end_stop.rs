@@ -17,6 +17,7 @@ impl Force for EndStop {
         family: Family::EndStop,
         title: "The table touches the end of its travel",
         equation: "f = stiffness*(theta2 - upper)*max(0, 1 + dissipation*w2) above upper, mirrored below lower, else 0",
+        signature: "r2 one-sided beyond a position theta2, zero elsewhere",
         reference: "Hunt, Crossley, J. Applied Mechanics 42(2), 1975",
         parameters: &[
             ParameterInfo::size("stiffness", "N.m/rad", 0.0, 1e9, "Stiffness of the stop").nominal(1.0),

@@ -19,6 +19,7 @@ impl Force for FlexibleMode {
         family: Family::FlexibleMode,
         title: "A third inertia on a spring behind the table",
         equation: "I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0; f = damping*(w2 - w3) + stiffness*(th2 - th3)",
+        signature: "r2 linear, a peak in one band of frequencies",
         reference: "Den Hartog, Mechanical Vibrations, 1956, chapter 3",
         parameters: &[
             ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia behind the table")

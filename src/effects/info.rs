@@ -210,6 +210,9 @@ pub struct EffectInfo {
     pub title: &'static str,
     /// Its equation, as text.
     pub equation: &'static str,
+    /// What it leaves in the residual torques of the nominal model, `r1 = I1*alpha1 + B*(omega1 - omega2) +
+    /// K*(theta1 - theta2) - T` and `r2 = I2*alpha2 - B*(omega1 - omega2) - K*(theta1 - theta2)`.
+    pub signature: &'static str,
     /// Literature.
     pub reference: &'static str,
     /// Its parameters.

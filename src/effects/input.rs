@@ -182,6 +182,7 @@ impl Input for TorqueGain {
         family: Family::Parameters,
         title: "A wrong torque constant",
         equation: "T = gain*command",
+        signature: "r1 proportional to the command; as if I1, I2, B and K were all off by one factor",
         reference: "Paper, section 2: T enters eq. 2 with gain one",
         parameters: &[ParameterInfo {
             off: 1.0,
@@ -220,6 +221,7 @@ impl Input for Saturation {
         family: Family::Saturation,
         title: "The drive's torque limit",
         equation: "T = min(max(command, -limit), limit)",
+        signature: "r1 only where the command passes a level; odd lines; grows with the amplitude",
         reference: "Hippe, Windup in Control, 2006, chapter 1",
         parameters: &[ParameterInfo {
             off: 1e9,
@@ -249,6 +251,7 @@ impl Input for Delay {
         family: Family::Delay,
         title: "Transport delay between command and torque: bus cycles, computation",
         equation: "T(t) = command(t - time)",
+        signature: "r1 with the rate of the command; linear; phase grows in proportion to frequency, gain stays",
         reference: "Astrom, Wittenmark, Computer-Controlled Systems, 1997, section 2.5",
         parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay")
             .nominal(1e-3)
@@ -293,6 +296,7 @@ impl Input for ActuatorLag {
         family: Family::ActuatorLag,
         title: "First-order lag of the drive's current loop",
         equation: "time_constant*T' = command - T",
+        signature: "r1 with the rate of the command; linear; gain falls and phase bends with frequency",
         reference: "Schroder, Elektrische Antriebe 2, section 15.5 (equivalent lag of the current loop)",
         parameters: &[ParameterInfo::size("time_constant", "s", 0.0, 10.0, "Time constant of the lag")
             .nominal(1e-3)

@@ -14,6 +14,7 @@ impl Force for QuadraticDrag {
         family: Family::ViscousFriction,
         title: "Drag that grows with the square of the speed",
         equation: "f = coefficient*w2*|w2|",
+        signature: "r2 with omega2 times its size; odd lines; its share grows with the amplitude",
         reference: "Batchelor, An Introduction to Fluid Dynamics, 1967, section 5.11",
         parameters: &[
             ParameterInfo::size("coefficient", "N.m.s2/rad2", 0.0, 1e6, "Drag torque per speed squared").nominal(1e-4)

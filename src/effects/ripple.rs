@@ -25,6 +25,7 @@ impl Force for TorqueRipple {
         family: Family::TorqueRipple,
         title: "Torque periodic in the motor's angle: cogging, commutation, screw eccentricity",
         equation: "f = -amplitude*sin(order*theta1 + phase)",
+        signature: "r1 periodic over the angle theta1, so at no fixed frequency",
         reference: "Proca, Keyhani, IEEE Trans. Energy Conversion 17(1), 2002; order-tracked, not at a fixed frequency",
         parameters: &[
             ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude of the ripple").nominal(1e-2),
@@ -59,6 +60,7 @@ impl Force for Unbalance {
         family: Family::LoadTorque,
         title: "Torque once per turn on the table side: a mass off its axis",
         equation: "f = -amplitude*sin(theta2 + phase)",
+        signature: "r2 periodic over one turn of theta2",
         reference: "Gravity on an eccentric mass: m*g*e*sin(theta2 + phase)",
         parameters: &[
             ParameterInfo::size("amplitude", "N.m", -1e6, 1e6, "Amplitude: mass times gravity times eccentricity")

@@ -136,6 +136,7 @@ impl Sensor for SensorDelay {
         family: Family::Sensor,
         title: "The table's encoder is read late",
         equation: "theta2 read at t is theta2(t - time)",
+        signature: "r1 and r2 agree with no torque: theta2 late by the same time at every frequency",
         reference: "A delay of both encoders is one of the input; only their difference is a sensor's own",
         parameters: &[ParameterInfo::size("time", "s", 0.0, 10.0, "Delay of the reading")
             .nominal(1e-3)
@@ -160,6 +161,7 @@ impl Sensor for LeadError {
         family: Family::Sensor,
         title: "The table's scale is off: in its pitch, or once or more per turn",
         equation: "theta2 read = theta2*(1 + scale) + amplitude*sin(order*theta2 + phase)",
+        signature: "r1 and r2 agree with no torque: theta2 off as a function of theta2 itself",
         reference: "ISO 230-2:2014, 3.3 (systematic and periodic positioning deviation)",
         parameters: &[
             ParameterInfo::size("scale", "1", -0.9, 10.0, "Relative error of the pitch").nominal(1e-3),
@@ -194,6 +196,7 @@ impl Sensor for EncoderQuantisation {
         family: Family::Sensor,
         title: "The encoders count whole steps",
         equation: "theta read = step*round(theta/step)",
+        signature: "no torque explains it: steps of one size in the position, white to the model",
         reference: "Widrow, Kollar, Quantization Noise, Cambridge 2008",
         parameters: &[ParameterInfo::size("step", "rad", 0.0, 1e3, "Angle of one count").nominal(1e-3)],
         memory: 0,

@@ -1,0 +1,25 @@
+//! `eixo completions`.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::CommandFactory;
+
+/// Arguments of `eixo completions`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: eixo completions bash > ~/.local/share/bash-completion/completions/eixo")]
+pub struct Args {
+    /// The shell
+    shell: clap_complete::Shell,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut super::Cli::command(), "eixo", &mut text);
+    std::io::stdout().write_all(&text)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,92 @@
+//! `eixo effects`.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use crate::effects::{EFFECTS, Effect, EffectInfo, Role};
+
+/// Arguments of `eixo effects`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: eixo effects\n         eixo effects backlash")]
+pub struct Args {
+    /// Tell all of this effect: equation, parameters, signature, literature
+    effect: Option<String>,
+    /// Write the list as a Markdown table
+    #[arg(long, conflicts_with = "effect")]
+    markdown: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// An unknown effect.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let text = match &args.effect {
+        Some(id) => detail(Effect::from_id(id)?.info()),
+        None if args.markdown => markdown(),
+        None => list(),
+    };
+    // A reader that has seen enough (head) is no error.
+    let _ = std::io::stdout().write_all(text.as_bytes());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list() -> String {
+    let mut out = String::new();
+    for effect in EFFECTS {
+        let e = effect.info();
+        let _ = writeln!(out, "{:<20} {:<9} {}", e.id, e.place.as_str(), e.title);
+    }
+    out.push_str("\n`eixo effects ID` tells more of one; parameters are set as ID.NAME=VALUE, all off by default\n");
+    out
+}
+
+fn detail(e: &EffectInfo) -> String {
+    let mut out = format!(
+        "{}: {}\n\nplace      {}\nfamily     {}\nequation   {}\nsignature  {}\nsource     {}\n",
+        e.id,
+        e.title,
+        e.place.as_str(),
+        e.family.as_str(),
+        e.equation,
+        e.signature,
+        e.reference
+    );
+    for p in e.parameters {
+        let unit = if p.unit.is_empty() { "1" } else { p.unit };
+        let word = if p.role == Role::Size { "off at" } else { "default" };
+        let _ = writeln!(out, "\n{}.{} [{unit}]\n    {}; {word} {}, from {} to {}", e.id, p.name, p.doc, p.off, p.min, p.max);
+    }
+    out
+}
+
+fn markdown() -> String {
+    let mut out = String::from("| effect | place | what it is | signature in the residual torques |\n|---|---|---|---|\n");
+    for effect in EFFECTS {
+        let e = effect.info();
+        let _ = writeln!(out, "| `{}` | {} | {} | {} |", e.id, e.place.as_str(), e.title, e.signature);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_readme_has_the_table_of_effects() {
+        let readme = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md"));
+        assert!(readme.contains(&markdown()), "put the output of `eixo effects --markdown` into README.md");
+    }
+
+    #[test]
+    fn every_parameter_of_every_effect_is_told() {
+        for e in EFFECTS.iter().map(|e| e.info()) {
+            let text = detail(e);
+            for p in e.parameters {
+                assert!(text.contains(&format!("\n{}.{} [", e.id, p.name)), "{text}");
+            }
+        }
+    }
+}
