@@ -72,9 +72,11 @@ impl Scale {
         }
         let margin = pad * (high - low);
         (low, high) = (low - margin, high + margin);
-        let step = nice_step((high - low) / wanted.max(1) as f64);
-        let first = (low / step - 1e-9).ceil() as i64;
-        let last = (high / step + 1e-9).floor() as i64;
+        let ends = |step: f64| ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+        // Two ticks are the least that show a scale.
+        let steps = (wanted.max(1)..).map(|n| nice_step((high - low) / n as f64));
+        let step = steps.take(8).find(|s| ends(*s).1 > ends(*s).0).unwrap_or((high - low) / 4.0);
+        let (first, last) = ends(step);
         let values: Vec<f64> = (first..=last.min(first + 50)).map(|i| i as f64 * step).collect();
 
         let biggest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -293,6 +295,14 @@ mod tests {
                 let value: f64 = t.label.as_deref().unwrap_or("").replace('−', "-").parse().expect("a number");
                 assert!((s.share(value) - t.share).abs() < 1e-6 * step, "{low} {width}: {value}");
             }
+        }
+    }
+
+    #[test]
+    fn a_small_axis_still_has_two_ticks_to_read_a_scale_from() {
+        for (low, high) in [(3.1, 4.6), (-0.37, 0.34), (0.6, 1.9), (99.0, 101.0), (-1.0, 4.9)] {
+            let s = Scale::new(&Axis::linear("a", "s"), [low, high].into_iter(), 2, 0.05);
+            assert!(s.ticks.len() >= 2, "{low} to {high}: {:?}", labels(&s));
         }
     }
 
