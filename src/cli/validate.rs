@@ -105,11 +105,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")?);
+    isolation::adopt_orphans();
     let report = validate(fmu, &options, &|rule, total| {
         bar.set_length(total as u64);
         bar.set_message(rule.to_owned());
         bar.inc(1);
     });
+    isolation::end_orphans();
     bar.finish_and_clear();
     let report = report?;
     let color = args.output.is_none() && std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();

@@ -31,7 +31,8 @@ enum {
     STEP_IGNORED, CONVERGENCE, VARIABLE, NEGATIVE, ZERO, WRONG_POINT, EARLY, EARLY_CRASH, LATE, INIT_ORDER, NAN_INPUT,
     NAN_HANG, CANCEL, TIME, DERIVATIVE, INPUT_DERIVATIVE, OUTPUT_DERIVATIVE, DIRECTIONAL, DEPENDENCY, GLOBAL, THREADS,
     HANDOVER, LEAK, LEAK_LARGE, NULL_CRASH, LEAK_FILE, LEAK_THREAD, STEP_LEAK, CALLBACKS, NAME_KEPT, ALLOCATION, DEBUG_LOGGING, LOG_CATEGORY,
-    DIRECTORY, ROUNDING, DENORMALS, STDOUT, SIGNALS, ENVIRONMENT, LOCALE, FILES
+    DIRECTORY, ROUNDING, DENORMALS, STDOUT, SIGNALS, ENVIRONMENT, LOCALE, FILES,
+    DAEMON
 };
 #ifndef DEFECT
 #define DEFECT NONE
@@ -163,6 +164,11 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
         pthread_attr_setstacksize(&attributes, 65536);
         pthread_create(&thread, &attributes, sleeper, NULL);
         pthread_attr_destroy(&attributes);
+    }
+    if (IS(DAEMON) && fork() == 0) {
+        setsid();
+        if (fork() == 0) sleep(300);
+        _exit(0);
     }
     if (IS(DIRECTORY) && chdir("/")) return NULL;
     if (IS(ROUNDING)) fesetround(FE_UPWARD);

@@ -106,7 +106,7 @@ fn nothing_survives_the_run_and_nothing_printed_is_taken_for_a_result() {
     if !corpus::compiler() {
         return;
     }
-    for defect in ["STEP_HANG", "STDOUT", "STEP_CRASH"] {
+    for defect in ["STEP_HANG", "STDOUT", "STEP_CRASH", "DAEMON"] {
         let folder = tempfile::tempdir().unwrap();
         let (fmu, temporary) = (folder.path().join("model.fmu"), folder.path().join("tmp"));
         std::fs::write(&fmu, pack(&running(DESCRIPTION, defect))).unwrap();
@@ -115,9 +115,32 @@ fn nothing_survives_the_run_and_nothing_printed_is_taken_for_a_result() {
         command.arg("validate").arg(&fmu).args(["--format", "json", "--timeout", "2"]).env("TMPDIR", &temporary);
         let output = command.output().unwrap();
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert!(!json["findings"].as_array().unwrap().is_empty(), "{defect}");
+        assert_eq!(json["findings"].as_array().unwrap().is_empty(), defect == "DAEMON", "{defect}");
+        let survivors = processes_with(&temporary);
+        assert!(survivors.is_empty(), "{defect}: {survivors:?}");
         assert_eq!(std::fs::read_dir(&temporary).unwrap().count(), 0, "{defect}");
     }
+}
+
+/// Processes whose environment names a path.
+fn processes_with(path: &std::path::Path) -> Vec<std::path::PathBuf> {
+    use std::os::unix::ffi::OsStrExt;
+    let needle = path.as_os_str().as_bytes();
+    let entries = std::fs::read_dir("/proc").unwrap().flatten().map(|e| e.path());
+    let holds = |process: &std::path::PathBuf| {
+        std::fs::read(process.join("environ")).is_ok_and(|e| e.windows(needle.len()).any(|w| w == needle))
+    };
+    entries.filter(holds).collect()
+}
+
+#[test]
+fn the_documented_rules_are_the_rules() {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rules.md");
+    let written = std::fs::read_to_string(&file).unwrap();
+    let table = written.split_once("\n| rule |").map(|(_, rest)| format!("| rule |{rest}")).unwrap();
+    let hint =
+        "write it again: (sed '/^| rule/,$d' docs/rules.md; eixo validate --rules) > new && mv new docs/rules.md";
+    assert_eq!(table, eixo::fmu::output::rules_text(), "{hint}");
 }
 
 #[test]
