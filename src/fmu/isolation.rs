@@ -53,6 +53,13 @@ pub(crate) enum Ended {
     TimedOut,
 }
 
+impl Ended {
+    /// Whether a signal ended the process that people and systems send: SIGHUP, SIGINT, SIGTERM.
+    pub fn is_from_outside(&self) -> bool {
+        matches!(self, Self::Signal(1 | 2 | 15))
+    }
+}
+
 /// What became of a child.
 #[derive(Debug)]
 pub(crate) struct Outcome {

@@ -252,7 +252,11 @@ impl<'a> Bench<'a> {
             ..self.options.bounds
         };
         let begin = Instant::now();
-        let outcome = isolation::run(&self.options.program, &task, &scratch, bounds)?;
+        let mut outcome = isolation::run(&self.options.program, &task, &scratch, bounds)?;
+        if outcome.ended.is_from_outside() {
+            // Someone ended the process, or the FMU does so itself: again, to tell.
+            outcome = isolation::run(&self.options.program, &task, &scratch, bounds)?;
+        }
         if rule.id == "simulate" {
             // What is slow is given time in proportion.
             let _ = self.slow.set(SLOWNESS * begin.elapsed());

@@ -150,7 +150,7 @@ fn dependencies(d: &Description, section: &str, unknown: &Unknown, findings: &mu
             findings.at("dependencies-index", unknown.position, format!("{who}: dependency {index} is listed twice"));
             return;
         }
-        if !is_known(d, section, index, known) {
+        if !is_known(d, section, known) {
             let message = format!("{who}: \"{}\" is {} and no known of this section", known.name, known.causality);
             findings.at("dependencies-known", unknown.position, message);
         }
@@ -186,19 +186,21 @@ fn kind_of_type(
 }
 
 /// Whether a variable may stand among the dependencies of a section.
-fn is_known(d: &Description, section: &str, index: u32, known: &Variable) -> bool {
+fn is_known(d: &Description, section: &str, known: &Variable) -> bool {
     match known.causality {
         Causality::Input | Causality::Independent => true,
         _ if known.variability == Variability::Constant => false,
         _ if section == "InitialUnknowns" => known.initial() == Some(Initial::Exact),
         Causality::Parameter | Causality::CalculatedParameter => false,
-        // States are known where they are exposed; else any variable may stand for one.
+        // States are known where they are exposed, and soundly so; else any variable may stand for one.
         _ => {
-            let is_state = |state: u32| {
-                state == index || d.by_index(state).is_some_and(|x| x.value_reference == known.value_reference)
+            let state = |u: &Unknown| d.by_index(d.by_index(u.index)?.derivative?);
+            let states: Vec<Option<&Variable>> = d.structure.derivatives.iter().map(state).collect();
+            let sound = |x: &Option<&Variable>| {
+                x.is_some_and(|x| x.base() == BaseType::Real && x.variability == Variability::Continuous)
             };
-            let mut states = d.structure.derivatives.iter().filter_map(|u| d.by_index(u.index)?.derivative);
-            d.structure.derivatives.is_empty() || states.any(is_state)
+            let listed = |x: &&Variable| x.name == known.name || x.value_reference == known.value_reference;
+            states.is_empty() || !states.iter().all(sound) || states.iter().flatten().any(listed)
         }
     }
 }
