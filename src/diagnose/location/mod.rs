@@ -94,11 +94,14 @@ pub fn locate(record: &Record, parameters: &Parameters, structure: Structure) ->
     let section = worst_section(record, parameters, structure);
     let part = section.map(|s| cut(record, s));
     let setting = Setting::new(part.as_ref().unwrap_or(record), parameters, structure);
-    let by_place = places::evidence(&setting);
-    let best = by_place.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
-    let place = best.and_then(|e| e.place);
-    let residual = residual_torques(&setting, record, &by_place, place);
     let flexible = structure == Structure::TwoInertia;
+    let mut by_place = places::evidence(&setting);
+    let mut place = places::likeliest(&by_place);
+    let residual = residual_torques(&setting, record, &by_place, place);
+    let by_state = state_curves(record, &residual, place, flexible);
+    if places::closed_loop(&mut by_place, &by_state) {
+        place = places::likeliest(&by_place);
+    }
     let slots = by_time::by_time(
         record.start,
         record.dt,
@@ -108,7 +111,6 @@ pub fn locate(record: &Record, parameters: &Parameters, structure: Structure) ->
     );
     let spread = by_time::spread(&slots);
     let by_frequency = frequency_parts(record, &residual, place);
-    let by_state = state_curves(record, &residual, place, flexible);
     let coarse = std::array::from_fn(|c| {
         // Half of the noise's variance is the lattice's own, step^2/12.
         let step = record.channels[c].as_deref().and_then(quantum)?;

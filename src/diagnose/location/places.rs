@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
+use super::StateCurve;
 use super::fit::{Fitted, Setting};
 use super::follows::{follow, of_the_command, of_the_motion};
 use super::plant::Port;
@@ -14,6 +15,9 @@ const MATERIAL: f64 = 10.0;
 /// The walk is only a stand-in for the effect: a gap between two places counts against this share of the number of
 /// readings, or of the gap between the best place and none where that is less.
 const TEMPER: f64 = 0.02;
+
+/// A place is sure from this share of the evidence on, and a curve that explains this share of a torque stands for it.
+pub(super) const SURE: f64 = 0.9;
 
 /// What speaks for a place.
 #[derive(Debug, Clone, Serialize)]
@@ -112,6 +116,34 @@ fn follow_torques(setting: &Setting<'_>, all: &mut Vec<PlaceEvidence>, samples: 
             None => all.push(PlaceEvidence { place: Some(place), log_likelihood: value, share: 0.0, fitted: plain }),
         }
     }
+}
+
+/// The likeliest place.
+#[must_use]
+pub fn likeliest(all: &[PlaceEvidence]) -> Option<Place> {
+    all.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)).and_then(|e| e.place)
+}
+
+/// Gives the motor the evidence of the input, and the other way round, where the dictionaries hardly tell them apart and
+/// one curve of the motion explains the torque that the command does not: in a closed loop the command follows the
+/// motion too. True if it did.
+pub fn closed_loop(all: &mut [PlaceEvidence], curves: &[StateCurve]) -> bool {
+    let at = |place: Place| all.iter().position(|e| e.place == Some(place));
+    let (Some(input), Some(motor)) = (at(Place::Input), at(Place::Motor)) else { return false };
+    let explained = |against: &[&str]| {
+        let own = curves.iter().filter(|c| c.residual == "r1" && against.contains(&c.against));
+        own.map(|c| c.explained).fold(0.0, f64::max)
+    };
+    let motion = explained(&["omega1", "theta1 within the turn"]);
+    let near = likeliest(all) == Some(Place::Input) && all[motor].share > 1.0 - SURE;
+    if !near || motion < SURE || motion < explained(&["T"]) + 0.1 {
+        return false;
+    }
+    let (low, high) = (all[motor].log_likelihood, all[input].log_likelihood);
+    (all[motor].log_likelihood, all[input].log_likelihood) = (high, low);
+    let (less, more) = (all[motor].share, all[input].share);
+    (all[motor].share, all[input].share) = (more, less);
+    true
 }
 
 /// Shares from the log-likelihoods, tempered.

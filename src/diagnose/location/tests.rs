@@ -211,3 +211,29 @@ fn a_record_longer_than_a_section_is_smoothed_as_one() {
         assert!(error < 5.0 * motion.state_std[k][0] && motion.state_std[k][0] < NOISE, "{k}: {error}");
     }
 }
+
+/// EMPS, closed loop, one encoder (A. Janot, M. Gautier, M. Brunot, 2019): by its authors' reference model friction rules.
+#[test]
+fn on_a_real_axis_in_closed_loop_friction_is_not_taken_for_an_error_of_the_command() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let data = std::env::var_os("EIXO_DATA").map_or_else(|| root.join("../shared/data"), Into::into);
+    let path = data.join("emps/train.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("skipped: {} is not there; set EIXO_DATA to the folder of measured data", path.display());
+        return;
+    };
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let [q, force] = ["q_meas_m", "force_cmd_N"].map(|n| header.iter().position(|h| *h == n).expect("column"));
+    let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|v| v.parse().expect("number")).collect()).collect();
+    let column = |i: usize| rows.iter().map(|r| r[i]).collect::<Vec<f64>>();
+    let channels = [Some(column(q)), None, None, None];
+    let torque = column(force);
+    let noise = crate::diagnose::estimate_noise(&torque, &channels.each_ref().map(|c| c.as_deref()), None).std;
+    let record = Record { start: 0.0, dt: 1e-3, hold: Hold::Zoh, torque, channels, noise };
+    let given = Parameters { i1: 90.0, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 };
+    let found = locate(&record, &given, Structure::Rigid);
+    assert_eq!(found.place, Some(Place::Motor), "{}", found.summary);
+    assert!(found.summary.contains("flat against the sign of omega1"), "{}", found.summary);
+    assert!(found.weak.expect("one encoder, rigid").contains("rigid"));
+}

@@ -2,7 +2,7 @@
 
 use super::by_state::{Shape, shape};
 use super::by_time::Spread;
-use super::places::PlaceEvidence;
+use super::places::{PlaceEvidence, SURE};
 use super::{FrequencyPart, Residual, StateCurve};
 use crate::axis::Structure;
 use crate::diagnose::{CHANNELS, Record};
@@ -14,8 +14,6 @@ const NAMED: f64 = 0.5;
 const CONSTANT: f64 = 0.95;
 /// Of two variables that explain alike to within this share, the earlier in the list is named.
 const ALIKE: f64 = 0.03;
-/// A place is sure from this share of the evidence on.
-const SURE: f64 = 0.9;
 
 /// What the sentence is made of.
 pub(super) struct Findings<'a> {
