@@ -81,7 +81,7 @@ pub fn bake(library: &mut [u8], starts: &Starts) -> Result<(), &'static str> {
     Ok(())
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::*;
 

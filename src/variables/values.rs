@@ -98,7 +98,7 @@ impl<S: Scalar> Values<S> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::*;
 

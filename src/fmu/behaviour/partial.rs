@@ -132,10 +132,11 @@ pub(super) fn directional(p: &Probe) -> Tested {
             break;
         }
     }
-    if problems.is_empty() && !moved {
-        if let Some(found) = after_a_step(p, &unknowns)? {
-            return Ok(found);
-        }
+    if problems.is_empty()
+        && !moved
+        && let Some(found) = after_a_step(p, &unknowns)?
+    {
+        return Ok(found);
     }
     if problems.is_empty() && (tested == 0 || !moved) {
         return not_tested("no output answers to a perturbed input at a communication point");

@@ -1,5 +1,7 @@
 //! Units of the model description: their SI base units, display units, and the linear analogue of a rotary unit.
 
+use std::borrow::Cow;
+
 use crate::axis::Motion;
 
 /// A unit with another scale for people: `displayed = factor*value`.
@@ -31,24 +33,11 @@ pub(super) fn display(unit: &str) -> Option<Display> {
 ///
 /// Every torque is a force times a metre per radian and every inertia a mass times its square, so each `rad` becomes a
 /// metre and each metre or its square that goes with them goes away.
-pub(super) fn of(unit: &'static str, motion: Motion) -> &'static str {
-    if motion == Motion::Rotary {
-        return unit;
-    }
-    match unit {
-        "kg.m2" => "kg",
-        "N.m" => "N",
-        "N.m.s/rad" => "N.s/m",
-        "N.m/rad" => "N/m",
-        "N.m/s" => "N/s",
-        "N.m.s2/rad2" => "N.s2/m2",
-        "rad" => "m",
-        "rad/s" => "m/s",
-        "rad/s2" => "m/s2",
-        "1/rad" => "1/m",
-        "1/rad2" => "1/m2",
-        "m/rad" => "1",
-        other => other,
+pub(super) fn of(unit: &'static str, motion: Motion) -> Cow<'static, str> {
+    match (motion, unit) {
+        (Motion::Rotary, _) => unit.into(),
+        (Motion::Linear, "m/rad") => "1".into(),
+        (Motion::Linear, _) => unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m").into(),
     }
 }
 
@@ -87,8 +76,20 @@ mod tests {
     fn every_unit_of_the_table_has_base_units_and_its_linear_analogue_no_radian() {
         for v in all().filter(|v| !v.unit.is_empty()) {
             assert!(base(v.unit).is_some(), "{v} {}", v.unit);
-            let linear = base(of(v.unit, Motion::Linear)).unwrap();
+            let linear = base(&of(v.unit, Motion::Linear)).unwrap();
             assert_eq!(linear[3], 0, "{v} {}", v.unit);
+        }
+        for (rotary, linear) in [
+            ("kg.m2", "kg"),
+            ("N.m.s/rad", "N.s/m"),
+            ("N.m.s2/rad2", "N.s2/m2"),
+            ("rad/s2", "m/s2"),
+            ("1/rad", "1/m"),
+            ("m/rad", "1"),
+            ("Hz", "Hz"),
+        ] {
+            assert_eq!(of(rotary, Motion::Linear), linear);
+            assert_eq!(of(rotary, Motion::Rotary), rotary);
         }
         assert_eq!(base("N.m.s2/rad2"), Some([1, 2, 0, -2]));
         assert_eq!(base("1"), Some([0; 4]));

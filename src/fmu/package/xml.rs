@@ -1,5 +1,6 @@
 //! `modelDescription.xml` from the variable table (FMI 2.0.4, section 2.2).
 
+use std::borrow::Cow;
 use std::io;
 
 use quick_xml::Writer;
@@ -89,10 +90,12 @@ fn number(value: f64) -> String {
 }
 
 fn unit_definitions(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
-    let mut names: Vec<&str> = all().map(|v| units::of(v.unit, starts.motion)).filter(|u| !u.is_empty()).collect();
+    let mut names: Vec<Cow<'static, str>> =
+        all().map(|v| units::of(v.unit, starts.motion)).filter(|u| !u.is_empty()).collect();
     names.sort_unstable();
     names.dedup();
     for name in names {
+        let name = name.as_ref();
         xml.create_element("Unit").with_attribute(("name", name)).write_inner_content(|xml| {
             let mut base = xml.create_element("BaseUnit");
             for (symbol, exponent) in ["kg", "m", "s", "rad"].into_iter().zip(units::base(name).unwrap_or_default()) {
@@ -170,6 +173,7 @@ fn variable(xml: &mut Xml, v: &Variable, start: f64, starts: &Starts) -> io::Res
         let mut kind = match v.kind {
             Type::Real => {
                 let unit = units::of(v.unit, starts.motion);
+                let unit = unit.as_ref();
                 let mut real = xml.create_element("Real").with_attribute(("unit", unit));
                 if let Some(display) = units::display(unit) {
                     real = real.with_attribute(("displayUnit", display.name));
