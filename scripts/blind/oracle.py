@@ -60,11 +60,11 @@ def crate(draw: effects.Draw) -> dict:
 
 
 def simplify(draw: effects.Draw) -> None:
-    """Leave out what the crate's formula does not have: the stop's damping, the saturating drift; Dahl's curve for the loop."""
+    """Leave out what the crate's formula does not have: the stop's damping, the saturating drift; the loop at sharpness 1."""
     draw.plant.pop("stop_b", None)
     draw.plant.pop("kdrift_tau", None)
     if draw.id == "coupling_hysteresis":
-        draw.plant |= {"hyst_n": 1.0, "hyst_even": 1.0}
+        draw.plant |= {"hyst_n": 1.0, "hyst_even": 0.0}
 
 
 def main() -> None:

@@ -8,12 +8,15 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::axis::Structure;
-use crate::diagnose::{Case, Model, NoiseEstimate, Record, diagnose, estimate_noise};
+use crate::diagnose::{CHANNELS, Case, Model, Replay, NoiseEstimate, Record, diagnose, estimate_noise};
 use crate::effects::{EFFECTS, Effect};
 use crate::report::diagnose::{Findings, report, short};
 use crate::report::format::{Medium, number};
 use crate::report::{html, terminal};
-use crate::trace::{Machine, Signal, load, write_text};
+use crate::fmu::host::Fmu;
+use crate::fmu::package::Package;
+use crate::fmu::simulate::{Inputs, Options, Setting, simulate};
+use crate::trace::{Machine, Signal, Trace, load, write_text};
 
 /// Arguments of `eixo diagnose`.
 #[derive(Debug, clap::Args)]
@@ -36,6 +39,9 @@ pub struct Args {
     /// Write the report as one HTML page
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Write the improved model as an FMU, and run it on held-out data through the import host
+    #[arg(long, value_name = "FILE")]
+    fmu: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -84,7 +90,39 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.report {
         write_text(path, html::page(&report(&findings)).as_bytes())?;
     }
+    if let Some(path) = &args.fmu {
+        let improved = Machine {
+            parameters: outcome.improved.parameters,
+            effects: outcome.improved.effects,
+            ..machine.clone()
+        };
+        Package::of(&improved).with_context(|| path.display().to_string())?.write(path)?;
+        println!("{}", replayed(path, &outcome.replay)?);
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Runs the FMU as any importer would, on held-out data from its state there; its own error in a sentence.
+fn replayed(path: &Path, replay: &Replay) -> anyhow::Result<String> {
+    let record = &replay.record;
+    let trace = Trace::new(record.start, record.dt, record.hold).with(Signal::T, record.torque.clone())?;
+    let starts = ["theta1_0", "omega1_0", "theta2_0", "omega2_0"];
+    let settings = starts.iter().zip(replay.initial);
+    let options = Options {
+        hold: record.hold,
+        settings: settings.map(|(n, v)| Setting { name: (*n).to_owned(), value: format!("{v:e}") }).collect(),
+        ..Options::default()
+    };
+    let run = simulate(&Fmu::open(path)?, &Inputs::of(&trace)?, &options)?;
+    let mut parts = Vec::new();
+    for (channel, name) in record.channels.iter().zip(CHANNELS) {
+        let (Some(measured), Some(own)) = (channel, run.get(name)) else { continue };
+        let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+        let squares = |f: &dyn Fn(usize) -> f64| (0..own.len()).map(|k| f(k).powi(2)).sum::<f64>();
+        let error = squares(&|k| own[k] - measured[k]) / squares(&|k| measured[k] - mean);
+        parts.push(format!("{name} {}", number(100.0 * error.sqrt(), 3, Medium::Terminal) + " %"));
+    }
+    Ok(format!("{}: run on held-out data, {} samples: its own error is {} of the signal", path.display(), record.len(), parts.join(", ")))
 }
 
 fn library(without: &[String]) -> anyhow::Result<Vec<Effect>> {

@@ -60,7 +60,7 @@ pub struct Args {
     /// The trace: CSV with time, T, theta1, theta2 (and omega1, omega2), or a log that --axis maps to them
     #[arg(required_unless_present = "paper_tables")]
     trace: Option<PathBuf>,
-    /// The machine: its nominal parameters are the reference, its [signals] map the log's columns
+    /// The machine: its nominal parameters are the reference, its `[signals]` map the log's columns
     #[arg(long, value_name = "FILE")]
     axis: Option<PathBuf>,
     /// Which estimators; may be given more than once

@@ -52,6 +52,16 @@ pub struct Outcome {
     pub decision: Decision,
     /// What the report draws.
     pub evidence: Evidence,
+    /// A stretch of held-out data for the improved model to be run on.
+    pub replay: Replay,
+}
+
+/// The first held-out window, and the improved model's state at its beginning.
+pub struct Replay {
+    /// The stretch.
+    pub record: Record,
+    /// `[theta1, omega1, theta2, omega2]` at its first sample.
+    pub initial: [f64; 4],
 }
 
 /// Diagnoses a record.
@@ -85,7 +95,8 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     lattice::judge(case, &decision, &mut diagnosis);
     words::fill(&mut diagnosis, &decision);
     let evidence = evidence::gather(located, held.record, held.windows, &initial(&held.states, held.windows), &models);
-    Outcome { diagnosis, improved: models[2], models, decision, evidence }
+    let replay = held.replay(&models[2]);
+    Outcome { diagnosis, improved: models[2], models, decision, evidence, replay }
 }
 
 /// The record that the fits see, and the one that they do not; encoders with zeros of their own are brought together.
@@ -120,6 +131,14 @@ impl Held<'_> {
     fn errors(&self, model: &Model) -> Vec<nalgebra::Vector4<f64>> {
         let data = Data { record: self.record, windows: self.windows };
         gap::errors(data, model, &initial(&self.states, self.windows)).0
+    }
+
+    fn replay(&self, model: &Model) -> Replay {
+        let first = &self.windows[..1];
+        let data = Data { record: self.record, windows: first };
+        let [theta1, omega1, theta2, omega2, ..] = gap::errors(data, model, &initial(&self.states, first)).1[0];
+        let record = self.record.part(first[0].begin..first[0].compared.end);
+        Replay { record, initial: [theta1, omega1, theta2, omega2] }
     }
 
     fn gap(&self, models: [Model; 3]) -> Gap {

@@ -19,7 +19,7 @@ mod states;
 mod windows;
 mod words;
 
-pub use assess::{Case, Outcome, diagnose};
+pub use assess::{Case, Outcome, Replay, diagnose};
 pub use decide::{Decision, Verdict};
 pub use diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
 pub use evidence::{Evidence, Overlay};

@@ -104,7 +104,8 @@ fn output_error_has_scipys_estimates_and_standard_errors() {
     // Where two iterations stop is a matter of their tolerances: a thousandth of a standard error.
     let near = |fit: &super::output_error::Fit, expected: &[f64; 4], std: &[f64; 4]| {
         for i in 0..4 {
-            assert!((fit.estimated.values[i] - expected[i]).abs() < 1e-3 * std[i], "{i}");
+            let off = (fit.estimated.values[i] - expected[i]) / std[i];
+            assert!(off.abs() < 1e-3, "parameter {i}: {off:e} standard errors off");
         }
     };
     near(&fit, &expected, &std);
