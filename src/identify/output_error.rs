@@ -261,7 +261,13 @@ impl<'a> OutputError<'a> {
         problem.free[BIAS] = free.bias;
         let x0 = self.first_state();
         let p = [start.i1.ln(), start.i2.ln(), start.b / problem.damping_unit, start.k.ln()];
-        let q = [p[0], p[1], p[2], p[3], x0[0], x0[1], x0[2], x0[3], 0.0, 0.0];
+        let mut q = [p[0], p[1], p[2], p[3], x0[0], x0[1], x0[2], x0[3], 0.0, 0.0];
+        // Speeds from positions alone are poor: the linear part first. A second start clears what damping the first
+        // has gathered in the valley that I2, B and K share.
+        problem.solve_state(&mut q);
+        let first = problem.run(&q, ITERATIONS);
+        let mut q = first.0;
+        problem.solve_state(&mut q);
         let report = problem.run(&q, ITERATIONS);
         problem.finish(&report.0, &report.1, 1.0, scheme)
     }
