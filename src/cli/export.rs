@@ -31,6 +31,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     };
     package.write(&args.fmu)?;
-    println!("{}: FMI 2.0 co-simulation, {}", args.fmu.display(), package.name);
+    let platforms: Vec<&str> = Package::platforms().collect();
+    println!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "));
     Ok(ExitCode::SUCCESS)
 }

@@ -13,13 +13,21 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use super::host;
 use crate::fmi2::bake;
 use crate::trace::{Machine, TraceError, write_text};
 use crate::variables::Starts;
 
-/// The lean shared library, from `build.rs`.
-static LIBRARY: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/eixo_fmu_library"));
+/// A lean shared library.
+struct Library {
+    /// Its folder under `binaries/`.
+    platform: &'static str,
+    /// Of its file's name.
+    extension: &'static str,
+    bytes: &'static [u8],
+}
+
+/// One a platform, from `build.rs`; the program's own first.
+static LIBRARIES: &[Library] = &include!(concat!(env!("OUT_DIR"), "/libraries.rs"));
 /// The picture of the model, from `scripts/draw_model.py`.
 static PICTURE: &[u8] = include_bytes!("../../../modelDescription/model.png");
 static LICENSE: &str = include_str!("../../../LICENSE");
@@ -97,14 +105,23 @@ impl Package {
         Ok(xml::document(&self.name, &self.starts)?)
     }
 
-    /// The shared library, with the start values in it.
+    /// Platforms whose library goes into the archive, by their folders; the program's own first.
+    pub fn platforms() -> impl Iterator<Item = &'static str> {
+        LIBRARIES.iter().map(|l| l.platform)
+    }
+
+    /// The shared library of the program's own platform, with the start values in it.
     ///
     /// # Errors
     /// [`PackageError::Library`].
     pub fn library(&self) -> Result<Vec<u8>, PackageError> {
-        let mut library = LIBRARY.to_vec();
-        bake(&mut library, &self.starts).map_err(PackageError::Library)?;
-        Ok(library)
+        self.baked(&LIBRARIES[0])
+    }
+
+    fn baked(&self, library: &Library) -> Result<Vec<u8>, PackageError> {
+        let mut bytes = library.bytes.to_vec();
+        bake(&mut bytes, &self.starts).map_err(PackageError::Library)?;
+        Ok(bytes)
     }
 
     /// The archive.
@@ -112,7 +129,6 @@ impl Package {
     /// # Errors
     /// See [`PackageError`].
     pub fn archive(&self) -> Result<Vec<u8>, PackageError> {
-        let (platform, extension) = host::platform();
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
         let mut add = |name: &str, bytes: &[u8], permissions: u32| -> Result<(), PackageError> {
             let options = SimpleFileOptions::default()
@@ -125,8 +141,10 @@ impl Package {
         };
         add("modelDescription.xml", &self.model_description()?, 0o644)?;
         add("model.png", PICTURE, 0o644)?;
-        let library = format!("binaries/{platform}/{}.{extension}", xml::MODEL_IDENTIFIER);
-        add(&library, &self.library()?, 0o755)?;
+        for library in LIBRARIES {
+            let name = format!("binaries/{}/{}.{}", library.platform, xml::MODEL_IDENTIFIER, library.extension);
+            add(&name, &self.baked(library)?, 0o755)?;
+        }
         add("documentation/index.html", documentation::page(&self.name, &self.starts).as_bytes(), 0o644)?;
         add("documentation/model.png", PICTURE, 0o644)?;
         add("documentation/licenses/license.txt", LICENSE.as_bytes(), 0o644)?;
@@ -171,6 +189,11 @@ mod tests {
         assert!(names.iter().any(|n| n.starts_with("binaries/")), "{names:?}");
         let description = Description::parse(&archive.read("modelDescription.xml").unwrap()).unwrap();
         assert_eq!(description.variables.len(), crate::variables::COUNT);
+    }
+
+    #[test]
+    fn the_programs_own_platform_comes_first() {
+        assert_eq!(Package::platforms().next(), Some(crate::fmu::host::platform().0));
     }
 
     #[test]
