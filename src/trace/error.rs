@@ -33,6 +33,14 @@ pub enum TraceError {
         /// What is missing and what a trace file looks like.
         what: String,
     },
+    /// A file of a form that is not read, or that is damaged.
+    #[error("{file}: {what}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong and the way out.
+        what: String,
+    },
     /// A row has too few or too many fields.
     #[error(
         "{file}: row {line}: {found} fields where the header has {expected}; complete or delete the row (a logger \

@@ -10,7 +10,7 @@ use super::units::Unit;
 use super::{Grid, Hold, Trace};
 
 /// Least samples of a trace.
-const SHORTEST: usize = 16;
+pub(super) const SHORTEST: usize = 16;
 
 /// Where a signal stands in a log: `value = scale*column + offset`, after the column's unit is brought to SI.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,20 +96,17 @@ pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError
         trace.set(signal, values)?;
     }
     if trace.is_empty() {
-        return Err(TraceError::NoTable {
-            file: table.file.clone(),
-            what: format!(
-                "no column has a signal's name ({}); the columns are: {}. Map them in [signals] of an axis file and \
-                 give it with --axis",
-                Signal::ALL.map(Signal::name).join(", "),
-                table.names()
-            ),
-        });
+        return Err(no_signal(table));
     }
     Ok(Loaded { trace, warnings })
 }
 
-fn wanted(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Result<Vec<(Signal, Column)>, TraceError> {
+/// The signals that the file has, and where.
+pub(super) fn wanted(
+    table: &Table,
+    mapping: &Mapping,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<(Signal, Column)>, TraceError> {
     if mapping.signals.is_empty() {
         let by_name = |s: &Signal| table.position(s.name()).is_some();
         return Ok(Signal::ALL.into_iter().filter(by_name).map(|s| (s, Column::named(s.name()))).collect());
@@ -144,8 +141,13 @@ fn missing(table: &Table, signal: &'static str, wanted: &str) -> TraceError {
     }
 }
 
-/// The values of a column in SI units, scaled.
-fn values(table: &Table, column: &Column, signal: &'static str, quantity: Quantity) -> Result<Vec<f64>, TraceError> {
+/// Which column it is, and the factor that brings it to SI.
+pub(super) fn scale(
+    table: &Table,
+    column: &Column,
+    signal: &'static str,
+    quantity: Quantity,
+) -> Result<(usize, f64), TraceError> {
     let index = table.position(&column.column).ok_or_else(|| missing(table, signal, &column.column))?;
     let mut scale = column.scale;
     if let Some(text) = table.headers[index].unit.as_ref().or(column.unit.as_ref()) {
@@ -169,12 +171,56 @@ fn values(table: &Table, column: &Column, signal: &'static str, quantity: Quanti
         }
         scale *= unit.factor;
     }
-    let raw = table.column(index)?;
-    Ok(if scale == 1.0 && column.offset == 0.0 {
-        raw.to_vec()
-    } else {
-        raw.iter().map(|v| v * scale + column.offset).collect()
-    })
+    Ok((index, scale))
+}
+
+/// Raw values scaled.
+pub(super) fn scaled(raw: &[f64], scale: f64, offset: f64) -> Vec<f64> {
+    if scale == 1.0 && offset == 0.0 { raw.to_vec() } else { raw.iter().map(|v| v * scale + offset).collect() }
+}
+
+/// The values of a column in SI units, scaled.
+fn values(table: &Table, column: &Column, signal: &'static str, quantity: Quantity) -> Result<Vec<f64>, TraceError> {
+    let (index, scale) = scale(table, column, signal, quantity)?;
+    Ok(scaled(table.column(index)?, scale, column.offset))
+}
+
+/// The column of time; none where the mapping gives the interval and the file has no such column.
+pub(super) fn time_column(table: &Table, mapping: &Mapping) -> Result<Option<Column>, TraceError> {
+    let column = mapping.time.clone();
+    if table.position(&column.column).is_some() {
+        return Ok(Some(column));
+    }
+    if mapping.dt.is_some() {
+        return Ok(None);
+    }
+    if table.position("time").is_some() {
+        return Ok(Some(Column::named("time")));
+    }
+    if column.is_plain() && column.column == "time" {
+        return Err(TraceError::NoTable {
+            file: table.file.clone(),
+            what: format!(
+                "no column \"time\"; the columns are: {}. Name the column of time in [signals] of the axis file \
+                 (time = \"...\"), or give the interval there (dt = 0.001)",
+                table.names()
+            ),
+        });
+    }
+    Ok(Some(column))
+}
+
+/// No column is a signal.
+pub(super) fn no_signal(table: &Table) -> TraceError {
+    TraceError::NoTable {
+        file: table.file.clone(),
+        what: format!(
+            "no column has a signal's name ({}); the columns are: {}. Map them in [signals] of an axis file and give it \
+             with --axis",
+            Signal::ALL.map(Signal::name).join(", "),
+            table.names()
+        ),
+    }
 }
 
 /// The grid, and the time stamps themselves where the record has to be resampled.
@@ -183,24 +229,10 @@ fn time_grid(
     mapping: &Mapping,
     warnings: &mut Vec<String>,
 ) -> Result<(Grid, Option<Vec<f64>>), TraceError> {
-    let mut column = mapping.time.clone();
-    if table.position(&column.column).is_none() {
-        if let Some(dt) = mapping.dt {
-            return Ok((Grid { start: 0.0, dt, sampling: Sampling::Uniform }, None));
-        }
-        if table.position("time").is_some() {
-            column = Column::named("time");
-        } else if column.is_plain() && column.column == "time" {
-            return Err(TraceError::NoTable {
-                file: table.file.clone(),
-                what: format!(
-                    "no column \"time\"; the columns are: {}. Name the column of time in [signals] of the axis file \
-                     (time = \"...\"), or give the interval there (dt = 0.001)",
-                    table.names()
-                ),
-            });
-        }
-    }
+    let Some(column) = time_column(table, mapping)? else {
+        let dt = mapping.dt.unwrap_or(1.0);
+        return Ok((Grid { start: 0.0, dt, sampling: Sampling::Uniform }, None));
+    };
     let time = values(table, &column, "time", Quantity::Time)?;
     let file = table.file.clone();
     let found = grid(&time).map_err(|e| match e {

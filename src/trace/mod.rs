@@ -1,14 +1,18 @@
-//! Traces of the axis: sampled signals in memory, their CSV files, and the machine description `axis.toml`.
+//! Traces of the axis: sampled signals in memory, their files (CSV, Parquet, MATLAB 5), and the machine description `axis.toml`.
 //!
 //! A [`Trace`] is one uniformly sampled record: `time(k) = start + k*dt`, never accumulated. Everything is SI: T in N.m
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
 //! record: see [`Trace::hold`].
 
+mod csv;
 mod error;
 mod load;
 pub mod machine;
+mod mat;
+mod parquet;
 mod sampling;
 mod signal;
+pub mod stream;
 mod table;
 mod units;
 mod write;

@@ -94,7 +94,12 @@ pub fn grid(time: &[f64]) -> Result<Grid, NoGrid> {
         .map(|(k, t)| (k, (t - (start + k as f64 * dt)).abs()))
         .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
     let jitter = worst / dt;
-    let sampling = if jitter <= Sampling::UNIFORM || worst <= rounding(time) {
+    let rounding = || {
+        let mut decimals = Decimals::default();
+        time.iter().for_each(|t| decimals.take(*t));
+        decimals.rounding()
+    };
+    let sampling = if jitter <= Sampling::UNIFORM || worst <= rounding() {
         Sampling::Uniform
     } else if jitter <= Sampling::RESAMPLED {
         Sampling::Jittered { jitter }
@@ -106,17 +111,36 @@ pub fn grid(time: &[f64]) -> Result<Grid, NoGrid> {
 
 /// How far from uniform the time stamps may lie through being written with few decimals: one unit of the last decimal
 /// (half for the stamp, half for the ends of the line); zero where they are not multiples of a power of ten.
-fn rounding(time: &[f64]) -> f64 {
-    for decimals in 0..=9 {
-        let scale = 10f64.powi(decimals);
-        if time.iter().all(|t| {
-            let scaled = t * scale;
-            (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1.0)
-        }) {
-            return 1.0001 / scale;
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Decimals {
+    /// Whether all stamps so far are multiples of `10^-k`.
+    multiples: [bool; 10],
+}
+
+impl Default for Decimals {
+    fn default() -> Self {
+        Self { multiples: [true; 10] }
+    }
+}
+
+impl Decimals {
+    /// Takes one stamp, s.
+    pub fn take(&mut self, stamp: f64) {
+        let mut scale = 1.0;
+        for multiple in &mut self.multiples {
+            if *multiple {
+                let scaled = stamp * scale;
+                *multiple = (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1.0);
+            }
+            scale *= 10.0;
         }
     }
-    0.0
+
+    /// The distance, s.
+    pub fn rounding(&self) -> f64 {
+        let decimals = self.multiples.iter().position(|m| *m);
+        decimals.map_or(0.0, |k| 1.0001 / 10_f64.powi(i32::try_from(k).unwrap_or(i32::MAX)))
+    }
 }
 
 /// Values of a smooth signal on the grid, by the cubic through the four samples around each grid time (Lagrange).

@@ -1,0 +1,420 @@
+//! Traces larger than memory: the rows of a CSV or Parquet file, some thousand at a time, as often as they are asked for.
+//!
+//! What a whole table is checked for ([`super::load`]) is checked here in one pass when the trace is opened and again as it
+//! is read; what needs all of a record at once, resampling, is refused with the way out.
+
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::{Path, PathBuf};
+
+use memchr::memrchr;
+
+use super::error::TraceError;
+use super::load::{Mapping, SHORTEST, no_signal, scale, scaled, time_column, wanted};
+use super::sampling::{Decimals, Sampling};
+use super::table::{Kind, Table};
+use super::{Quantity, Signal, Trace, csv, parquet};
+
+/// Bytes of a CSV file that are read at a time: whatever the file, no more than this, and the numbers in it, is in memory.
+const BLOCK: usize = 8 << 20;
+/// Steps of time whose median is the usual one.
+const STEPS: usize = 1 << 14;
+
+/// A file whose rows are read piece by piece.
+struct Rows {
+    path: PathBuf,
+    kind: Kind,
+    /// The columns, without their values.
+    head: Table,
+}
+
+/// Some rows, one slice a column asked for.
+struct Piece<'a> {
+    /// Row of the first, from 0.
+    first: usize,
+    columns: &'a [Vec<f64>],
+    /// (row, line) as in [`Table`].
+    lines: &'a [(usize, usize)],
+}
+
+impl Piece<'_> {
+    /// Line in the file of the piece's row `k`.
+    fn line(&self, k: usize) -> usize {
+        let row = self.first + k;
+        let last = self.lines.partition_point(|(first, _)| *first <= row);
+        last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
+    }
+}
+
+impl Rows {
+    fn open(path: &Path) -> Result<Self, TraceError> {
+        let file = path.display().to_string();
+        let (kind, mut open) = Kind::open(path)?;
+        let headers = match kind {
+            Kind::Parquet => parquet::Source::open(open, &file)?.headers,
+            Kind::Csv => {
+                let failed = |reason| TraceError::Read { path: path.to_owned(), reason };
+                let mut bytes = Vec::new();
+                open.rewind().and_then(|()| open.take(BLOCK as u64).read_to_end(&mut bytes)).map_err(failed)?;
+                csv::Head::find(csv::unmarked(&bytes), &file)?.headers
+            }
+            Kind::Mat => {
+                return Err(TraceError::Format {
+                    file,
+                    what:
+                        "a MATLAB file holds its columns one behind the other and is not streamed; leave --stream out \
+                           (it is at most 2 GiB), or write it as Parquet or CSV"
+                            .to_owned(),
+                });
+            }
+        };
+        let columns = vec![Vec::new(); headers.len()];
+        let faults = vec![None; headers.len()];
+        Ok(Self { path: path.to_owned(), kind, head: Table { file, headers, columns, faults, lines: Vec::new() } })
+    }
+
+    /// Reads these columns from the first row to the last.
+    fn each(&self, wanted: &[usize], take: &mut dyn FnMut(&Piece) -> Result<(), TraceError>) -> Result<(), TraceError> {
+        match self.kind {
+            Kind::Csv => self.each_block(wanted, take),
+            _ => {
+                let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
+                let source = parquet::Source::open(File::open(&self.path).map_err(failed)?, &self.head.file)?;
+                source.batches(wanted, |first, columns| take(&Piece { first, columns, lines: &[] }))
+            }
+        }
+    }
+
+    fn each_block(
+        &self,
+        wanted: &[usize],
+        take: &mut dyn FnMut(&Piece) -> Result<(), TraceError>,
+    ) -> Result<(), TraceError> {
+        let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
+        let name = &self.head.file;
+        let mut file = File::open(&self.path).map_err(failed)?;
+        let mut bytes = Vec::with_capacity(BLOCK);
+        (&mut file).take(BLOCK as u64).read_to_end(&mut bytes).map_err(failed)?;
+        let start = bytes.len() - csv::unmarked(&bytes).len();
+        let head = csv::Head::find(&bytes[start..], name)?;
+        let format = csv::Format::of(&head, &bytes[start + head.body..]);
+        bytes.drain(..start + head.body);
+        let (mut row, mut line) = (0, head.lines + 1);
+        loop {
+            let before = bytes.len();
+            (&mut file).take(BLOCK.saturating_sub(before) as u64).read_to_end(&mut bytes).map_err(failed)?;
+            let ended = bytes.len() < BLOCK;
+            let end = match memrchr(b'\n', &bytes) {
+                _ if ended => bytes.len(),
+                Some(at) => at + 1,
+                None => {
+                    let what = format!("line {line} is longer than {BLOCK} bytes: this is no table of numbers");
+                    return Err(TraceError::Format { file: name.clone(), what });
+                }
+            };
+            let rows = csv::rows(&bytes[..end], &format, row, line).map_err(|r| r.named(name, &format))?;
+            let count = rows.columns.first().map_or(0, Vec::len);
+            let mut columns = Vec::with_capacity(wanted.len());
+            let mut all: Vec<Option<Vec<f64>>> = rows.columns.into_iter().map(Some).collect();
+            for (k, &column) in wanted.iter().enumerate() {
+                if let Some(fault) = &rows.faults[column] {
+                    return Err(fault.named(name, &self.head.headers[column].name));
+                }
+                // The same column may serve two signals.
+                let twin = wanted[..k].iter().position(|c| *c == column);
+                let values = twin.map_or_else(|| all[column].take(), |at: usize| columns.get(at).cloned());
+                columns.push(values.unwrap_or_default());
+            }
+            if count > 0 {
+                take(&Piece { first: row, columns: &columns, lines: &rows.lines })?;
+            }
+            row += count;
+            line += rows.passed;
+            bytes.drain(..end);
+            if ended {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// Which column is a signal, and how it is brought to SI.
+#[derive(Debug, Clone, Copy)]
+struct Source {
+    column: usize,
+    scale: f64,
+    offset: f64,
+}
+
+/// A trace that is read piece by piece.
+pub struct Stream {
+    rows: Rows,
+    time: Option<Source>,
+    signals: Vec<(Signal, Source)>,
+    /// A record without samples: start, interval and hold.
+    empty: Trace,
+    /// Largest distance of a time stamp from the grid, s.
+    tolerance: f64,
+    length: usize,
+    /// Each a sentence that says what to do.
+    pub warnings: Vec<String>,
+}
+
+impl Stream {
+    /// Opens a trace, and reads its time stamps once.
+    ///
+    /// # Errors
+    /// As [`super::load`]; and where the file cannot be read row by row, or its time stamps would have to be resampled.
+    pub fn open(path: &Path, mapping: &Mapping) -> Result<Self, TraceError> {
+        let rows = Rows::open(path)?;
+        let mut warnings = Vec::new();
+        let mut signals = Vec::new();
+        for (signal, column) in wanted(&rows.head, mapping, &mut warnings)? {
+            let (index, scale) = scale(&rows.head, &column, signal.name(), signal.quantity(mapping.motion))?;
+            signals.push((signal, Source { column: index, scale, offset: column.offset }));
+        }
+        if signals.is_empty() {
+            return Err(no_signal(&rows.head));
+        }
+        let time = match time_column(&rows.head, mapping)? {
+            None => None,
+            Some(column) => {
+                let (index, scale) = scale(&rows.head, &column, "time", Quantity::Time)?;
+                Some(Source { column: index, scale, offset: column.offset })
+            }
+        };
+        let mut clock = Clock::new(rows.head.file.clone());
+        let columns: Vec<usize> = time.iter().map(|t| t.column).collect();
+        let first = signals[0].1.column;
+        rows.each(if columns.is_empty() { std::slice::from_ref(&first) } else { &columns }, &mut |piece| match time {
+            Some(t) => clock.take(&scaled(&piece.columns[0], t.scale, t.offset), piece),
+            None => {
+                clock.count += piece.columns[0].len();
+                Ok(())
+            }
+        })?;
+        clock.finish()?;
+        if clock.count < SHORTEST {
+            return Err(TraceError::TooShort { file: rows.head.file, found: clock.count, needed: SHORTEST });
+        }
+        let (start, dt) = match (time, mapping.dt) {
+            (Some(_), _) => (clock.first, (clock.last - clock.first) / (clock.count - 1) as f64),
+            (None, dt) => (0.0, dt.unwrap_or(1.0)),
+        };
+        let tolerance = (Sampling::UNIFORM * dt).max(clock.decimals.rounding());
+        Ok(Self {
+            rows,
+            time,
+            signals,
+            empty: Trace::new(start, dt, mapping.hold),
+            tolerance,
+            length: clock.count,
+            warnings,
+        })
+    }
+
+    /// Samples of the record.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.length
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.length == 0
+    }
+
+    /// The record without its samples: start, interval, hold.
+    #[must_use]
+    pub const fn frame(&self) -> &Trace {
+        &self.empty
+    }
+
+    /// The signals of the record.
+    pub fn signals(&self) -> impl Iterator<Item = Signal> + '_ {
+        self.signals.iter().map(|(s, _)| *s)
+    }
+
+    /// The record from its first sample to its last: `take(index of the first sample, samples)`.
+    ///
+    /// # Errors
+    /// [`TraceError`], naming file, row and column; what `take` gives.
+    pub fn each(&self, mut take: impl FnMut(usize, Trace) -> Result<(), TraceError>) -> Result<(), TraceError> {
+        let columns: Vec<usize> =
+            self.time.iter().chain(self.signals.iter().map(|(_, s)| s)).map(|s| s.column).collect();
+        let file = &self.rows.head.file;
+        self.rows.each(&columns, &mut |piece| {
+            let mut own = piece.columns;
+            if let Some(t) = self.time {
+                for (k, stamp) in scaled(&own[0], t.scale, t.offset).into_iter().enumerate() {
+                    let off = (stamp - self.empty.time(piece.first + k)).abs();
+                    if off > self.tolerance {
+                        return Err(TraceError::Format {
+                            file: file.clone(),
+                            what: format!(
+                                "row {}: the time stamp is {:.1} % of a sample off uniform sampling at dt = {:.9e} s, and a \
+                                 streamed trace is not resampled; give dt in [signals] and name no time column there, or \
+                                 cut the record into parts",
+                                piece.line(k),
+                                100.0 * off / self.empty.dt,
+                                self.empty.dt
+                            ),
+                        });
+                    }
+                }
+                own = &own[1..];
+            }
+            let mut trace = Trace::new(self.empty.time(piece.first), self.empty.dt, self.empty.hold);
+            for ((signal, source), values) in self.signals.iter().zip(own) {
+                trace.set(*signal, scaled(values, source.scale, source.offset))?;
+            }
+            take(piece.first, trace)
+        })
+    }
+}
+
+/// What one pass over the time stamps finds.
+struct Clock {
+    file: String,
+    count: usize,
+    first: f64,
+    last: f64,
+    decimals: Decimals,
+    /// The first steps and the lines behind them, until there are enough of them.
+    early: Vec<(f64, usize)>,
+    usual: Option<f64>,
+}
+
+impl Clock {
+    fn new(file: String) -> Self {
+        Self { file, count: 0, first: 0.0, last: 0.0, decimals: Decimals::default(), early: Vec::new(), usual: None }
+    }
+
+    fn take(&mut self, stamps: &[f64], piece: &Piece) -> Result<(), TraceError> {
+        for (k, &stamp) in stamps.iter().enumerate() {
+            self.decimals.take(stamp);
+            if self.count == 0 {
+                self.first = stamp;
+            } else {
+                let step = stamp - self.last;
+                let line = piece.line(k);
+                if step <= 0.0 {
+                    let (file, before) = (self.file.clone(), self.last);
+                    return Err(TraceError::NotIncreasing { file, line, before, after: stamp });
+                }
+                match self.usual {
+                    Some(usual) => self.gap(step, line, usual)?,
+                    None => {
+                        self.early.push((step, line));
+                        if self.early.len() == STEPS {
+                            self.finish()?;
+                        }
+                    }
+                }
+            }
+            self.last = stamp;
+            self.count += 1;
+        }
+        Ok(())
+    }
+
+    fn gap(&self, gap: f64, line: usize, dt: f64) -> Result<(), TraceError> {
+        if gap <= 1.5 * dt {
+            return Ok(());
+        }
+        let missing = ((gap / dt).round() as usize).saturating_sub(1).max(1);
+        Err(TraceError::Gap { file: self.file.clone(), line, gap, missing, dt })
+    }
+
+    /// The usual step, and the early ones judged by it.
+    fn finish(&mut self) -> Result<(), TraceError> {
+        if self.usual.is_some() || self.early.is_empty() {
+            return Ok(());
+        }
+        let mut steps: Vec<f64> = self.early.iter().map(|(step, _)| *step).collect();
+        let middle = steps.len() / 2;
+        let (_, &mut usual, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+        self.usual = Some(usual);
+        for (step, line) in std::mem::take(&mut self.early) {
+            self.gap(step, line, usual)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::load;
+    use super::*;
+
+    /// Enough rows for several blocks; comments and blank lines among them.
+    fn long(path: &Path) -> usize {
+        use std::fmt::Write;
+        let mut text = String::from("time [ms],note,T [mN.m],theta1 [deg]\n");
+        let rows = 700_000;
+        for k in 0..rows {
+            if k % 5000 == 9 {
+                text.push_str("# a comment\n\n");
+            }
+            writeln!(text, "{},x,{},{}.25", 0.5 * f64::from(k), k % 977, k % 1013).unwrap();
+        }
+        assert!(text.len() > 5 * BLOCK / 4);
+        std::fs::write(path, text).unwrap();
+        rows as usize
+    }
+
+    #[test]
+    fn a_streamed_file_holds_the_numbers_of_the_whole_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.csv");
+        let rows = long(&path);
+        let whole = load(&path, &Mapping::default()).unwrap().trace;
+        let stream = Stream::open(&path, &Mapping::default()).unwrap();
+        assert_eq!((stream.len(), stream.frame().start, stream.frame().dt), (rows, whole.start, whole.dt));
+        let mut seen = 0;
+        let mut pieces = 0;
+        stream
+            .each(|first, piece| {
+                assert_eq!(first, seen);
+                for signal in [Signal::T, Signal::Theta1] {
+                    let expected = &whole.get(signal).unwrap()[first..first + piece.len()];
+                    assert_eq!(piece.get(signal).unwrap(), expected);
+                }
+                seen += piece.len();
+                pieces += 1;
+                Ok(())
+            })
+            .unwrap();
+        assert_eq!(seen, rows);
+        assert!(pieces > 1);
+    }
+
+    #[test]
+    fn a_fault_far_down_is_named_by_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.csv");
+        long(&path);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let at = text.lines().position(|l| l.starts_with("300000,")).unwrap();
+        let replaced = |with: &str| {
+            let lines: Vec<&str> = text.lines().enumerate().map(|(k, l)| if k == at { with } else { l }).collect();
+            std::fs::write(&path, lines.join("\n")).unwrap();
+            match Stream::open(&path, &Mapping::default()) {
+                Ok(stream) => stream.each(|_, _| Ok(())).unwrap_err().to_string(),
+                Err(error) => error.to_string(),
+            }
+        };
+        let line = format!("row {}", at + 1);
+        let error = replaced("300000,x,none,1.25");
+        assert!(error.contains(&format!("{line}, column T")), "{error}");
+        let error = replaced("300000,x,1");
+        assert!(error.contains(&line) && error.contains("3 fields"), "{error}");
+        let error = replaced("300000.2,x,1,1.25");
+        assert!(error.contains(&line) && error.contains("not resampled"), "{error}");
+        let error = replaced("299000,x,1,1.25");
+        assert!(error.contains(&line) && error.contains("must increase"), "{error}");
+        let error = replaced("# nothing");
+        assert!(error.contains(&format!("row {}", at + 2)) && error.contains("gap"), "{error}");
+    }
+}

@@ -1,0 +1,152 @@
+//! Parquet and MATLAB files as other programs write them (pyarrow, scipy; `scripts/fixtures/formats.py`).
+
+use std::path::{Path, PathBuf};
+
+use eixo::trace::{Column, Mapping, Signal, Table, TraceError, load};
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/formats").join(name)
+}
+
+/// The formula of `scripts/fixtures/formats.py`: time, T, theta1, counts of row k.
+fn row(k: usize) -> [f64; 4] {
+    let torque = [0.0, 0.5, 0.25, -0.125, -0.5, -0.75, 1.0];
+    [k as f64 / 1000.0, torque[k % 7], (k * k % 997) as f64 / 64.0, (k % 50) as f64]
+}
+
+fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
+    let index = table.position(name).unwrap_or_else(|| panic!("{name} of {}", table.names()));
+    table.column(index).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refusal(table: &Table, name: &str) -> String {
+    table.column(table.position(name).expect("the column")).expect_err("a fault").to_string()
+}
+
+#[test]
+fn parquet_files_of_every_codec_and_encoding_hold_the_numbers_that_were_written() {
+    for name in ["none", "snappy", "gzip", "zstd", "lz4", "version2"] {
+        let table = Table::read(&data(&format!("{name}.parquet"))).unwrap();
+        assert_eq!(table.rows(), 200, "{name}");
+        for k in 0..200 {
+            for (c, column_name) in ["time", "T", "theta1", "counts"].into_iter().enumerate() {
+                assert_eq!(column(&table, column_name)[k], row(k)[c], "{name}, {column_name}, row {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_parquet_trace_has_its_units_in_its_column_names_as_csv_does() {
+    let trace = load(&data("snappy.parquet"), &Mapping::default()).unwrap().trace;
+    assert_eq!(trace.len(), 200);
+    assert!((trace.dt() - 1e-3).abs() < 1e-15);
+    assert_eq!(trace.get(Signal::Theta1).unwrap()[61], row(61)[2]);
+}
+
+#[test]
+fn time_stamps_decimals_and_whole_numbers_are_numbers_and_nulls_and_text_are_named_only_when_used() {
+    let table = Table::read(&data("types.parquet")).unwrap();
+    for k in 0..200 {
+        assert_eq!(column(&table, "time")[k], row(k)[0]);
+        assert_eq!(column(&table, "T")[k], row(k)[1]);
+        assert_eq!(column(&table, "theta1")[k], row(k)[2]);
+        assert_eq!(column(&table, "large")[k], (k as u64 + (1 << 63)) as f64);
+        assert_eq!(column(&table, "moving")[k], f64::from(u8::from(k % 2 == 0)));
+    }
+    let gaps = refusal(&table, "gaps");
+    assert!(gaps.contains("types.parquet: row 38, column gaps: \"null\""), "{gaps}");
+    assert!(refusal(&table, "note").contains("column note"));
+    // Nanoseconds since 1970 would have left no digit of the millisecond in a double.
+    assert!((load(&data("types.parquet"), &Mapping::default()).unwrap().trace.dt() - 1e-3).abs() < 1e-15);
+}
+
+#[test]
+fn matlab_vectors_are_columns_plain_or_compressed() {
+    for name in ["plain.mat", "compressed.mat"] {
+        let table = Table::read(&data(name)).unwrap();
+        for k in 0..200 {
+            for (c, column_name) in ["time", "T", "theta1"].into_iter().enumerate() {
+                assert_eq!(column(&table, column_name)[k], row(k)[c], "{name}, {column_name}, row {k}");
+            }
+        }
+    }
+    let table = Table::read(&data("plain.mat")).unwrap();
+    assert_eq!(column(&table, "counts")[149], 49.0);
+    assert!(table.position("fs").is_none() && table.position("note").is_none(), "{}", table.names());
+    let short = refusal(&table, "short");
+    assert!(short.contains("column short") && short.contains("5 values") && short.contains("200"), "{short}");
+}
+
+#[test]
+fn fields_of_a_matlab_structure_are_columns_and_a_matrix_one_column_each() {
+    let table = Table::read(&data("struct.mat")).unwrap();
+    let expected = |c: usize| (0..200).map(|k| row(k)[c]).collect::<Vec<_>>();
+    assert_eq!(column(&table, "time"), expected(0));
+    assert_eq!(column(&table, "T"), expected(1));
+    assert_eq!(column(&table, "both(1,:)"), expected(2));
+    assert_eq!(column(&table, "both(2,:)"), expected(1));
+    assert!(refusal(&table, "wave").contains("complex"));
+    let mapping = Mapping {
+        signals: vec![(Signal::T, Column { unit: Some("mN.m".into()), ..Column::named("T") })],
+        ..Mapping::default()
+    };
+    let trace = load(&data("struct.mat"), &mapping).unwrap().trace;
+    assert_eq!(trace.get(Signal::T).unwrap()[6], 1e-3);
+}
+
+#[test]
+fn an_hdf5_file_is_refused_with_the_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.mat");
+    std::fs::write(&path, b"\x89HDF\r\n\x1a\n and so on").unwrap();
+    let error = Table::read(&path).unwrap_err().to_string();
+    assert!(error.contains("log.mat") && error.contains("-v7"), "{error}");
+}
+
+/// Cuts and single flipped bytes: an error that names the file, or a table of as many rows; never a panic, and never more
+/// memory than the file can account for.
+#[test]
+fn damaged_files_are_errors_that_name_them() {
+    let folder = tempfile::tempdir().unwrap();
+    std::panic::set_hook(Box::new(|_| {}));
+    for name in ["zstd.parquet", "types.parquet", "plain.mat", "compressed.mat", "struct.mat"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        let path = folder.path().join(name);
+        let check = |bytes: &[u8], what: &str| {
+            std::fs::write(&path, bytes).unwrap();
+            match Table::read(&path) {
+                Ok(table) => assert!(table.rows() <= 1 << 16, "{name}, {what}: {} rows", table.rows()),
+                Err(TraceError::Read { reason, .. }) => panic!("{name}, {what}: {reason}"),
+                Err(error) => assert!(error.to_string().contains(name), "{name}, {what}: {error}"),
+            }
+        };
+        for k in 0..64 {
+            check(&whole[..whole.len() * k / 64], &format!("cut at {k}/64"));
+        }
+        for k in (0..whole.len()).step_by(whole.len() / 400 + 1) {
+            let mut bytes = whole.clone();
+            bytes[k] ^= 1 << (k % 8);
+            check(&bytes, &format!("byte {k}"));
+        }
+    }
+}
+
+#[test]
+fn a_small_file_that_unfolds_to_gigabytes_is_refused_before_it_does() {
+    use std::io::Write;
+    // A compressed element that announces 3.9 GB of zeros.
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    packed.write_all(&14_u32.to_le_bytes()).unwrap();
+    packed.write_all(&3_900_000_000_u32.to_le_bytes()).unwrap();
+    packed.write_all(&vec![0; 1 << 20]).unwrap();
+    let packed = packed.finish().unwrap();
+    let mut bytes = b"MATLAB 5.0 MAT-file".to_vec();
+    bytes.resize(124, b' ');
+    bytes.extend([0, 1, b'I', b'M']);
+    bytes.extend(15_u32.to_le_bytes());
+    bytes.extend((packed.len() as u32).to_le_bytes());
+    bytes.extend(packed);
+    let error = Table::parse(&bytes, "bomb.mat").unwrap_err().to_string();
+    assert!(error.contains("bomb.mat") && error.contains("unfolds"), "{error}");
+}
