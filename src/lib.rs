@@ -5,6 +5,7 @@
 //! `cli -> fmu -> variables -> axis` and `fmi2 -> variables`.
 
 pub mod axis;
+pub mod drive;
 pub mod effects;
 pub mod fmi2;
 pub mod scalar;

@@ -1,23 +1,17 @@
 //! The circular test of machine tools in simulation (ISO 230-4): two axes under position control follow a circle, and
 //! the path of the table shows what an unmodelled effect does to a part.
 //!
-//! Each axis has the usual drive: a proportional position loop, a proportional-integral velocity loop, feed-forward of
-//! velocity and acceleration, a torque limit:
+//! Each axis has the usual [`crate::drive`], at the motor's encoder or at the table's. The torque of one sample acts from
+//! the next on: the time that a drive needs to compute, and what a co-simulation master makes of the two as FMUs.
 //!
-//! ```text
-//! w* = kp*(th* - th) + fv*th*'        command of the velocity loop, rad/s
-//! T  = kv*(w* - w) + ki*int(w* - w) + fa*(I1 + I2)*th*'',   |T| <= limit
-//! ```
-//!
-//! `th*` is the circle's coordinate over the lead; th and w come from the motor's encoder or from the table's. The
-//! drive computes once a sample and holds its torque; the integral stops while the torque is limited.
-//! An axis is taken as identified in place: X carries Y, so X's I2 already contains Y's mass.
+//! Y is stacked on X. An axis is taken as identified in place: X carries Y, so X's I2 already contains Y's mass.
 
 pub mod roundness;
 
 use std::f64::consts::TAU;
 
 use crate::axis::{Axis, Parameters, Scheme, State, Structure, substeps};
+use crate::drive::{Drive, Gains};
 use crate::effects::{Ramp, SensorHistory, Settings, TorqueHistory};
 
 /// Which encoder closes the position loop.
@@ -30,40 +24,20 @@ pub enum Feedback {
     Table,
 }
 
-/// A drive's position and velocity loops.
+/// A drive's gains and its encoder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Servo {
-    /// Position gain, 1/s.
-    pub kp: f64,
-    /// Velocity gain, N.m.s/rad.
-    pub kv: f64,
-    /// Integral gain of the velocity loop, N.m/rad.
-    pub ki: f64,
-    /// Share of the velocity fed forward.
-    pub velocity_forward: f64,
-    /// Share of the acceleration fed forward.
-    pub acceleration_forward: f64,
-    /// Torque limit, N.m.
-    pub limit: f64,
+    /// The gains.
+    pub gains: Gains,
     /// Which encoder closes the position loop; the velocity loop is closed at the motor.
     pub feedback: Feedback,
 }
 
 impl Servo {
-    /// Loops for an axis of these parameters: velocity bandwidth `bandwidth` rad/s, position gain a quarter of it unless
-    /// given, integral time four over the bandwidth, full feed-forward, no torque limit.
+    /// The gains of [`Gains::tuned`] for an axis of these parameters, at the motor's encoder.
     #[must_use]
     pub fn tuned(p: &Parameters, bandwidth: f64, kp: Option<f64>) -> Self {
-        let kv = (p.i1 + p.i2) * bandwidth;
-        Self {
-            kp: kp.unwrap_or(bandwidth / 4.0),
-            kv,
-            ki: kv * bandwidth / 4.0,
-            velocity_forward: 1.0,
-            acceleration_forward: 1.0,
-            limit: f64::INFINITY,
-            feedback: Feedback::Motor,
-        }
+        Self { gains: Gains::tuned(p.i1 + p.i2, bandwidth, kp), feedback: Feedback::Motor }
     }
 }
 
@@ -145,15 +119,11 @@ const RUN_IN: f64 = 1.5;
 const LEAST: usize = 360;
 const MOST: usize = 20_000_000;
 
-/// Angle on the circle, its rate and its second derivative at time `t`: the feed is reached over half a turn.
-fn schedule(rate: f64, t: f64) -> (f64, f64, f64) {
+/// Angle on the circle at time `t`: the feed is reached over half a turn.
+fn schedule(rate: f64, t: f64) -> f64 {
     // phi = rate*t^2/(2*ramp) until t = ramp, where phi is half a turn.
     let ramp = TAU / rate;
-    if t < ramp {
-        (0.5 * rate * t * t / ramp, rate * t / ramp, rate / ramp)
-    } else {
-        (rate * (t - 0.5 * ramp), rate, 0.0)
-    }
+    if t < ramp { 0.5 * rate * t * t / ramp } else { rate * (t - 0.5 * ramp) }
 }
 
 /// Runs the test: the table's path over the last turn, starting on the +X side.
@@ -184,20 +154,16 @@ pub fn run(x: &ServoAxis, y: &ServoAxis, test: &CircleTest) -> Result<Path, Circ
     let mut axes = [Loop::new(x, test.radius, test.dt), Loop::new(y, 0.0, test.dt)];
     for k in 0..=last {
         let time = k as f64 * test.dt;
-        let (phi, w, a) = schedule(rate, time);
-        let (s, c) = phi.sin_cos();
+        let (s, c) = schedule(rate, time).sin_cos();
         let r = test.radius;
-        let goals = [
-            [r * c, -r * s * w, -r * (c * w * w + s * a)],
-            [sense * r * s, sense * r * c * w, sense * r * (c * a - s * w * w)],
-        ];
+        let goals = [r * c, sense * r * s];
         if k >= first {
             path.x.push(axes[0].position());
             path.y.push(axes[1].position());
         }
         for ((axis, goal), name) in axes.iter_mut().zip(goals).zip(["X", "Y"]) {
             axis.step(goal, time);
-            let off = (axis.position() - goal[0]).abs();
+            let off = (axis.position() - goal).abs();
             if off.is_nan() || off > r {
                 return Err(CircleError::Unstable { axis: name, time });
             }
@@ -211,7 +177,8 @@ struct Loop<'a> {
     axis: Axis,
     set: &'a ServoAxis,
     state: State,
-    integral: f64,
+    drive: Drive,
+    torque: f64,
     torques: TorqueHistory<f64>,
     seen: SensorHistory<f64>,
     per: usize,
@@ -226,7 +193,17 @@ impl<'a> Loop<'a> {
         let theta = at / p.rho;
         let state = axis.state(theta, 0.0, theta, 0.0, 0.0);
         let seen = SensorHistory::settled(state.reading(), dt);
-        Self { axis, set, state, integral: 0.0, torques: TorqueHistory::default(), seen, per, dt }
+        Self {
+            axis,
+            set,
+            state,
+            drive: Drive::default(),
+            torque: 0.0,
+            torques: TorqueHistory::default(),
+            seen,
+            per,
+            dt,
+        }
     }
 
     /// Where the table is, m.
@@ -234,25 +211,20 @@ impl<'a> Loop<'a> {
         self.set.parameters.rho * self.state.theta2()
     }
 
-    /// One sample towards `goal`: position, velocity, acceleration of the table, m, m/s, m/s2.
-    fn step(&mut self, goal: [f64; 3], time: f64) {
-        let (p, servo) = (&self.set.parameters, &self.set.servo);
+    /// One sample towards `goal`, m.
+    fn step(&mut self, goal: f64, time: f64) {
+        let servo = &self.set.servo;
         let read = if self.axis.on().sensors().is_empty() {
             self.state.reading()
         } else {
             self.set.effects.transform_sensor(self.axis.on(), &self.seen, self.dt)
         };
-        let [theta, omega, alpha] = goal.map(|g| g / p.rho);
         let position = match servo.feedback {
             Feedback::Motor => read.theta1,
             Feedback::Table => read.theta2,
         };
-        let error = servo.kp * (theta - position) + servo.velocity_forward * omega - read.omega1;
-        let wanted = servo.kv * error + self.integral + servo.acceleration_forward * (p.i1 + p.i2) * alpha;
-        let torque = wanted.clamp(-servo.limit, servo.limit);
-        if torque == wanted {
-            self.integral += servo.ki * error * self.dt;
-        }
+        let torque = self.torque;
+        self.torque = self.drive.sample(&servo.gains, goal / self.set.parameters.rho, position, read.omega1, self.dt);
         let h = self.dt / self.per as f64;
         for j in 0..self.per {
             let held = Ramp { start: torque, end: torque };
@@ -269,6 +241,8 @@ impl<'a> Loop<'a> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Complex;
+
     use super::roundness::Roundness;
     use super::*;
     use crate::effects::Effect;
@@ -296,26 +270,37 @@ mod tests {
         let path = run(&axis(Settings::default()), &axis(Settings::default()), &TEST).expect("a path");
         let r = Roundness::of(&path, TEST.radius).expect("a circle");
         assert!(r.deviation < 1e-7, "{r:?}");
-        // The motor follows its command; the table follows the motor through the coupling.
-        let (p, w) = (Parameters::PAPER, TEST.feed / TEST.radius);
-        let gain = p.k.hypot(p.b * w) / (p.k - p.i2 * w * w).hypot(p.b * w);
-        assert!((r.mean - TEST.radius * (gain - 1.0)).abs() < 1e-9, "{r:?}");
+        // The radius is the gain of the loop at the turning rate: the drive's differences and sums over its samples, the
+        // sample in which it computes and half of the one over which it holds, the motor, and the table behind it.
+        type C = Complex<f64>;
+        let (p, g) = (Parameters::PAPER, axis(Settings::default()).servo.gains);
+        let s = C::new(0.0, TEST.feed / TEST.radius);
+        let late = |samples: f64| (-s * samples * TEST.dt).exp();
+        let difference = (1.0 - late(1.0)) / TEST.dt;
+        let speed_loop = g.kv + g.ki * TEST.dt * late(1.0) / (1.0 - late(1.0));
+        let (table, coupling) = (s * s * p.i2 + s * p.b + p.k, s * p.b + p.k);
+        let motor = table / (s * s * (table * p.i1 + coupling * p.i2));
+        let command = speed_loop * (g.kp + difference) + g.inertia * difference * difference;
+        let open = late(1.5) * motor;
+        let gain = (open * command / (1.0 + open * speed_loop * (g.kp + s)) * coupling / table).norm();
+        assert!((r.mean - TEST.radius * (gain - 1.0)).abs() < 1e-9, "{r:?} {gain}");
     }
 
     #[test]
     fn a_position_lag_without_feed_forward_shrinks_the_circle_by_its_frequency_response() {
         let mut a = axis(Settings::default());
-        a.servo.velocity_forward = 0.0;
-        a.servo.acceleration_forward = 0.0;
-        a.servo.ki = 0.0;
+        a.servo.gains.velocity_forward = 0.0;
+        a.servo.gains.acceleration_forward = 0.0;
+        a.servo.gains.ki = 0.0;
         a.structure = Structure::Rigid;
         let fast = CircleTest { feed: 0.4, dt: 2e-4, ..TEST };
         let r = Roundness::of(&run(&a, &a, &fast).expect("a path"), fast.radius).expect("a circle");
-        // Rigid axis: J*s^2 + kv*s + kv*kp; the radius is the gain at the turning rate. The held torque adds half a
-        // sample of delay, which this rate hardly sees.
+        // Rigid axis: J*s^2 + (kv*s + kv*kp)*exp(-s*d); the radius is the gain at the turning rate, and the delay d is the
+        // sample in which the drive computes and half of the one over which it holds.
         let (w, j) = (fast.feed / fast.radius, a.parameters.i1 + a.parameters.i2);
-        let (kv, kp) = (a.servo.kv, a.servo.kp);
-        let gain = kv * kp / (kv * kp - j * w * w).hypot(kv * w);
+        let (kv, kp, late) = (a.servo.gains.kv, a.servo.gains.kp, 1.5 * fast.dt * fast.feed / fast.radius);
+        let (s, c) = late.sin_cos();
+        let gain = kv * kp / (kv * kp * c + kv * w * s - j * w * w).hypot(kv * w * c - kv * kp * s);
         let expected = fast.radius * (gain - 1.0);
         assert!((r.mean - expected).abs() < 0.02 * expected.abs(), "{} against {expected}", r.mean);
     }

@@ -5,17 +5,31 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use crate::fmu::package::Package;
+use super::drives::Drives;
+use crate::fmu::package::{Package, XyTable};
 use crate::trace::Machine;
 
 /// Arguments of `eixo export`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  eixo export axis.fmu --axis axis.toml\n  eixo export table.ssp --axis x.toml --y y.toml")]
 pub struct Args {
-    /// The FMU to write
+    /// The FMU to write; with the name's end .ssp an XY table of two axes and their drives (SSP 1.0)
     pub fmu: PathBuf,
     /// Machine whose parameters and effects become the start values; without it the paper's axis with every effect off
     #[arg(long, value_name = "AXIS.TOML")]
     pub axis: Option<PathBuf>,
+    /// Write the FMU of the axis' drive in place of the axis
+    #[arg(long, conflicts_with = "y")]
+    pub drive: bool,
+    /// For an XY table (FILE.ssp): the Y axis, stacked on the X axis of --axis; as X without
+    #[arg(long, value_name = "AXIS.TOML")]
+    pub y: Option<PathBuf>,
+    /// For an XY table: no connectors of the system itself, for tools that know only its components (ecos)
+    #[arg(long)]
+    pub bare: bool,
+    /// The drives.
+    #[command(flatten)]
+    pub drives: Drives,
 }
 
 /// Runs the command.
@@ -23,15 +37,38 @@ pub struct Args {
 /// # Errors
 /// When the axis file cannot be used, or the FMU cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let package = match &args.axis {
-        None => Package::default(),
-        Some(path) => {
-            let machine = Machine::read(path)?;
-            Package::of(&machine).with_context(|| path.display().to_string())?
+    let x = args.axis.as_deref().map(Machine::read).transpose()?;
+    if args.fmu.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
+        anyhow::ensure!(!args.drive, "--drive writes an FMU: give {} the end .fmu", args.fmu.display());
+        return table(&args, x.unwrap_or_default());
+    }
+    anyhow::ensure!(args.y.is_none() && !args.bare, "--y and --bare are for an XY table: give {} the end .ssp", args.fmu.display());
+    let file = || args.axis.as_ref().map_or_else(String::new, |path| path.display().to_string());
+    let package = match x {
+        Some(machine) if !args.drive => Package::of(&machine).with_context(file)?,
+        None if !args.drive => Package::default(),
+        machine => {
+            let machine = machine.unwrap_or_default();
+            let [axis, _] = args.drives.axes(&machine, &machine)?;
+            let (gains, rho, motion) = (axis.servo.gains, axis.parameters.rho, machine.signals.motion);
+            Package::drive("drive", &gains, rho, args.drives.dt, motion).with_context(file)?
         }
     };
     package.write(&args.fmu)?;
     let platforms: Vec<&str> = Package::platforms().collect();
     println!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The XY table: X carries Y.
+fn table(args: &Args, x: Machine) -> anyhow::Result<ExitCode> {
+    let y = args.y.as_deref().map(Machine::read).transpose()?.unwrap_or_else(|| x.clone());
+    let [of_x, of_y] = args.drives.axes(&x, &y)?;
+    let name = if x.name == y.name { x.name.clone() } else { format!("{} and {}", x.name, y.name) };
+    let axes = [(of_x, x.signals.motion), (of_y, y.signals.motion)];
+    let table = XyTable { name, axes, dt: args.drives.dt, connectors: !args.bare };
+    table.write(&args.fmu)?;
+    let step = args.drives.dt;
+    println!("{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s", args.fmu.display(), table.name);
     Ok(ExitCode::SUCCESS)
 }

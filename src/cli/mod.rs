@@ -20,6 +20,8 @@ pub struct Cli {
     pub command: Command,
 }
 
+mod drives;
+
 macro_rules! commands {
     ($($(#[$doc:meta])* $name:ident => $module:ident),* $(,)?) => {
         $(mod $module;)*

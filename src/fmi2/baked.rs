@@ -7,9 +7,9 @@
 #![allow(unsafe_code)]
 
 use crate::axis::Motion;
-use crate::variables::{COUNT, Starts};
 #[cfg(feature = "cli")]
-use crate::variables::{Causality, at};
+use crate::variables::Causality;
+use crate::variables::{COUNT, Model, Starts};
 
 /// What the block begins with, once in a library.
 const MARK: [u8; 16] = *b"eixo start value";
@@ -18,6 +18,7 @@ const MARK: [u8; 16] = *b"eixo start value";
 struct Block {
     mark: [u8; 16],
     motion: u64,
+    model: u64,
     values: [f64; COUNT],
 }
 
@@ -26,6 +27,7 @@ struct Block {
 static BLOCK: Block = Block {
     mark: MARK,
     motion: 0,
+    model: Model::Axis as u64,
     values: {
         let mut values = [0.0; COUNT];
         let mut i = 0;
@@ -56,7 +58,8 @@ pub(super) fn starts() -> Starts {
     // after the compiler saw them; every pattern of bits is a valid `u64` and `f64`.
     let block = unsafe { (&raw const BLOCK).read_volatile() };
     let motion = if block.motion == 1 { Motion::Linear } else { Motion::Rotary };
-    Starts { values: block.values, motion }
+    let model = if block.model == Model::Drive as u64 { Model::Drive } else { Model::Axis };
+    Starts { model, values: block.values, motion }
 }
 
 /// Writes start values into the bytes of a library, little-endian as all platforms of FMI 2.0 are.
@@ -72,10 +75,11 @@ pub fn bake(library: &mut [u8], starts: &Starts) -> Result<(), &'static str> {
     }
     let block =
         library.get_mut(at_ + MARK.len()..at_ + size_of::<Block>()).ok_or("its block of start values is cut off")?;
-    let (motion, values) = block.split_at_mut(8);
-    motion.copy_from_slice(&(starts.motion as u64).to_le_bytes());
+    let (head, values) = block.split_at_mut(16);
+    head[..8].copy_from_slice(&(starts.motion as u64).to_le_bytes());
+    head[8..].copy_from_slice(&(starts.model as u64).to_le_bytes());
     for (i, (slot, value)) in values.chunks_exact_mut(8).zip(starts.values).enumerate() {
-        debug_assert!(value == 0.0 || at(i).causality != Causality::Output);
+        debug_assert!(value == 0.0 || starts.model.at(i).causality != Causality::Output);
         slot.copy_from_slice(&value.to_le_bytes());
     }
     Ok(())

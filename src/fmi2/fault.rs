@@ -5,7 +5,7 @@ use std::fmt;
 use super::gate::Mode;
 use super::kernel::StepError;
 use crate::axis::ParameterError;
-use crate::variables::at;
+use crate::variables::Named;
 
 /// A refused call. Nothing has changed.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,11 +19,11 @@ pub(super) enum Fault {
     /// No variable of the type has this value reference.
     Reference { reference: u32, wanted: &'static str },
     /// The variable may not be set now.
-    NotSettable { index: usize, mode: Mode },
+    NotSettable { index: Named, mode: Mode },
     /// NaN or infinity.
-    NotFinite { index: usize, value: f64 },
+    NotFinite { index: Named, value: f64 },
     /// Out of the bounds of the variable.
-    Bounds { index: usize, value: f64 },
+    Bounds { index: Named, value: f64 },
     /// An argument that must be a finite number, greater than zero where said.
     Number { name: &'static str, value: f64, must_be: &'static str },
     /// A communication point that is not where the last step ended.
@@ -31,7 +31,7 @@ pub(super) enum Fault {
     /// A step past the end of the experiment.
     PastStop { end: f64, stop: f64 },
     /// No input, or no output, where one is needed.
-    Not { index: usize, what: &'static str },
+    Not { index: Named, what: &'static str },
     /// An order of derivatives that is not offered.
     Order(i32),
     /// A state that this instance did not make.
@@ -64,12 +64,12 @@ impl fmt::Display for Fault {
             Self::Null(name) => write!(f, "{name} is a null pointer"),
             Self::Reference { reference, wanted } => write!(f, "no {wanted} variable has value reference {reference}"),
             Self::NotSettable { index, mode } => {
-                let v = at(*index);
+                let v = index.variable();
                 write!(f, "{v} ({:?} {:?}) cannot be set {mode}", v.variability, v.causality)
             }
-            Self::NotFinite { index, value } => write!(f, "{} = {value}: it must be a finite number", at(*index)),
+            Self::NotFinite { index, value } => write!(f, "{} = {value}: it must be a finite number", index),
             Self::Bounds { index, value } => {
-                let v = at(*index);
+                let v = index.variable();
                 let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
                 write!(f, "{v} = {value:?}: it must be from {min:?} to {max:?}")
             }
@@ -78,7 +78,7 @@ impl fmt::Display for Fault {
                 write!(f, "currentCommunicationPoint = {given} s, but the last step ended at {expected} s")
             }
             Self::PastStop { end, stop } => write!(f, "the step ends at {end} s, after the stop time {stop} s"),
-            Self::Not { index, what } => write!(f, "{} is no {what}", at(*index)),
+            Self::Not { index, what } => write!(f, "{} is no {what}", index),
             Self::Order(order) => write!(f, "order {order}: only derivatives of order 1 are offered"),
             Self::UnknownState => f.write_str("this FMU state is none of this instance, or has been freed"),
             Self::Stored(why) => write!(f, "the serialised state cannot be used: {why}"),

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::abi::{Callbacks, Component, LOG_CATEGORIES, Status};
 use super::fault::Fault;
-use super::kernel::Kernel;
+use super::simulation::Simulation;
 use super::stored::Snapshot;
 use crate::variables::Starts;
 
@@ -131,7 +131,7 @@ pub(super) struct Instance {
 
 /// The instance itself.
 pub(super) struct Body {
-    pub kernel: Kernel,
+    pub kernel: Simulation,
     pub mode: Mode,
     pub set_up: bool,
     pub starts: Starts,
@@ -223,7 +223,7 @@ impl Body {
 /// Makes an instance and hands its ownership to the importer.
 pub(super) fn create(starts: Starts, log: Log) -> Component {
     let body = Body {
-        kernel: Kernel::new(&starts),
+        kernel: Simulation::new(&starts),
         mode: Mode::Instantiated,
         set_up: false,
         starts,

@@ -9,10 +9,10 @@ use std::fmt;
 use crate::axis::{Axis, ParameterError, State, Structure};
 use crate::effects::{Effect, Ramp, Reading, SensorHistory, TorqueHistory, effect_scope};
 use crate::scalar::{Dual, Scalar};
-use crate::variables::{Causality, Slot, Starts, Values, Variable, all, at, effect_of};
+use crate::variables::{Slot, Starts, Values, Variable, all, effect_of};
 
 /// Most internal steps in one communication step.
-const MOST_STEPS: f64 = 1e9;
+pub(super) const MOST_STEPS: f64 = 1e9;
 /// A communication step that is longer than whole internal steps by less than this share is cut into that many.
 const SLACK: f64 = 1e-6;
 /// Share of the internal step over which the output derivatives of an axis with effects look ahead.
@@ -481,11 +481,4 @@ impl<S: Scalar> Scene<'_, S> {
             _ => self.rho * self.reading().theta2,
         }
     }
-}
-
-/// Whether a directional derivative may be taken to a variable: the input always, during initialisation the parameters.
-#[must_use]
-pub fn may_be_known(index: usize, initialising: bool) -> bool {
-    let causality = at(index).causality;
-    causality == Causality::Input || (initialising && causality == Causality::Parameter)
 }

@@ -1,15 +1,17 @@
 //! The FMU: FMI 2.0 co-simulation, its C ABI and the simulation behind it.
 //!
-//! [`kernel`] is the simulation, safe and without a heap; [`stored`] its state as bytes; `gate` the one way in from C (null
+//! [`simulation`] is what runs, safe and without a heap: [`kernel`] the axis, [`drive`] the drive; [`stored`] is its state as bytes; `gate` the one way in from C (null
 //! check, call sequence, `catch_unwind`), and `exports` the functions of `fmi2Functions.h`. No globals: everything lives
 //! in the instance.
 
 mod abi;
 mod baked;
+pub mod drive;
 mod exports;
 mod fault;
 mod gate;
 pub mod kernel;
+pub mod simulation;
 pub mod stored;
 
 pub use abi::*;

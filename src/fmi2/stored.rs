@@ -4,7 +4,7 @@
 //! every number that is no `f64` is brought into its range as it is read.
 
 use super::gate::Mode;
-use super::kernel::Kernel;
+use super::simulation::Simulation;
 use crate::variables::{Starts, guid};
 
 const MAGIC: [u8; 8] = *b"eixoFMU1";
@@ -16,7 +16,7 @@ const CHECKSUM: usize = 8;
 #[derive(Debug, Clone, Copy)]
 pub struct Snapshot {
     /// The simulation.
-    pub kernel: Kernel,
+    pub kernel: Simulation,
     /// Where in the call sequence.
     pub mode: Mode,
     /// Whether the experiment has been set up.
@@ -30,7 +30,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 
 /// Number of bytes of a stored state.
 #[must_use]
-pub fn size(kernel: &Kernel) -> usize {
+pub fn size(kernel: &Simulation) -> usize {
     let mut count = 0;
     let mut copy = *kernel;
     copy.words(&mut |_| count += 1);
@@ -64,7 +64,7 @@ pub fn write(snapshot: &Snapshot, starts: &Starts, bytes: &mut [u8]) -> bool {
 /// # Errors
 /// Says what does not fit.
 pub fn read(starts: &Starts, bytes: &[u8]) -> Result<Snapshot, &'static str> {
-    let mut kernel = Kernel::new(starts);
+    let mut kernel = Simulation::new(starts);
     let size = size(&kernel);
     if bytes.len() != size {
         return Err("it has another length");

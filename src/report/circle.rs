@@ -136,12 +136,12 @@ fn table(f: &Findings) -> Table {
 fn drives(f: &Findings) -> Table {
     let mut table = Table::new("Loops of the drives", ["gain", "X", "Y"]);
     let rows: [(&str, Gain, &str); 6] = [
-        ("position gain kp", |s| s.kp, "1/s"),
-        ("velocity gain kv", |s| s.kv, "N.m.s/rad"),
-        ("integral gain ki", |s| s.ki, "N.m/rad"),
-        ("velocity fed forward", |s| s.velocity_forward, ""),
-        ("acceleration fed forward", |s| s.acceleration_forward, ""),
-        ("torque limit", |s| s.limit, "N.m"),
+        ("position gain kp", |s| s.gains.kp, "1/s"),
+        ("velocity gain kv", |s| s.gains.kv, "N.m.s/rad"),
+        ("integral gain ki", |s| s.gains.ki, "N.m/rad"),
+        ("velocity fed forward", |s| s.gains.velocity_forward, ""),
+        ("acceleration fed forward", |s| s.gains.acceleration_forward, ""),
+        ("torque limit", |s| s.gains.limit, "N.m"),
     ];
     for (name, value, unit) in rows {
         table.row(

@@ -3,8 +3,8 @@
 
 use std::fmt::{self, Write};
 
+use super::Type;
 use super::values::Starts;
-use super::{Type, all};
 
 /// FNV-1a with 128 bits (Fowler, Noll, Vo; draft-eastlake-fnv, section 6): a fingerprint, no protection.
 struct Fnv(u128);
@@ -73,7 +73,7 @@ impl fmt::Display for Guid {
 #[must_use]
 pub fn guid(starts: &Starts) -> Guid {
     let mut hash = Fnv::new();
-    for v in all() {
+    for v in starts.model.all() {
         // Writing into a hash cannot fail.
         let _ = write!(hash, "{v}\0{}\0{:?}\0{:?}\0{}\0", v.reference, v.causality, v.variability, v.unit);
         if let Type::Enumeration(kind) = v.kind {
@@ -84,7 +84,7 @@ pub fn guid(starts: &Starts) -> Guid {
         }
     }
     hash.bytes(&[starts.motion as u8]);
-    starts.values.iter().for_each(|v| hash.number(Some(*v)));
+    starts.values[..starts.model.count()].iter().for_each(|v| hash.number(Some(*v)));
     Guid(hash.0)
 }
 

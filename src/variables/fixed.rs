@@ -83,25 +83,8 @@ const fn weight(name: &'static str, start: f64, doc: &'static str) -> Variable {
 
 const PAPER: Parameters = Parameters::PAPER;
 
-macro_rules! slots {
-    ($($slot:ident = $variable:expr;)*) => {
-        /// The fixed variables by name; the number is the index.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        #[repr(usize)]
-        #[allow(missing_docs)]
-        pub enum Slot { $($slot),* }
-
-        impl Slot {
-            /// All, in order.
-            pub const ALL: &[Self] = &[$(Self::$slot),*];
-        }
-
-        /// The fixed variables, in order; each carries its index as value reference.
-        pub const FIXED: &[Variable] = &[$(Variable { reference: Slot::$slot as u32, ..$variable }),*];
-    };
-}
-
 slots! {
+    Slot in FIXED:
     Torque = Variable {
         name: "T",
         unit: "N.m",

@@ -1,4 +1,5 @@
-//! THE variable table of the FMU: value references, causality, units, bounds, start values, dependencies.
+//! THE variable tables of the FMUs: value references, causality, units, bounds, start values, dependencies. [`Model`] is
+//! the way to the table of either model; the functions of this module are those of the axis.
 //!
 //! Nothing lists the variables twice. The C ABI finds them here by their value reference, `modelDescription.xml` and the
 //! documentation are written from here, and the parameters of the effects come from [`EFFECTS`] themselves.
@@ -7,16 +8,39 @@
 //! is what importers hold: the fixed variables carry their index, parameter `j` of effect `i` carries `256*(i + 1) + j`,
 //! so that neither a new effect nor a new parameter of one moves the others.
 
+/// A list of variables whose index is their value reference, and the enum of their names.
+macro_rules! slots {
+    ($slots:ident in $table:ident: $($slot:ident = $variable:expr;)*) => {
+        /// The variables of the list by name; the number is the index.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(usize)]
+        #[allow(missing_docs)]
+        pub enum $slots { $($slot),* }
+
+        impl $slots {
+            /// All, in order.
+            pub const ALL: &[Self] = &[$(Self::$slot),*];
+        }
+
+        /// The list, in order; each carries its index as value reference.
+        pub const $table: &[Variable] = &[$(Variable { reference: $slots::$slot as u32, ..$variable }),*];
+    };
+}
+
+mod drive;
 mod fingerprint;
 mod fixed;
+mod model;
 mod values;
 
 use std::fmt;
 
 use crate::effects::{EFFECTS, Effect, PARAMETERS, Place};
 
+pub use drive::{DRIVE, DriveSlot, NO_LIMIT};
 pub use fingerprint::{Guid, guid};
 pub use fixed::{FIXED, Slot};
+pub use model::{Model, Named};
 pub use values::{Starts, Values};
 
 /// Number of variables.

@@ -2,15 +2,21 @@
 
 use std::array;
 
-use super::{COUNT, FIXED, Slot, all};
+use super::{COUNT, FIXED, Model, Slot, all};
+#[cfg(feature = "cli")]
+use super::{DriveSlot, NO_LIMIT};
 use crate::axis::{Motion, Parameters, Scheme, Structure};
+#[cfg(feature = "cli")]
+use crate::drive::Gains;
 use crate::effects::{PARAMETERS, Settings};
 use crate::scalar::Scalar;
 
 /// Start values of every variable (zero for outputs), as an FMU carries them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Starts {
-    /// One a variable, in the order of the table.
+    /// Of which model.
+    pub model: Model,
+    /// One a variable, in the order of the model's table; what is left over is zero.
     pub values: [f64; COUNT],
     /// Units of the axis.
     pub motion: Motion,
@@ -23,7 +29,7 @@ impl Default for Starts {
         for (value, variable) in values.iter_mut().zip(all()) {
             *value = variable.start.unwrap_or(0.0);
         }
-        Self { values, motion: Motion::Rotary }
+        Self { model: Model::Axis, values, motion: Motion::Rotary }
     }
 }
 
@@ -41,6 +47,26 @@ impl Starts {
         put(Slot::Rho, parameters.rho);
         put(Slot::Structure, if structure == Structure::Rigid { 2.0 } else { 1.0 });
         starts.values[FIXED.len()..].copy_from_slice(effects.flat());
+        starts
+    }
+
+    /// The start values of a drive with a sampling interval of `dt` s, for an axis with a lead of `rho`.
+    #[must_use]
+    pub fn drive(gains: &Gains, rho: f64, dt: f64, motion: Motion) -> Self {
+        let mut starts = Self { model: Model::Drive, values: [0.0; COUNT], motion };
+        for (slot, value) in [
+            (DriveSlot::Kp, gains.kp),
+            (DriveSlot::Kv, gains.kv),
+            (DriveSlot::Ki, gains.ki),
+            (DriveSlot::VelocityForward, gains.velocity_forward),
+            (DriveSlot::AccelerationForward, gains.acceleration_forward),
+            (DriveSlot::Inertia, gains.inertia),
+            (DriveSlot::Limit, gains.limit.min(NO_LIMIT)),
+            (DriveSlot::Rho, rho),
+            (DriveSlot::SampleTime, dt),
+        ] {
+            starts.values[slot as usize] = value;
+        }
         starts
     }
 }

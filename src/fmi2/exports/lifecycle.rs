@@ -7,7 +7,7 @@ use super::super::abi::{Callbacks, Component, LOG_CATEGORIES, Status, Text};
 use super::super::baked;
 use super::super::fault::Fault;
 use super::super::gate::{self, Function, Log, Mode};
-use super::super::kernel::Kernel;
+use super::super::simulation::Simulation;
 use super::{array, call, typed};
 use crate::variables::guid;
 
@@ -152,7 +152,7 @@ pub unsafe extern "C" fn fmi2Terminate(c: Component) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Reset(c: Component) -> c_int {
     call!(c, fmi2Reset, |body| {
-        body.kernel = Kernel::new(&body.starts);
+        body.kernel = Simulation::new(&body.starts);
         body.mode = Mode::Instantiated;
         body.set_up = false;
         Ok(Status::Ok)

@@ -5,48 +5,50 @@ use std::ffi::{c_int, c_uint};
 use super::super::abi::{Component, Status, Text};
 use super::super::fault::Fault;
 use super::super::gate::{self, Body, Function, Mode};
-use super::super::kernel::may_be_known;
 use super::{array, array_mut, call, typed};
-use crate::variables::{Causality, Slot, Type, Variability, at, index_of};
+use crate::variables::{Causality, Model, Named, Type, Variability};
 
 /// Index of the Real variable, or of the Enumeration, with a value reference.
 #[inline]
-fn resolve(reference: c_uint, real: bool) -> Result<usize, Fault> {
+fn resolve(model: Model, reference: c_uint, real: bool) -> Result<usize, Fault> {
     let wanted = if real { "Real" } else { "Integer or Enumeration" };
-    // The fixed variables up to the structure are Reals with their index as reference: no table needed.
-    if real && reference < Slot::Structure as u32 {
+    // The head of the table needs no look into it.
+    if real && (reference as usize) < model.plain() {
         return Ok(reference as usize);
     }
-    index_of(reference).filter(|&i| (at(i).kind == Type::Real) == real).ok_or(Fault::Reference { reference, wanted })
+    let fits = |&i: &usize| (model.at(i).kind == Type::Real) == real;
+    model.index_of(reference).filter(fits).ok_or(Fault::Reference { reference, wanted })
 }
 
 /// Checks that a value may be set now.
 fn settable(body: &Body, index: usize, value: f64) -> Result<(), Fault> {
-    let v = at(index);
+    let named = Named(body.kernel.model(), index);
+    let v = named.variable();
     let allowed = match v.causality {
         Causality::Input => true,
         Causality::Output => false,
         Causality::Parameter => body.mode != Mode::Step || v.variability == Variability::Tunable,
     };
     if !allowed {
-        return Err(Fault::NotSettable { index, mode: body.mode });
+        return Err(Fault::NotSettable { index: named, mode: body.mode });
     }
     if !value.is_finite() {
-        return Err(Fault::NotFinite { index, value });
+        return Err(Fault::NotFinite { index: named, value });
     }
     if v.min.is_some_and(|m| value < m) || v.max.is_some_and(|m| value > m) {
-        return Err(Fault::Bounds { index, value });
+        return Err(Fault::Bounds { index: named, value });
     }
     Ok(())
 }
 
 /// Sets values: all, or none of them where one is refused.
 fn set(body: &mut Body, references: &[c_uint], real: bool, value: impl Fn(usize) -> f64) -> Result<Status, Fault> {
+    let model = body.kernel.model();
     for (i, &reference) in references.iter().enumerate() {
-        settable(body, resolve(reference, real)?, value(i))?;
+        settable(body, resolve(model, reference, real)?, value(i))?;
     }
     for (i, &reference) in references.iter().enumerate() {
-        body.kernel.set(resolve(reference, real)?, value(i));
+        body.kernel.set(resolve(model, reference, real)?, value(i));
     }
     Ok(Status::Ok)
 }
@@ -64,8 +66,9 @@ pub unsafe extern "C" fn fmi2GetReal(c: Component, vr: *const c_uint, count: usi
     call!(c, fmi2GetReal, |body| {
         // SAFETY: the importer's.
         let (vr, value) = unsafe { (array(vr, count, "vr")?, array_mut(value, count, "value")?) };
+        let model = body.kernel.model();
         for (out, &reference) in value.iter_mut().zip(vr) {
-            *out = body.kernel.get(resolve(reference, true)?)?;
+            *out = body.kernel.get(resolve(model, reference, true)?)?;
         }
         Ok(Status::Ok)
     })
@@ -76,8 +79,9 @@ pub unsafe extern "C" fn fmi2GetInteger(c: Component, vr: *const c_uint, count: 
     call!(c, fmi2GetInteger, |body| {
         // SAFETY: the importer's.
         let (vr, value) = unsafe { (array(vr, count, "vr")?, array_mut(value, count, "value")?) };
+        let model = body.kernel.model();
         for (out, &reference) in value.iter_mut().zip(vr) {
-            *out = body.kernel.get(resolve(reference, false)?)? as c_int;
+            *out = body.kernel.get(resolve(model, reference, false)?)? as c_int;
         }
         Ok(Status::Ok)
     })
@@ -149,24 +153,25 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
             unsafe { (array(unknown, unknowns, "vUnknown_ref")?, array(known, knowns, "vKnown_ref")?) };
         // SAFETY: the importer's.
         let (seed, result) = unsafe { (array(seed, knowns, "dvKnown")?, array_mut(result, unknowns, "dvUnknown")?) };
+        let model = body.kernel.model();
         for &reference in unknown {
-            let index = resolve(reference, true)?;
-            if at(index).causality != Causality::Output {
-                return Err(Fault::Not { index, what: "output" });
+            let index = resolve(model, reference, true)?;
+            if model.at(index).causality != Causality::Output {
+                return Err(Fault::Not { index: Named(model, index), what: "output" });
             }
         }
         let initialising = body.mode == Mode::Initialization;
         for (&reference, &value) in known.iter().zip(seed) {
-            let index = resolve(reference, true)?;
-            if !may_be_known(index, initialising) {
-                return Err(Fault::Not { index, what: "known of the outputs here" });
+            let index = resolve(model, reference, true)?;
+            if !model.may_be_known(index, initialising) {
+                return Err(Fault::Not { index: Named(model, index), what: "known of the outputs here" });
             }
             if !value.is_finite() {
-                return Err(Fault::NotFinite { index, value });
+                return Err(Fault::NotFinite { index: Named(model, index), value });
             }
         }
         // Every reference has just been resolved once.
-        let index = |reference: c_uint| resolve(reference, true).unwrap_or(0);
+        let index = |reference: c_uint| resolve(model, reference, true).unwrap_or(0);
         let seeds = known.iter().zip(seed).map(|(&reference, &value)| (index(reference), value));
         body.kernel.directional(seeds, |derivative| {
             for (out, &reference) in result.iter_mut().zip(unknown) {
@@ -190,21 +195,21 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
         let (vr, order) = unsafe { (array(vr, count, "vr")?, array(order, count, "order")?) };
         // SAFETY: the importer's.
         let value = unsafe { array(value, count, "value") }?;
+        let model = body.kernel.model();
         for ((&reference, &order), &value) in vr.iter().zip(order).zip(value) {
-            let index = resolve(reference, true)?;
-            if at(index).causality != Causality::Input {
-                return Err(Fault::Not { index, what: "input" });
+            let index = resolve(model, reference, true)?;
+            if model.at(index).causality != Causality::Input {
+                return Err(Fault::Not { index: Named(model, index), what: "input" });
             }
             if order != 1 {
                 return Err(Fault::Order(order));
             }
             if !value.is_finite() {
-                return Err(Fault::NotFinite { index, value });
+                return Err(Fault::NotFinite { index: Named(model, index), value });
             }
         }
-        // There is one input.
-        if let Some(&last) = value.last() {
-            body.kernel.set_rate(last);
+        for (&reference, &value) in vr.iter().zip(value) {
+            body.kernel.set_rate(resolve(model, reference, true)?, value);
         }
         Ok(Status::Ok)
     })
@@ -223,10 +228,11 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
         let (vr, order) = unsafe { (array(vr, count, "vr")?, array(order, count, "order")?) };
         // SAFETY: the importer's.
         let value = unsafe { array_mut(value, count, "value") }?;
+        let model = body.kernel.model();
         for ((&reference, &order), out) in vr.iter().zip(order).zip(value) {
-            let index = resolve(reference, true)?;
-            if at(index).causality != Causality::Output {
-                return Err(Fault::Not { index, what: "output" });
+            let index = resolve(model, reference, true)?;
+            if model.at(index).causality != Causality::Output {
+                return Err(Fault::Not { index: Named(model, index), what: "output" });
             }
             if order != 1 {
                 return Err(Fault::Order(order));

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::units;
 use crate::axis::Motion;
 use crate::effects::{EFFECTS, Place};
-use crate::variables::{Causality, FIXED, Starts, Type, Variable, at, first_of};
+use crate::variables::{Causality, FIXED, Model, Starts, Type, Variable, at, first_of};
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;\
 color:#1a1a1a;background:#fff}table{border-collapse:collapse;width:100%;margin:1rem 0}th,td{text-align:left;\
@@ -21,8 +21,15 @@ x2 = rho*theta2";
 const NEWMARK: &str = "theta+ = theta + h*omega + h^2*((1/2 - alpha)*a + alpha*a+)\n\
 omega+ = omega + h*((1 - delta)*a + delta*a+)";
 
-/// The page for an axis of that name.
+const LAW: &str = "w* = kp*(r - theta) + velocity_forward*r'\n\
+T  = kv*(w* - omega) + ki*int(w* - omega) + acceleration_forward*inertia*r'',   |T| <= limit";
+
+/// The page for a model of that name.
 pub(super) fn page(name: &str, starts: &Starts) -> String {
+    let body = match starts.model {
+        Model::Axis => axis(name, starts),
+        Model::Drive => drive(name, starts),
+    };
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -32,41 +39,69 @@ pub(super) fn page(name: &str, starts: &Starts) -> String {
                 title { (name) }
                 style { (PreEscaped(STYLE)) }
             }
-            body {
-                h1 { (name) }
-                p {
-                    "The drive axis of a machine tool as an FMI 2.0 co-simulation unit: the inertia of motor and screw and \
-                     the inertia of the table, joined by a spring and a damper, with effects that are all "
-                    @if starts.values[FIXED.len()..] == Starts::default().values[FIXED.len()..] { "off" } @else { "as set below" }
-                    " at the start."
-                }
-                img src="model.png" alt="Motor and screw, coupling with spring and damper, table";
-                (equations())
-                (stepping())
-                h2 { "Variables" }
-                (table(FIXED.iter().enumerate().map(|(i, v)| (*v, starts.values[i])), starts.motion))
-                h2 { "Effects" }
-                p {
-                    "An effect is on when one of its sizes differs from the value given here as off. All parameters of an \
-                     effect may be changed between steps."
-                }
-                @for place in Place::ALL {
-                    h3 { "At the " (place.as_str()) }
-                    @for &effect in EFFECTS.iter().filter(|e| e.info().place == place) {
-                        @let info = effect.info();
-                        h4 id=(info.id) { code { (info.id) } ": " (info.title) }
-                        pre { (info.equation) }
-                        (table((0..info.parameters.len()).map(|j| {
-                            let index = first_of(effect) + j;
-                            (at(index), starts.values[index])
-                        }), starts.motion))
-                        p { small { (info.reference) } }
-                    }
-                }
-            }
+            body { (body) }
         }
     }
     .into_string()
+}
+
+fn drive(name: &str, starts: &Starts) -> Markup {
+    html! {
+        h1 { (name) }
+        p {
+            "The drive of a machine tool's axis as an FMI 2.0 co-simulation unit: it reads where the table shall be and where the encoders \
+             say that it is, and commands a torque."
+        }
+        h2 { "Equations" }
+        pre { (LAW) }
+        p {
+            "r = reference/rho is the reference as an angle; r' and r'' are its backward differences over the samples. The integral \
+             does not grow while it would drive the limited torque further into its limit."
+        }
+        h2 { "Steps" }
+        p {
+            "The drive samples its inputs at the start and after each " code { "sample_time" } ", whatever the communication step. What it \
+             computes is put out when the next sample is due, which is the time that a drive needs to compute, and held from there; up to \
+             then the torque is zero. Make the communication step the sampling interval, or a whole part of it."
+        }
+        h2 { "Variables" }
+        (table(starts.model.all().enumerate().map(|(i, v)| (v, starts.values[i])), starts.motion))
+    }
+}
+
+fn axis(name: &str, starts: &Starts) -> Markup {
+    html! {
+        h1 { (name) }
+        p {
+            "The drive axis of a machine tool as an FMI 2.0 co-simulation unit: the inertia of motor and screw and \
+             the inertia of the table, joined by a spring and a damper, with effects that are all "
+            @if starts.values[FIXED.len()..] == Starts::default().values[FIXED.len()..] { "off" } @else { "as set below" }
+            " at the start."
+        }
+        img src="model.png" alt="Motor and screw, coupling with spring and damper, table";
+        (equations())
+        (stepping())
+        h2 { "Variables" }
+        (table(FIXED.iter().enumerate().map(|(i, v)| (*v, starts.values[i])), starts.motion))
+        h2 { "Effects" }
+        p {
+            "An effect is on when one of its sizes differs from the value given here as off. All parameters of an \
+             effect may be changed between steps."
+        }
+        @for place in Place::ALL {
+            h3 { "At the " (place.as_str()) }
+            @for &effect in EFFECTS.iter().filter(|e| e.info().place == place) {
+                @let info = effect.info();
+                h4 id=(info.id) { code { (info.id) } ": " (info.title) }
+                pre { (info.equation) }
+                (table((0..info.parameters.len()).map(|j| {
+                    let index = first_of(effect) + j;
+                    (at(index), starts.values[index])
+                }), starts.motion))
+                p { small { (info.reference) } }
+            }
+        }
+    }
 }
 
 fn equations() -> Markup {

@@ -4,6 +4,7 @@
 //! variable table. The archive is deterministic: the same axis gives the same bytes.
 
 mod documentation;
+mod table;
 mod units;
 mod xml;
 
@@ -13,9 +14,12 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
+use crate::drive::Gains;
 use crate::fmi2::bake;
-use crate::trace::{Machine, TraceError, write_text};
-use crate::variables::Starts;
+use crate::trace::{Machine, Motion, TraceError, write_text};
+use crate::variables::{Model, Starts};
+
+pub use table::XyTable;
 
 /// A lean shared library.
 struct Library {
@@ -28,7 +32,7 @@ struct Library {
 
 /// One a platform, from `build.rs`; the program's own first.
 static LIBRARIES: &[Library] = &include!(concat!(env!("OUT_DIR"), "/libraries.rs"));
-/// The picture of the model, from `scripts/draw_model.py`.
+/// The picture of the axis, from `scripts/draw_model.py`.
 static PICTURE: &[u8] = include_bytes!("../../../modelDescription/model.png");
 static LICENSE: &str = include_str!("../../../LICENSE");
 /// Name of the model where no machine gives one.
@@ -86,15 +90,27 @@ impl Package {
     /// [`PackageError::Bounds`] when one of its values is out of the bounds of the FMU's variable.
     pub fn of(machine: &Machine) -> Result<Self, PackageError> {
         let starts = Starts::of(&machine.parameters, machine.structure, &machine.effects, machine.signals.motion);
-        for (index, &value) in starts.values.iter().enumerate() {
-            let v = crate::variables::at(index);
+        Self::checked(if machine.name.trim().is_empty() { NAME } else { &machine.name }, starts)
+    }
+
+    /// The FMU with these start values, if all lie within their bounds.
+    fn checked(name: &str, starts: Starts) -> Result<Self, PackageError> {
+        for (index, &value) in starts.values.iter().enumerate().take(starts.model.count()) {
+            let v = starts.model.at(index);
             let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
             if !(min <= value && value <= max) {
                 return Err(PackageError::Bounds { variable: v.to_string(), value, min, max });
             }
         }
-        let name = if machine.name.trim().is_empty() { NAME.to_owned() } else { machine.name.clone() };
-        Ok(Self { name, starts })
+        Ok(Self { name: name.to_owned(), starts })
+    }
+
+    /// The FMU of a drive with a sampling interval of `dt` s, for an axis with a lead of `rho`.
+    ///
+    /// # Errors
+    /// [`PackageError::Bounds`] when a gain is out of the bounds of the FMU's variable.
+    pub fn drive(name: &str, gains: &Gains, rho: f64, dt: f64, motion: Motion) -> Result<Self, PackageError> {
+        Self::checked(name, Starts::drive(gains, rho, dt, motion))
     }
 
     /// `modelDescription.xml`.
@@ -129,25 +145,22 @@ impl Package {
     /// # Errors
     /// See [`PackageError`].
     pub fn archive(&self) -> Result<Vec<u8>, PackageError> {
+        let model = self.starts.model;
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-        let mut add = |name: &str, bytes: &[u8], permissions: u32| -> Result<(), PackageError> {
-            let options = SimpleFileOptions::default()
-                .compression_method(CompressionMethod::Deflated)
-                .last_modified_time(DateTime::default())
-                .unix_permissions(permissions);
-            zip.start_file(name, options)?;
-            zip.write_all(bytes)?;
-            Ok(())
-        };
-        add("modelDescription.xml", &self.model_description()?, 0o644)?;
-        add("model.png", PICTURE, 0o644)?;
-        for library in LIBRARIES {
-            let name = format!("binaries/{}/{}.{}", library.platform, xml::MODEL_IDENTIFIER, library.extension);
-            add(&name, &self.baked(library)?, 0o755)?;
+        add(&mut zip, "modelDescription.xml", &self.model_description()?, 0o644)?;
+        if model == Model::Axis {
+            add(&mut zip, "model.png", PICTURE, 0o644)?;
         }
-        add("documentation/index.html", documentation::page(&self.name, &self.starts).as_bytes(), 0o644)?;
-        add("documentation/model.png", PICTURE, 0o644)?;
-        add("documentation/licenses/license.txt", LICENSE.as_bytes(), 0o644)?;
+        for library in LIBRARIES {
+            let name = format!("binaries/{}/{}.{}", library.platform, xml::identifier(model), library.extension);
+            add(&mut zip, &name, &self.baked(library)?, 0o755)?;
+        }
+        let page = documentation::page(&self.name, &self.starts);
+        add(&mut zip, "documentation/index.html", page.as_bytes(), 0o644)?;
+        if model == Model::Axis {
+            add(&mut zip, "documentation/model.png", PICTURE, 0o644)?;
+        }
+        add(&mut zip, "documentation/licenses/license.txt", LICENSE.as_bytes(), 0o644)?;
         Ok(zip.finish()?.into_inner())
     }
 
@@ -158,6 +171,17 @@ impl Package {
     pub fn write(&self, path: &Path) -> Result<(), PackageError> {
         Ok(write_text(path, &self.archive()?)?)
     }
+}
+
+/// Adds a file to an archive.
+fn add(zip: &mut ZipWriter<Cursor<Vec<u8>>>, name: &str, bytes: &[u8], permissions: u32) -> Result<(), PackageError> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(permissions);
+    zip.start_file(name, options)?;
+    zip.write_all(bytes)?;
+    Ok(())
 }
 
 #[cfg(test)]

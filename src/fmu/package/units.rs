@@ -1,6 +1,9 @@
 //! Units of the model description: their SI base units, display units, and the linear analogue of a rotary unit.
 
 use std::borrow::Cow;
+use std::io;
+
+use quick_xml::Writer;
 
 use crate::axis::Motion;
 
@@ -65,6 +68,18 @@ pub(super) fn base(unit: &str) -> Option<[i32; 4]> {
         }
     }
     Some(sum)
+}
+
+/// The base unit of a unit as an element.
+pub(super) fn base_element(xml: &mut Writer<Vec<u8>>, element: &str, unit: &str) -> io::Result<()> {
+    let mut base = xml.create_element(element);
+    for (symbol, exponent) in ["kg", "m", "s", "rad"].into_iter().zip(self::base(unit).unwrap_or_default()) {
+        if exponent != 0 {
+            base = base.with_attribute((symbol, exponent.to_string().as_str()));
+        }
+    }
+    base.write_empty()?;
+    Ok(())
 }
 
 #[cfg(test)]

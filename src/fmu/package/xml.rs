@@ -8,15 +8,25 @@ use quick_xml::events::{BytesDecl, Event};
 
 use super::units;
 use crate::fmi2::LOG_CATEGORIES;
-use crate::variables::{
-    COUNT, Causality, Enumeration, FIXED, Slot, Starts, Type, Variability, Variable, all, at, depends_at_start,
-    depends_on_input, guid,
-};
+use crate::variables::{Causality, Enumeration, FIXED, Model, Starts, Type, Variability, Variable, guid};
 
 type Xml = Writer<Vec<u8>>;
 
 /// Name of the binary, and prefix of nothing: the functions are exported as the standard names them.
-pub(super) const MODEL_IDENTIFIER: &str = "eixo";
+pub(super) const fn identifier(model: Model) -> &'static str {
+    match model {
+        Model::Axis => "eixo",
+        Model::Drive => "eixo_drive",
+    }
+}
+
+const fn description(model: Model) -> &'static str {
+    match model {
+        Model::Axis => "Drive axis of a machine tool: motor and table joined by spring and damper, with effects",
+        Model::Drive => "Drive of a machine tool's axis: position loop, velocity loop, feed-forward, torque limit",
+    }
+}
+
 /// Samples of the paper's simulation (Table 1), at its own step.
 const SAMPLES: f64 = 2048.0;
 
@@ -29,7 +39,7 @@ pub(super) fn document(name: &str, starts: &Starts) -> io::Result<Vec<u8>> {
             ("fmiVersion", "2.0"),
             ("modelName", name),
             ("guid", guid(starts).to_string().as_str()),
-            ("description", "Drive axis of a machine tool: motor and table joined by spring and damper, with effects"),
+            ("description", description(starts.model)),
             ("author", "the eixo authors"),
             ("version", env!("CARGO_PKG_VERSION")),
             ("license", env!("CARGO_PKG_LICENSE")),
@@ -45,18 +55,21 @@ pub(super) fn document(name: &str, starts: &Starts) -> io::Result<Vec<u8>> {
 fn content(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
     xml.create_element("CoSimulation")
         .with_attributes([
-            ("modelIdentifier", MODEL_IDENTIFIER),
+            ("modelIdentifier", identifier(starts.model)),
             ("canHandleVariableCommunicationStepSize", "true"),
             ("canInterpolateInputs", "true"),
             ("maxOutputDerivativeOrder", "1"),
             ("canNotUseMemoryManagementFunctions", "true"),
             ("canGetAndSetFMUstate", "true"),
             ("canSerializeFMUstate", "true"),
-            ("providesDirectionalDerivative", "true"),
+            // A drive puts out what earlier inputs made: no derivative is of use.
+            ("providesDirectionalDerivative", if starts.model == Model::Axis { "true" } else { "false" }),
         ])
         .write_empty()?;
     xml.create_element("UnitDefinitions").write_inner_content(|xml| unit_definitions(xml, starts))?;
-    xml.create_element("TypeDefinitions").write_inner_content(type_definitions)?;
+    if starts.model == Model::Axis {
+        xml.create_element("TypeDefinitions").write_inner_content(type_definitions)?;
+    }
     xml.create_element("LogCategories").write_inner_content(|xml| {
         for (name, description) in LOG_CATEGORIES {
             xml.create_element("Category")
@@ -65,7 +78,7 @@ fn content(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
         }
         Ok(())
     })?;
-    let step = starts.values[Slot::DtInternal as usize];
+    let step = starts.values[starts.model.internal_step()];
     xml.create_element("DefaultExperiment")
         .with_attributes([
             ("startTime", "0"),
@@ -74,12 +87,12 @@ fn content(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
         ])
         .write_empty()?;
     xml.create_element("ModelVariables").write_inner_content(|xml| {
-        for (index, v) in all().enumerate() {
+        for (index, v) in starts.model.all().enumerate() {
             variable(xml, &v, starts.values[index], starts)?;
         }
         Ok(())
     })?;
-    xml.create_element("ModelStructure").write_inner_content(structure)?;
+    xml.create_element("ModelStructure").write_inner_content(|xml| structure(xml, starts.model))?;
     Ok(())
 }
 
@@ -91,19 +104,13 @@ fn number(value: f64) -> String {
 
 fn unit_definitions(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
     let mut names: Vec<Cow<'static, str>> =
-        all().map(|v| units::of(v.unit, starts.motion)).filter(|u| !u.is_empty()).collect();
+        starts.model.all().map(|v| units::of(v.unit, starts.motion)).filter(|u| !u.is_empty()).collect();
     names.sort_unstable();
     names.dedup();
     for name in names {
         let name = name.as_ref();
         xml.create_element("Unit").with_attribute(("name", name)).write_inner_content(|xml| {
-            let mut base = xml.create_element("BaseUnit");
-            for (symbol, exponent) in ["kg", "m", "s", "rad"].into_iter().zip(units::base(name).unwrap_or_default()) {
-                if exponent != 0 {
-                    base = base.with_attribute((symbol, exponent.to_string().as_str()));
-                }
-            }
-            base.write_empty()?;
+            units::base_element(xml, "BaseUnit", name)?;
             if let Some(display) = units::display(name) {
                 xml.create_element("DisplayUnit")
                     .with_attributes([("name", display.name), ("factor", number(display.factor).as_str())])
@@ -199,10 +206,10 @@ fn variable(xml: &mut Xml, v: &Variable, start: f64, starts: &Starts) -> io::Res
     Ok(())
 }
 
-fn structure(xml: &mut Xml) -> io::Result<()> {
-    let outputs = || (0..COUNT).filter(|&i| at(i).causality == Causality::Output);
+fn structure(xml: &mut Xml, model: Model) -> io::Result<()> {
+    let outputs = || (0..model.count()).filter(|&i| model.at(i).causality == Causality::Output);
     let unknown = |xml: &mut Xml, output: usize, known: &dyn Fn(usize) -> bool| -> io::Result<()> {
-        let indices: Vec<String> = (0..COUNT).filter(|&i| known(i)).map(|i| (i + 1).to_string()).collect();
+        let indices: Vec<String> = (0..model.count()).filter(|&i| known(i)).map(|i| (i + 1).to_string()).collect();
         xml.create_element("Unknown")
             .with_attributes([
                 ("index", (output + 1).to_string().as_str()),
@@ -211,10 +218,9 @@ fn structure(xml: &mut Xml) -> io::Result<()> {
             .write_empty()?;
         Ok(())
     };
-    xml.create_element("Outputs").write_inner_content(|xml| {
-        outputs().try_for_each(|o| unknown(xml, o, &|i| i == Slot::Torque as usize && depends_on_input(o)))
-    })?;
+    xml.create_element("Outputs")
+        .write_inner_content(|xml| outputs().try_for_each(|o| unknown(xml, o, &|i| model.depends_on_input(o, i))))?;
     xml.create_element("InitialUnknowns")
-        .write_inner_content(|xml| outputs().try_for_each(|o| unknown(xml, o, &|i| depends_at_start(o, i))))?;
+        .write_inner_content(|xml| outputs().try_for_each(|o| unknown(xml, o, &|i| model.depends_at_start(o, i))))?;
     Ok(())
 }
