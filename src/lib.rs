@@ -1,7 +1,7 @@
 //! `eixo`: the drive axis of a machine tool as an FMI 2.0 co-simulation FMU, its identification from logged traces,
 //! and the diagnosis of the gap between the model and the machine.
 //!
-//! Imports run downward only: `cli -> report -> diagnose -> identify -> trace -> axis -> effects`,
+//! Imports run downward only: `cli -> fleet -> report -> diagnose -> identify -> trace -> axis -> effects`,
 //! `cli -> fmu -> variables -> axis` and `fmi2 -> variables`.
 
 pub mod axis;
@@ -17,6 +17,8 @@ pub mod circle;
 pub mod cli;
 #[cfg(feature = "cli")]
 pub mod diagnose;
+#[cfg(feature = "cli")]
+pub mod fleet;
 #[cfg(feature = "cli")]
 pub mod fmu;
 #[cfg(feature = "cli")]

@@ -148,7 +148,7 @@ fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::
     let mut machine = Machine { name: "a machine with hidden friction".to_owned(), parameters, ..Machine::default() };
     write_text(&file("nominal.toml"), machine.to_toml().as_bytes())?;
 
-    let (record, noise) = super::diagnose::record(&file("machine.csv"), &machine)?;
+    let super::diagnose::Recorded { record, noise, .. } = super::diagnose::record(&file("machine.csv"), &machine)?;
     let case = Case {
         machine: machine.name.clone(),
         nominal: Model { parameters: machine.parameters, structure: machine.structure, effects: machine.effects },

@@ -6,10 +6,14 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
 
+use super::many::Many;
 use crate::axis::Structure;
-use crate::diagnose::{CHANNELS, Case, Model, Replay, NoiseEstimate, Record, diagnose, estimate_noise};
+use crate::diagnose::{CHANNELS, Case, Model, NoiseEstimate, Outcome, Record, Replay, diagnose, estimate_noise};
 use crate::effects::{EFFECTS, Effect};
+use crate::fleet::{Found, Tracked};
+use crate::identify::parameters::{NAMES, units as base_units};
 use crate::report::diagnose::{Findings, report, short};
 use crate::report::format::{Medium, number};
 use crate::report::{html, terminal};
@@ -20,28 +24,100 @@ use crate::trace::{Machine, Signal, Trace, load, write_text};
 
 /// Arguments of `eixo diagnose`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: eixo diagnose log.csv --axis axis.toml --holdout other.csv --json diagnosis.json")]
+#[command(after_help = "Examples:
+  eixo diagnose log.csv --axis axis.toml --holdout other.csv --json diagnosis.json --report diagnosis.html
+  eixo diagnose machines/ 'archive/*.parquet' --output diagnoses")]
 pub struct Args {
-    /// Measured trace (CSV)
-    trace: PathBuf,
-    /// The nominal axis: parameters, known effects, columns of the log
+    /// Measured traces (CSV, Parquet, MATLAB 5); with --output also folders and patterns
+    #[arg(required = true)]
+    traces: Vec<PathBuf>,
+    /// The nominal axis: parameters, known effects, columns of the log. With --output and without it, each trace's own is the
+    /// axis.toml in its folder or the nearest one above
     #[arg(long)]
-    axis: PathBuf,
+    axis: Option<PathBuf>,
     /// A second trace that the fits never see; without it the last third is held out
-    #[arg(long)]
+    #[arg(long, conflicts_with = "output")]
     holdout: Option<PathBuf>,
     /// Effects that must not be named, separated by commas
     #[arg(long, value_delimiter = ',', value_name = "EFFECT")]
     without: Vec<String>,
     /// Write the diagnosis as JSON (schema eixo.diagnosis/1)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
     json: Option<PathBuf>,
     /// Write the report as one HTML page
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
     report: Option<PathBuf>,
     /// Write the improved model as an FMU, and run it on held-out data through the import host
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
     fmu: Option<PathBuf>,
+    #[command(flatten)]
+    many: Many,
+}
+
+/// What the summary of many traces says of each beside its parameters.
+const FACTS: [&str; 11] = [
+    "verdict",
+    "place",
+    "cause",
+    "probability",
+    "closure",
+    "closure_low",
+    "closure_high",
+    "error_before",
+    "error_reidentified",
+    "error_after",
+    "noise_floor",
+];
+
+/// One trace diagnosed.
+struct Diagnosed {
+    machine: Machine,
+    outcome: Outcome,
+    /// What was diagnosed: file, samples, rate.
+    described: String,
+    warnings: Vec<String>,
+}
+
+impl Diagnosed {
+    fn findings(&self) -> Findings<'_> {
+        Findings {
+            diagnosis: &self.outcome.diagnosis,
+            evidence: Some(&self.outcome.evidence),
+            trace: &self.described,
+            motion: self.machine.signals.motion,
+        }
+    }
+}
+
+/// Diagnoses one trace.
+fn examine(
+    trace: &Path,
+    axis: &Path,
+    holdout: Option<&Path>,
+    library: Vec<Effect>,
+    progress: &(dyn Fn(&str) + Sync),
+) -> anyhow::Result<Diagnosed> {
+    let machine = Machine::read(axis)?;
+    let Recorded { record: train, noise, mut warnings } = record(trace, &machine)?;
+    let holdout = holdout.map(|p| record(p, &machine).map(|r| (r, p))).transpose()?;
+    warnings.extend(holdout.iter().flat_map(|(r, _)| r.warnings.iter().cloned()));
+    let case = Case {
+        machine: machine.name.clone(),
+        nominal: Model { parameters: machine.parameters, structure: machine.structure, effects: machine.effects },
+        train: &train,
+        noise: &noise,
+        holdout: holdout.as_ref().map(|(r, _)| &r.record),
+        library,
+    };
+    let outcome = diagnose(&case, progress);
+    let described = format!(
+        "{}: {} samples at {} Hz{}",
+        trace.display(),
+        train.len(),
+        number(1.0 / train.dt, 4, Medium::Page),
+        holdout.as_ref().map_or_else(String::new, |(_, p)| format!("; held out: {}", p.display()))
+    );
+    Ok(Diagnosed { machine, outcome, described, warnings })
 }
 
 /// Runs the command.
@@ -49,37 +125,25 @@ pub struct Args {
 /// # Errors
 /// When the command could not run.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let machine = Machine::read(&args.axis)?;
-    let (train, noise) = record(&args.trace, &machine)?;
-    let holdout = args.holdout.as_deref().map(|p| record(p, &machine)).transpose()?;
     let library = library(&args.without)?;
+    if args.many.is_wanted(&args.traces)? {
+        let ids: Vec<&str> = library.iter().map(|e| e.info().id).collect();
+        return args.many.run("diagnose", &FACTS, ids.join(","), &args.traces, args.axis.as_deref(), &|item| {
+            let axis = item.axis.as_deref().context("no axis.toml in its folder or above, and no --axis")?;
+            Ok(found(&examine(&item.path, axis, None, library.clone(), &|_| ())?))
+        });
+    }
+    let trace = args.traces.first().context("no trace given")?;
+    let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {elapsed} {msg}")?);
-    let case = Case {
-        machine: machine.name.clone(),
-        nominal: Model { parameters: machine.parameters, structure: machine.structure, effects: machine.effects },
-        train: &train,
-        noise: &noise,
-        holdout: holdout.as_ref().map(|(r, _)| r),
-        library,
-    };
-    let outcome = diagnose(&case, &|what| {
+    let diagnosed = examine(trace, axis, args.holdout.as_deref(), library, &|what| {
         bar.set_message(what.to_owned());
         bar.tick();
-    });
+    })?;
     bar.finish_and_clear();
-    let described = format!(
-        "{}: {} samples at {} Hz{}",
-        args.trace.display(),
-        train.len(),
-        number(1.0 / train.dt, 4, Medium::Page),
-        args.holdout.as_ref().map_or_else(String::new, |p| format!("; held out: {}", p.display()))
-    );
-    let findings = Findings {
-        diagnosis: &outcome.diagnosis,
-        evidence: Some(&outcome.evidence),
-        trace: &described,
-        motion: machine.signals.motion,
-    };
+    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    let findings = diagnosed.findings();
+    let outcome = &diagnosed.outcome;
     let colour = std::io::stdout().is_terminal();
     print!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }));
     if let Some(path) = &args.json {
@@ -94,12 +158,53 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let improved = Machine {
             parameters: outcome.improved.parameters,
             effects: outcome.improved.effects,
-            ..machine.clone()
+            ..diagnosed.machine.clone()
         };
         Package::of(&improved).with_context(|| path.display().to_string())?.write(path)?;
         println!("{}", replayed(path, &outcome.replay)?);
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A diagnosis as a row of the summary.
+fn found(diagnosed: &Diagnosed) -> Found {
+    let d = &diagnosed.outcome.diagnosis;
+    let held = &d.gap.holdout.combined;
+    let causes: Vec<&str> = d.causes.iter().map(|c| c.id.as_str()).collect();
+    let facts = vec![
+        json!(d.verdict),
+        json!(d.location.place),
+        if causes.is_empty() { Value::Null } else { json!(causes.join("+")) },
+        d.causes.first().map_or(Value::Null, |c| json!(c.probability)),
+        json!(d.gap.closure),
+        json!(d.gap.interval[0]),
+        json!(d.gap.interval[1]),
+        json!(held.before),
+        json!(held.reidentified),
+        json!(held.after),
+        json!(held.noise_floor),
+    ];
+    let units = base_units(diagnosed.machine.signals.motion);
+    let tracked = |name: String, unit: &str, value: &Value, of: &str| {
+        let value_of = |key: &str| value.get(key).and_then(Value::as_f64);
+        Some(Tracked { name, unit: unit.to_owned(), value: value_of(of)?, std: value_of("std") })
+    };
+    let base = d.parameters.iter().filter_map(|(name, value)| {
+        let unit = NAMES.iter().position(|n| n == name).map_or("", |k| units[k]);
+        tracked(name.clone(), unit, value, "fitted")
+    });
+    let of_causes = d.causes.iter().flat_map(|c| c.parameters.iter().map(move |(name, value)| (c, name, value)));
+    let of_causes = of_causes.filter_map(|(c, name, value)| {
+        let unit = value.get("unit").and_then(Value::as_str).unwrap_or_default();
+        tracked(format!("{}.{name}", c.id), unit, value, "value")
+    });
+    Found {
+        facts,
+        parameters: base.chain(of_causes).collect(),
+        warnings: diagnosed.warnings.iter().chain(&d.warnings).cloned().collect(),
+        result: json!(d),
+        report: report(&diagnosed.findings()),
+    }
 }
 
 /// Runs the FMU as any importer would, on held-out data from its state there; its own error in a sentence.
@@ -134,18 +239,26 @@ fn library(without: &[String]) -> anyhow::Result<Vec<Effect>> {
     Ok(EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect())
 }
 
+/// A trace as the diagnosis needs it.
+pub(super) struct Recorded {
+    /// The record.
+    pub record: Record,
+    /// What is known of its noise.
+    pub noise: NoiseEstimate,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
 /// Reads a trace as the diagnosis needs it.
-pub(super) fn record(path: &Path, machine: &Machine) -> anyhow::Result<(Record, NoiseEstimate)> {
+pub(super) fn record(path: &Path, machine: &Machine) -> anyhow::Result<Recorded> {
     let loaded = load(path, &machine.signals)?;
-    for warning in &loaded.warnings {
-        eprintln!("warning: {}: {warning}", path.display());
-    }
+    let mut warnings = loaded.warnings;
     let trace = &loaded.trace;
-    let torque = trace.require(Signal::T)?.to_vec();
+    let torque = trace.require(Signal::T).with_context(|| path.display().to_string())?.to_vec();
     let mut channels =
         [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(|s| trace.get(s).map(<[f64]>::to_vec));
     if machine.structure == Structure::Rigid && (channels[2].is_some() || channels[3].is_some()) {
-        eprintln!("warning: a rigid axis has no table of its own: theta2 and omega2 are left out.");
+        warnings.push("A rigid axis has no table of its own: theta2 and omega2 are left out.".to_owned());
         channels[2] = None;
         channels[3] = None;
     }
@@ -163,5 +276,6 @@ pub(super) fn record(path: &Path, machine: &Machine) -> anyhow::Result<(Record, 
         let span = channels[i].as_ref().map_or(0.0, |v| v.iter().fold(0.0_f64, |m, x| m.max(x.abs())));
         noise.std[i].max(1e-9 * span).max(1e-12)
     });
-    Ok((Record { start: trace.start, dt: trace.dt, hold: trace.hold, torque, channels, noise: std }, noise))
+    let record = Record { start: trace.start, dt: trace.dt, hold: trace.hold, torque, channels, noise: std };
+    Ok(Recorded { record, noise, warnings })
 }

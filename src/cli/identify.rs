@@ -8,9 +8,13 @@ use std::time::Duration;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use serde_json::json;
+
 use super::FINDINGS;
+use super::many::Many;
 use crate::axis::{Scheme, Structure};
-use crate::identify::result::Identification;
+use crate::fleet::{Found, Tracked};
+use crate::identify::result::{Estimate, Identification};
 use crate::identify::run::{Method, Request, identify};
 use crate::report::{Block, Cell, Table, terminal};
 use crate::trace::{Hold, Machine, load, write_text};
@@ -56,11 +60,17 @@ pub enum Holds {
 
 /// Arguments of `eixo identify`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  eixo identify trace.csv --axis axis.toml --report identification.html
+  eixo identify machines/ --axis axis.toml --output identifications
+  eixo identify --paper-tables")]
 pub struct Args {
-    /// The trace: CSV with time, T, theta1, theta2 (and omega1, omega2), or a log that --axis maps to them
+    /// Traces (CSV, Parquet, MATLAB 5) with time, T, theta1, theta2 (and omega1, omega2), or logs that --axis maps to them; with
+    /// --output also folders and patterns
     #[arg(required_unless_present = "paper_tables")]
-    trace: Option<PathBuf>,
-    /// The machine: its nominal parameters are the reference, its `[signals]` map the log's columns
+    traces: Vec<PathBuf>,
+    /// The machine: its nominal parameters are the reference, its `[signals]` map the log's columns. With --output and without
+    /// it, each trace's own is the axis.toml in its folder or the nearest one above
     #[arg(long, value_name = "FILE")]
     axis: Option<PathBuf>,
     /// Which estimators; may be given more than once
@@ -70,7 +80,7 @@ pub struct Args {
     #[arg(long)]
     paper: bool,
     /// Reproduce Tables 1 to 5 of the paper beside its own figures, and say what agrees and why
-    #[arg(long, conflicts_with_all = ["trace", "axis", "report"])]
+    #[arg(long, conflicts_with_all = ["traces", "axis", "report", "output"])]
     paper_tables: bool,
     /// Forgetting factor of RLS and ELS
     #[arg(long, default_value_t = 1.0)]
@@ -94,15 +104,20 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Integration::Auto)]
     integration: Integration,
     /// Write the result as JSON
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
     json: Option<PathBuf>,
     /// Write the result as one HTML page
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
     report: Option<PathBuf>,
     /// Write the axis file with the recommended estimates as its parameters
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
     axis_out: Option<PathBuf>,
+    #[command(flatten)]
+    many: Many,
 }
+
+/// What the summary of many traces says of each beside its parameters.
+const FACTS: [&str; 4] = ["verdict", "method", "fit", "why"];
 
 /// Runs the command.
 ///
@@ -118,39 +133,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.forgetting
     );
     anyhow::ensure!(args.p0 > 0.0 && args.p0.is_finite(), "--p0 is {}: it must be greater than zero", args.p0);
-    let path = args.trace.as_deref().context("no trace given")?;
-    let mut machine = match &args.axis {
-        Some(axis) => Machine::read(axis)?,
-        None => Machine { name: "axis".to_owned(), ..Machine::default() },
-    };
-    match args.hold {
-        Some(Holds::Zoh) => machine.signals.hold = Hold::Zoh,
-        Some(Holds::Linear) => machine.signals.hold = Hold::Linear,
-        None => {}
+    if args.many.is_wanted(&args.traces)? {
+        // All that bears on the result, in words.
+        let settings = format!("{:?} {:?} {:?} {:?}", request(&args, true), args.hold, args.from, args.to);
+        return args.many.run("identify", &FACTS, settings, &args.traces, args.axis.as_deref(), &|item| {
+            let (_, result) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
+            found(&result)
+        });
     }
+    let path = args.traces.first().context("no trace given")?;
     let bar = progress();
-    bar.set_message("reading the trace");
-    let loaded = load(path, &machine.signals)?;
-    let trace = cut(loaded.trace, args.from, args.to, path)?;
-    let request = Request {
-        methods: methods(&args.method),
-        forgetting: args.forgetting,
-        p0: args.p0,
-        paper: args.paper,
-        period: args.period,
-        reference: args.axis.is_some(),
-        scheme: match args.integration {
-            Integration::Auto => None,
-            Integration::Exact => Some(Scheme::Exact),
-            Integration::Newmark => Some(Scheme::NEWMARK),
-        },
-    };
-    let file = path.display().to_string();
-    let mut result =
-        identify(&trace, &machine, &request, &file, &mut |what| bar.set_message(what.to_owned()))
-            .with_context(|| file.clone())?;
+    let (machine, result) =
+        examine(path, args.axis.as_deref(), &args, &mut |what| bar.set_message(what.to_owned()))?;
     bar.finish_and_clear();
-    result.warnings.splice(0..0, loaded.warnings);
+    let file = path.display();
 
     print!("{}", terminal::blocks(&blocks(&result), terminal::Layout::default()));
     if let Some(path) = &args.json {
@@ -168,6 +164,68 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     );
     let sound = result.recommended.is_some();
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::from(FINDINGS) })
+}
+
+/// Identifies one trace.
+fn examine(
+    path: &Path,
+    axis: Option<&Path>,
+    args: &Args,
+    progress: &mut dyn FnMut(&str),
+) -> anyhow::Result<(Machine, Identification)> {
+    let mut machine = match axis {
+        Some(axis) => Machine::read(axis)?,
+        None => Machine { name: "axis".to_owned(), ..Machine::default() },
+    };
+    match args.hold {
+        Some(Holds::Zoh) => machine.signals.hold = Hold::Zoh,
+        Some(Holds::Linear) => machine.signals.hold = Hold::Linear,
+        None => {}
+    }
+    progress("reading the trace");
+    let loaded = load(path, &machine.signals)?;
+    let trace = cut(loaded.trace, args.from, args.to, path)?;
+    let file = path.display().to_string();
+    let mut result = identify(&trace, &machine, &request(args, axis.is_some()), &file, progress).context(file)?;
+    result.warnings.splice(0..0, loaded.warnings);
+    Ok((machine, result))
+}
+
+fn request(args: &Args, reference: bool) -> Request {
+    Request {
+        methods: methods(&args.method),
+        forgetting: args.forgetting,
+        p0: args.p0,
+        paper: args.paper,
+        period: args.period,
+        reference,
+        scheme: match args.integration {
+            Integration::Auto => None,
+            Integration::Exact => Some(Scheme::Exact),
+            Integration::Newmark => Some(Scheme::NEWMARK),
+        },
+    }
+}
+
+/// An identification as a row of the summary: the method to trust.
+fn found(result: &Identification) -> anyhow::Result<Found> {
+    let best = result.recommended.as_ref().context("no method gives an estimate to trust")?;
+    let method = &result.methods[best.method];
+    let fit = method.outputs.iter().map(|o| o.fit_percent / 100.0).reduce(f64::min);
+    let white = !method.outputs.is_empty() && method.outputs.iter().all(|o| o.whiteness.white);
+    let tracked = |e: &Estimate| Tracked { name: e.name.to_owned(), unit: e.unit.to_owned(), value: e.value, std: e.std };
+    Ok(Found {
+        facts: vec![
+            json!(if white { "white" } else { "not_white" }),
+            json!(method.method),
+            json!(fit),
+            json!(best.why),
+        ],
+        parameters: method.parameters.iter().map(tracked).collect(),
+        warnings: result.warnings.clone(),
+        result: json!(result),
+        report: crate::report::identify::report(result),
+    })
 }
 
 fn progress() -> ProgressBar {

@@ -42,6 +42,8 @@ macro_rules! commands {
     };
 }
 
+mod many;
+
 commands! {
     /// Run the main job on bundled data, start to finish, ending in an HTML report
     Demo => demo,

@@ -120,7 +120,7 @@ fn space(medium: Medium) -> char {
 pub fn cell(cell: &Cell, medium: Medium) -> String {
     match cell {
         Cell::Empty => String::new(),
-        Cell::Text(text) => text.clone(),
+        Cell::Text(text) | Cell::Link(text, _) => text.clone(),
         Cell::Number(value, digits, unit) => with_unit(number(*value, *digits, medium), unit, medium),
         Cell::Count(value) => count(*value),
         Cell::Estimate(value, std, unit) => with_unit(estimate(*value, *std, medium), unit, medium),

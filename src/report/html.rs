@@ -151,8 +151,15 @@ fn cell_markup(cell: &Cell) -> Markup {
                 }
             }
         }
+        Cell::Link(_, path) if is_plain(path) => html! { a href=(path) { (text) } },
         _ => html! { (text) },
     }
+}
+
+/// Whether a path leads to a file beside the page, whatever it was made of: no scheme, no way up.
+fn is_plain(path: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./".contains(c);
+    path.chars().all(plain) && !path.starts_with('/') && !path.split('/').any(|part| part == "..")
 }
 
 /// A figure in two layouts of which the style sheet shows the one that suits the room it has.

@@ -191,6 +191,8 @@ pub enum Cell {
     Empty,
     /// Text.
     Text(String),
+    /// Text that leads to a file: its path from the page's folder, of letters, digits and `-_./` alone.
+    Link(String, String),
     /// A number with so many significant digits, and its unit (may be empty).
     Number(f64, usize, String),
     /// A whole number.
@@ -221,7 +223,7 @@ impl Cell {
 
     /// Whether the cell is set flush right, as numbers are.
     pub(crate) fn is_numeric(&self) -> bool {
-        !matches!(self, Self::Empty | Self::Text(_))
+        !matches!(self, Self::Empty | Self::Text(_) | Self::Link(..))
     }
 }
 

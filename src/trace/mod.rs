@@ -28,6 +28,7 @@ pub use sampling::{Grid, Sampling, grid};
 pub use signal::{Motion, Quantity, Signal};
 pub use table::{Header, Table};
 pub use units::Unit;
+pub(crate) use write::append_number;
 pub use write::{write_columns, write_csv, write_text};
 
 /// One uniformly sampled record of the axis, SI units.

@@ -28,7 +28,6 @@ pub fn write_csv(path: &Path, trace: &Trace, motion: Motion) -> Result<(), Trace
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
 pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), TraceError> {
-    use std::fmt::Write as _;
     let rows = columns.iter().map(|(_, v)| v.len()).max().unwrap_or(0);
     let mut text = String::with_capacity((rows + 1) * columns.len() * 20);
     text.push_str(&columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(","));
@@ -39,19 +38,21 @@ pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), Trac
                 text.push(',');
             }
             if let Some(value) = values.get(row) {
-                let size = value.abs();
-                // The shortest text that reads back as the same number.
-                let written = if size != 0.0 && !(1e-4..1e15).contains(&size) {
-                    write!(text, "{value:e}")
-                } else {
-                    write!(text, "{value}")
-                };
-                debug_assert!(written.is_ok(), "writing to a string");
+                append_number(&mut text, *value);
             }
         }
         text.push('\n');
     }
     write_text(path, text.as_bytes())
+}
+
+/// Appends the shortest text that reads back as the same number.
+pub(crate) fn append_number(text: &mut String, value: f64) {
+    use std::fmt::Write as _;
+    let size = value.abs();
+    let written =
+        if size != 0.0 && !(1e-4..1e15).contains(&size) { write!(text, "{value:e}") } else { write!(text, "{value}") };
+    debug_assert!(written.is_ok(), "writing to a string");
 }
 
 /// Writes a whole file at once: beside the target first, then renamed.

@@ -1,0 +1,155 @@
+//! The summary: a row a trace, as CSV or Parquet.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+use serde_json::Value;
+
+use super::{FleetError, Placed, store};
+use crate::trace::{append_number, write_text};
+
+/// A column of the summary.
+enum Column {
+    Text(Vec<Option<String>>),
+    Number(Vec<Option<f64>>),
+}
+
+/// The columns: what it is, the facts, each parameter with its standard error and its change since the machine's first
+/// record, what is to be known, where the report is.
+fn columns(facts: &[&str], rows: &[Placed]) -> Vec<(String, Column)> {
+    let text = |of: &dyn Fn(&Placed) -> Option<String>| Column::Text(rows.iter().map(of).collect());
+    let mut columns = vec![
+        ("machine".to_owned(), text(&|p| Some(p.machine.clone()))),
+        ("trace".to_owned(), text(&|p| Some(p.row.trace.clone()))),
+        ("when".to_owned(), text(&|p| p.when.as_ref().map(|w| w.text.clone()))),
+        ("status".to_owned(), text(&|p| Some(if p.row.done { "done" } else { "failed" }.to_owned()))),
+    ];
+    for (k, fact) in facts.iter().enumerate() {
+        let values = || rows.iter().map(|p| p.row.facts.get(k));
+        let numeric = values().flatten().any(Value::is_number);
+        let column = if numeric {
+            Column::Number(values().map(|v| v.and_then(Value::as_f64)).collect())
+        } else {
+            Column::Text(values().map(|v| v.and_then(Value::as_str).map(str::to_owned)).collect())
+        };
+        columns.push(((*fact).to_owned(), column));
+    }
+    let mut names: Vec<(&str, &str)> = Vec::new();
+    for parameter in rows.iter().flat_map(|p| &p.row.parameters) {
+        if !names.iter().any(|(name, _)| *name == parameter.name) {
+            names.push((&parameter.name, &parameter.unit));
+        }
+    }
+    for (name, unit) in names {
+        let of = |p: &Placed| p.row.parameters.iter().find(|t| t.name == name).cloned();
+        // The first of each machine: the rows stand in the order of time.
+        let mut firsts: BTreeMap<&str, f64> = BTreeMap::new();
+        for p in rows {
+            if let Some(own) = of(p) {
+                firsts.entry(&p.machine).or_insert(own.value);
+            }
+        }
+        let change = |p: &Placed| {
+            let first = *firsts.get(p.machine.as_str())?;
+            (first != 0.0).then_some(of(p)?.value / first - 1.0)
+        };
+        let title = if unit.is_empty() || unit == "1" { name.to_owned() } else { format!("{name} [{unit}]") };
+        columns.push((title, Column::Number(rows.iter().map(|p| of(p).map(|t| t.value)).collect())));
+        columns.push((format!("{name}_std"), Column::Number(rows.iter().map(|p| of(p)?.std).collect())));
+        columns.push((format!("{name}_change"), Column::Number(rows.iter().map(change).collect())));
+    }
+    columns.push(("message".to_owned(), text(&|p| Some(p.row.message.clone()).filter(|m| !m.is_empty()))));
+    columns.push(("report".to_owned(), text(&|p| p.row.done.then(|| format!("reports/{}", store::report(p.item))))));
+    columns
+}
+
+/// Writes the summary: Parquet where the name ends so, else CSV.
+pub(super) fn write(path: &Path, facts: &[&str], rows: &[Placed]) -> Result<(), FleetError> {
+    let columns = columns(facts, rows);
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet") || e.eq_ignore_ascii_case("pq"));
+    let bytes = if packed {
+        pack(&columns, rows.len()).map_err(|e| FleetError::Parquet { path: path.to_owned(), reason: e.to_string() })?
+    } else {
+        csv(&columns, rows.len()).into_bytes()
+    };
+    write_text(path, &bytes)?;
+    Ok(())
+}
+
+/// RFC 4180.
+fn csv(columns: &[(String, Column)], rows: usize) -> String {
+    let quoted = |text: &str| {
+        if text.contains([',', '"', '\n', '\r']) {
+            format!("\"{}\"", text.replace('"', "\"\""))
+        } else {
+            text.to_owned()
+        }
+    };
+    let mut out = columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",");
+    out.push('\n');
+    for row in 0..rows {
+        for (k, (_, column)) in columns.iter().enumerate() {
+            if k > 0 {
+                out.push(',');
+            }
+            match column {
+                Column::Text(values) => out.push_str(&quoted(values[row].as_deref().unwrap_or_default())),
+                Column::Number(values) => {
+                    if let Some(value) = values[row] {
+                        append_number(&mut out, value);
+                    }
+                }
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
+fn pack(columns: &[(String, Column)], rows: usize) -> Result<Vec<u8>, ParquetError> {
+    let mut fields = Vec::with_capacity(columns.len());
+    for (name, column) in columns {
+        let field = match column {
+            Column::Text(_) => {
+                Type::primitive_type_builder(name, Physical::BYTE_ARRAY).with_logical_type(Some(LogicalType::String))
+            }
+            Column::Number(_) => Type::primitive_type_builder(name, Physical::DOUBLE),
+        };
+        fields.push(Arc::new(field.with_repetition(Repetition::OPTIONAL).build()?));
+    }
+    let schema = Arc::new(Type::group_type_builder("summary").with_fields(fields).build()?);
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .set_created_by(format!("eixo {}", env!("CARGO_PKG_VERSION")))
+        .build();
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
+    if rows > 0 {
+        let mut group = writer.next_row_group()?;
+        for (_, column) in columns {
+            let Some(mut own) = group.next_column()? else { break };
+            match column {
+                Column::Text(values) => {
+                    let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
+                    let present: Vec<ByteArray> =
+                        values.iter().flatten().map(|v| ByteArray::from(v.as_str())).collect();
+                    own.typed::<ByteArrayType>().write_batch(&present, Some(&levels), None)?;
+                }
+                Column::Number(values) => {
+                    let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
+                    let present: Vec<f64> = values.iter().flatten().copied().collect();
+                    own.typed::<DoubleType>().write_batch(&present, Some(&levels), None)?;
+                }
+            }
+            own.close()?;
+        }
+        group.close()?;
+    }
+    writer.into_inner()
+}

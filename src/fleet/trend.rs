@@ -1,0 +1,78 @@
+//! How a parameter drifts over a machine's records: the line through its estimates, by least squares.
+
+use super::{Placed, Tracked};
+
+/// A parameter of one machine over its records.
+pub(super) struct Trend<'a> {
+    /// The machine.
+    pub machine: &'a str,
+    /// The parameter: name and unit.
+    pub parameter: &'a Tracked,
+    /// Abscissae: days since the machine's first record, or the number of the record where not every one has a date.
+    pub at: Vec<f64>,
+    /// Estimates and standard errors.
+    pub values: Vec<(f64, Option<f64>)>,
+    /// Whether the abscissae are days.
+    pub days: bool,
+}
+
+impl<'a> Trend<'a> {
+    /// Every parameter of every machine that was estimated at least twice; the rows in the summary's order.
+    pub fn all(rows: &'a [Placed<'a>]) -> Vec<Self> {
+        let mut trends: Vec<Self> = Vec::new();
+        for of_machine in rows.chunk_by(|a, b| a.machine == b.machine) {
+            let done = || of_machine.iter().filter(|p| p.row.done);
+            let first = done().find_map(|p| p.when.as_ref()).map(|w| w.days);
+            let last = done().filter_map(|p| p.when.as_ref()).next_back().map(|w| w.days);
+            let days = done().all(|p| p.when.is_some()) && first < last;
+            let mut of: Vec<Self> = Vec::new();
+            for (k, placed) in done().enumerate() {
+                let at = match (&placed.when, first) {
+                    (Some(when), Some(first)) if days => when.days - first,
+                    _ => k as f64 + 1.0,
+                };
+                for parameter in &placed.row.parameters {
+                    let found = of.iter().position(|t| t.parameter.name == parameter.name);
+                    let index = found.unwrap_or_else(|| {
+                        let machine = placed.machine.as_str();
+                        of.push(Self { machine, parameter, at: Vec::new(), values: Vec::new(), days });
+                        of.len() - 1
+                    });
+                    of[index].at.push(at);
+                    of[index].values.push((parameter.value, parameter.std));
+                }
+            }
+            trends.extend(of.into_iter().filter(|t| t.at.len() > 1));
+        }
+        trends
+    }
+
+    /// Change from the first record to the last, relative to the first.
+    pub fn change(&self) -> Option<f64> {
+        let (first, last) = (self.values.first()?.0, self.values.last()?.0);
+        (first != 0.0).then(|| last / first - 1.0)
+    }
+
+    /// Rise of the line over the period, relative to the mean, and its standard error from the scatter about the line; needs
+    /// three records.
+    pub fn drift(&self) -> Option<(f64, f64)> {
+        let n = self.at.len() as f64;
+        let mean = |of: &dyn Fn(usize) -> f64| (0..self.at.len()).map(of).sum::<f64>() / n;
+        let (t, y) = (mean(&|k| self.at[k]), mean(&|k| self.values[k].0));
+        let sum = |of: &dyn Fn(usize) -> f64| n * mean(of);
+        let spread = sum(&|k| (self.at[k] - t).powi(2));
+        if self.at.len() < 3 || spread <= 0.0 || y == 0.0 {
+            return None;
+        }
+        let slope = sum(&|k| (self.at[k] - t) * (self.values[k].0 - y)) / spread;
+        let rest = sum(&|k| (self.values[k].0 - y - slope * (self.at[k] - t)).powi(2));
+        let std = (rest / (n - 2.0) / spread).sqrt();
+        let span = self.at.last()? - self.at.first()?;
+        Some((slope * span / y.abs(), std * span / y.abs()))
+    }
+
+    /// Whether the drift stands out of the scatter: four standard errors.
+    pub fn stands_out(&self) -> bool {
+        self.drift().is_some_and(|(drift, std)| drift.abs() > 4.0 * std && drift.abs() > 1e-6)
+    }
+}

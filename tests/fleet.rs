@@ -1,0 +1,198 @@
+//! Many traces in one run: the summary is the same to the byte for any number of threads, parts and interruptions, a bad trace
+//! is a row that says why, and a drift that was put in comes out.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use eixo::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
+use eixo::effects::{Effect, Settings};
+use eixo::identify::excitation::{Kind, Multisine};
+use eixo::trace::{Machine, Motion, Signal, Trace, write_csv};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+const DT: f64 = 1e-3;
+
+/// A record of an axis of this stiffness and dry friction, with noise on the angles.
+fn log(path: &Path, stiffness: f64, friction: f64, seed: u64) {
+    let torque: Vec<f64> =
+        Multisine::new(Kind::Odd, 1000, 1, 80, 0.03, 0.0, seed).expect("the excitation").period().repeat(2);
+    let parameters = Parameters { k: stiffness, ..Parameters::PAPER };
+    let mut effects = Settings::default();
+    let coulomb = Effect::from_id("coulomb_motor").expect("the effect");
+    effects.of_mut(coulomb)[coulomb.parameter("level").expect("its level")] = friction;
+    let options = SimulateOptions { start: 0.0, dt: DT, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 4 };
+    let response = simulate(&parameters, Structure::TwoInertia, &effects, [0.0; 4], &torque, &options);
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut noisy = |values: Vec<f64>| -> Vec<f64> {
+        values
+            .into_iter()
+            .map(|v| {
+                let e: f64 = StandardNormal.sample(&mut rng);
+                v + 2e-6 * e
+            })
+            .collect()
+    };
+    let trace = Trace::new(0.0, DT, Hold::Zoh)
+        .with(Signal::T, torque)
+        .and_then(|t| t.with(Signal::Theta1, noisy(response.readings.iter().map(|r| r.theta1).collect())))
+        .and_then(|t| t.with(Signal::Theta2, noisy(response.readings.iter().map(|r| r.theta2).collect())))
+        .expect("the trace");
+    write_csv(path, &trace, Motion::Rotary).expect("the file");
+}
+
+/// Two machines of three days each: the first one's stiffness falls by 2 % a day, the second has friction; and two files that
+/// are no traces.
+fn machines(root: &Path) -> PathBuf {
+    let folder = root.join("machines");
+    for name in ["press", "mill"] {
+        std::fs::create_dir_all(folder.join(name)).expect("the folder");
+        let axis = Machine { name: format!("{name} X"), parameters: Parameters::PAPER, ..Machine::default() };
+        std::fs::write(folder.join(name).join("axis.toml"), axis.to_toml()).expect("the axis file");
+    }
+    for day in 0..3_u32 {
+        let date = format!("2026-03-{:02}.csv", 9 + day);
+        let k = Parameters::PAPER.k;
+        log(&folder.join("press").join(&date), k * (1.0 - 0.02 * f64::from(day)), 0.0, 1 + u64::from(day));
+        log(&folder.join("mill").join(&date), k, 0.004, 11 + u64::from(day));
+    }
+    std::fs::write(folder.join("mill/2026-03-12.csv"), "time,T,theta1\n0,1,2\n0.1,x\n").expect("the file");
+    std::fs::write(folder.join("press/2026-03-12 <b>&.csv"), "nothing").expect("the file");
+    folder
+}
+
+fn eixo(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_eixo")).args(arguments).current_dir(folder).output().expect("eixo")
+}
+
+fn read(path: impl AsRef<Path>) -> Vec<u8> {
+    std::fs::read(path.as_ref()).unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
+}
+
+/// Every file of the results, by name.
+fn outputs(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for part in [".", "results", "reports"] {
+        for entry in std::fs::read_dir(folder.join(part)).expect("the folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_file() {
+                all.push((path.strip_prefix(folder).expect("below it").to_owned(), read(&path)));
+            }
+        }
+    }
+    all.sort();
+    all
+}
+
+#[test]
+fn a_fleet_is_diagnosed_the_same_in_one_run_in_parts_and_after_an_interruption() {
+    let root = tempfile::tempdir().unwrap();
+    machines(root.path());
+    let whole = eixo(&["diagnose", "machines", "--output", "one", "--jobs", "1"], root.path());
+    let (out, err) = (String::from_utf8_lossy(&whole.stdout), String::from_utf8_lossy(&whole.stderr));
+    // Findings: two of the eight could not be used.
+    assert_eq!(whole.status.code(), Some(1), "{out}{err}");
+    assert!(out.contains("2 traces could not be used"), "{out}");
+    assert!(out.contains("2026-03-12.csv: row 3: 2 fields where the header has 3"), "{out}");
+
+    let summary = String::from_utf8(read(root.path().join("one/summary.csv"))).unwrap();
+    let rows: Vec<&str> = summary.lines().collect();
+    assert_eq!(rows.len(), 9, "{summary}");
+    assert!(rows[0].starts_with("machine,trace,when,status,verdict,place,cause,probability,closure,"), "{}", rows[0]);
+    let column =
+        |name: &str| rows[0].split(',').position(|c| c == name).unwrap_or_else(|| panic!("{name}: {}", rows[0]));
+    let cell = |row: usize, name: &str| rows[row].split(',').nth(column(name)).unwrap();
+    for row in [1, 2, 3] {
+        assert_eq!(cell(row, "cause"), "coulomb_motor", "{}", rows[row]);
+        assert_eq!(cell(row, "when"), format!("2026-03-{:02}", 8 + row));
+        let level: f64 = cell(row, "coulomb_motor.level [N.m]").parse().unwrap();
+        let std: f64 = cell(row, "coulomb_motor.level_std").parse().unwrap();
+        assert!((level - 0.004).abs() < 5.0 * std + 1e-5, "{level} ± {std}");
+    }
+    for row in [5, 6, 7] {
+        assert_eq!(cell(row, "machine"), "press X");
+        let change: f64 = cell(row, "K_change").parse().unwrap();
+        // The first day's model is right as it is: its parameters stand without a standard error.
+        let of = |row: usize, name: &str| -> f64 { cell(row, name).parse().unwrap_or(0.0) };
+        let std = (of(row, "K_std") + of(5, "K_std")) / of(5, "K [N.m/rad]");
+        assert!((change + 0.02 * (row as f64 - 5.0)).abs() <= 4.0 * std, "{}", rows[row]);
+        assert!(std < 2e-3, "{std}");
+    }
+    assert_eq!([cell(4, "status"), cell(8, "status")], ["failed"; 2]);
+
+    // The index leads to each report; a file name is text in it, never markup.
+    let index = String::from_utf8(read(root.path().join("one/index.html"))).unwrap();
+    let links: Vec<&str> = index.split("href=\"").skip(1).filter_map(|s| s.split('"').next()).collect();
+    let reports: Vec<&&str> = links.iter().filter(|l| l.starts_with("reports/")).collect();
+    assert!(reports.len() >= 6, "{links:?}");
+    reports.iter().for_each(|l| assert!(root.path().join("one").join(l).is_file(), "{l}"));
+    assert!(index.contains("2026-03-12 &lt;b&gt;&amp;.csv") && !index.contains("<b>"));
+
+    // In parts, in another order, with two at a time; then put together.
+    let listed = eixo(&["diagnose", "machines", "--output", "two", "--list"], root.path());
+    let mut listed: Vec<String> = String::from_utf8(listed.stdout).unwrap().lines().map(str::to_owned).collect();
+    assert_eq!(listed.len(), 8);
+    listed.reverse();
+    for pair in listed[..6].chunks(2) {
+        let mut arguments = vec!["diagnose", "--output", "two", "--part", "--jobs", "2"];
+        arguments.extend(pair.iter().map(String::as_str));
+        eixo(&arguments, root.path());
+        assert!(!root.path().join("two/summary.csv").exists());
+    }
+    // As after an interruption: a result without its report, and one cut off half way, are made again.
+    let folder = outputs(&root.path().join("two"));
+    let result = folder.iter().find(|(p, _)| p.starts_with("results")).unwrap();
+    std::fs::write(root.path().join("two").join(&result.0), &result.1[..result.1.len() / 2]).unwrap();
+    let page = folder.iter().find(|(p, _)| p.starts_with("reports")).unwrap();
+    std::fs::remove_file(root.path().join("two").join(&page.0)).unwrap();
+    let rest = eixo(&["diagnose", "machines", "--output", "two"], root.path());
+    assert_eq!(rest.status.code(), Some(1));
+    let err = String::from_utf8_lossy(&rest.stderr);
+    assert!(err.contains(" of 8 traces were done by an earlier run"), "{err}");
+    let (one, two) = (outputs(&root.path().join("one")), outputs(&root.path().join("two")));
+    assert_eq!(one.len(), two.len());
+    for (a, b) in one.iter().zip(&two) {
+        assert_eq!(a.0, b.0);
+        assert_eq!(a.1, b.1, "{} differs", a.0.display());
+    }
+
+    // Nothing is done twice; another option does it again.
+    let again = eixo(&["diagnose", "machines", "--output", "two", "--summary", "two/again.parquet"], root.path());
+    assert!(String::from_utf8_lossy(&again.stderr).contains("8 of 8 traces were done by an earlier run"));
+    let table = eixo::trace::Table::read(&root.path().join("two/again.parquet")).unwrap();
+    assert_eq!(table.rows(), 8);
+    assert_eq!(table.headers[table.position("K").unwrap()].unit.as_deref(), Some("N.m/rad"));
+}
+
+#[test]
+fn a_fleet_is_identified_with_one_axis_file_a_folder_a_machine() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = machines(root.path());
+    let axis = folder.join("mill/axis.toml");
+    let pattern = format!("{}/*/*-1?.csv", folder.display());
+    let first = folder.join("press/2026-03-09.csv");
+    let arguments = ["identify", &pattern, &first.display().to_string(), "--axis", &axis.display().to_string()];
+    let run = eixo(&[&arguments[..], &["--method", "oe", "--output", "found"]].concat(), root.path());
+    assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
+    let summary = String::from_utf8(read(root.path().join("found/summary.csv"))).unwrap();
+    let machines: Vec<&str> = summary.lines().skip(1).filter_map(|l| l.split(',').next()).collect();
+    assert_eq!(machines, ["mill", "mill", "mill", "press", "press", "press"], "{summary}");
+    assert!(summary.starts_with("machine,trace,when,status,verdict,method,fit,why,I1 [kg.m2],I1_std,I1_change,"));
+}
+
+#[test]
+fn what_cannot_be_run_says_what_is_missing() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = machines(root.path());
+    let says = |arguments: &[&str], what: &str| {
+        let run = eixo(arguments, &folder);
+        let err = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{err}");
+        assert!(err.contains(what), "{err}");
+    };
+    says(&["diagnose", "mill"], "--output");
+    says(&["diagnose", "mill/*.xyz", "--output", "out"], "mill/*.xyz: no file matches");
+    says(&["diagnose", "mill/2026-03-09.csv"], "--axis is missing");
+    says(&["diagnose", "mill/none.csv", "--output", "out"], "none.csv: cannot read");
+    says(&["diagnose", "mill", "--output", "mill/axis.toml"], "cannot make the folder");
+}
