@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use eixo::report::polar::PolarTrace;
+use eixo::report::polar::{PolarTrace, Ring};
 use eixo::report::terminal::{self, Layout};
 use eixo::report::{
     Axis, Block, Cell, ChainDiagram, Chart, Colour, Dash, Figure, Mark, Place, PolarPlot, Range, Report, Section,
@@ -128,6 +128,8 @@ fn figures() -> Vec<Figure> {
                         },
                     ],
                     reach: None,
+                    radius: Some(0.05),
+                    ring: Some(Ring { centre: (1e-6, 0.0), low: -1e-6, high: 5e-6, colour: Colour::Vermillion }),
                 }
             },
             "Quadrant glitches where an axis reverses.",

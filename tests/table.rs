@@ -73,3 +73,39 @@ fn options_that_do_not_belong_together_are_refused() {
         assert!(!Path::new(args[1]).exists());
     }
 }
+
+#[test]
+fn a_diagnosis_an_improved_fmu_and_an_axis_file_turn_the_same_circle() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).into_os_string().into_string().unwrap();
+    let (axis, found, fmu, json) = (path("axis.toml"), path("found.toml"), path("found.fmu"), path("found.json"));
+    std::fs::write(&axis, AXIS).unwrap();
+    std::fs::write(&found, format!("{}[effects.coulomb_motor]\nlevel = 0.004\n", AXIS.replace("2.37e-4", "2.5e-4")))
+        .unwrap();
+    fine(&["export", &fmu, "--axis", &found]);
+    let diagnosis = r#"{"schema": "eixo.diagnosis/1", "verdict": "effect", "parameters": {"I1": {"fitted": 2.5e-4}},
+        "causes": [{"id": "coulomb_motor", "parameters": {"level": {"value": 0.004}}}]}"#;
+    std::fs::write(&json, diagnosis).unwrap();
+    let report = path("circle.html");
+    let printed: Vec<String> = [&found, &fmu, &json]
+        .map(|file| fine(&["circle", &axis, "--diagnosed", file, "--radius", "0.02", "--report", &report]))
+        .into();
+    assert!(printed[0] == printed[1] && printed[0] == printed[2], "{printed:#?}");
+    assert!(
+        printed[0].contains("coulomb_motor on X and Y") && printed[0].contains("fitted parameters"),
+        "{}",
+        printed[0]
+    );
+    let page = std::fs::read_to_string(&report).unwrap();
+    assert!(page.contains("Nominal model with coulomb_motor") && page.contains("magnified"));
+    for (text, says) in [
+        ("{}", "it is no diagnosis"),
+        (&diagnosis.replace("0.004", "-1"), "coulomb_motor.level is -1"),
+        (&diagnosis.replace("coulomb_motor", "magic"), "there is no effect \"magic\""),
+    ] {
+        std::fs::write(&json, text).unwrap();
+        let done = eixo(&["circle", &axis, "--diagnosed", &json]);
+        let error = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.code() == Some(2) && error.contains(says), "{error}");
+    }
+}

@@ -11,6 +11,10 @@ use super::Path;
 pub struct Roundness {
     /// Circular deviation G: the width of the ring about the least-squares centre that holds the path.
     pub deviation: f64,
+    /// Least distance from that centre.
+    pub low: f64,
+    /// Greatest distance from that centre.
+    pub high: f64,
     /// Largest radial deviation F about the programmed centre.
     pub largest: f64,
     /// Smallest radial deviation.
@@ -19,7 +23,7 @@ pub struct Roundness {
     pub mean: f64,
     /// Centre of the least-squares circle.
     pub centre: (f64, f64),
-    /// Height of the peak at +X, +Y, -X, -Y, outward positive, over the straight lines before and behind it.
+    /// Height of the peak at +X, +Y, -X, -Y, outward positive, over both of the straight lines before and behind it.
     pub reversals: [f64; 4],
     /// Step at +X, +Y, -X, -Y: the line behind, in the sense of the angle, less the line before.
     pub steps: [f64; 4],
@@ -56,6 +60,8 @@ impl Roundness {
         let at = [0.0, 0.25, 0.5, 0.75].map(|turn| reversal(&angle, &deviation, TAU * turn));
         Some(Self {
             deviation: high - low,
+            low,
+            high,
             largest,
             smallest,
             mean: deviation.iter().sum::<f64>() / n,
@@ -66,6 +72,17 @@ impl Roundness {
             ellipse_diagonal: second(f64::sin),
         })
     }
+}
+
+/// Bi-directional circular deviation G(b): the width of the ring about the least-squares centre of both paths that holds
+/// both; none without a circle to be seen.
+#[must_use]
+pub fn bidirectional(paths: &[Path; 2]) -> Option<f64> {
+    let join = |f: fn(&Path) -> &Vec<f64>| paths.iter().flat_map(|p| f(p).iter().copied()).collect();
+    let both = Path { x: join(|p| &p.x), y: join(|p| &p.y) };
+    let centre = least_squares_centre(&both)?;
+    let (low, high) = extremes(both.x.iter().zip(&both.y).map(|(x, y)| (x - centre.0).hypot(y - centre.1)));
+    Some(high - low)
 }
 
 fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -89,7 +106,8 @@ fn least_squares_centre(path: &Path) -> Option<(f64, f64)> {
     Some((fit[0] * scale, fit[1] * scale))
 }
 
-/// Peak and step near `at`: what stands within [`NEAR`] over lines through what stands around it, one on each side.
+/// Peak and step near `at`: what stands within [`NEAR`] outside of both lines through what stands around it, one on each
+/// side. The way from one line to the other is no peak, wherever the step is taken.
 fn reversal(angle: &[f64], deviation: &[f64], at: f64) -> (f64, f64) {
     let offset = |a: f64| (a - at + PI).rem_euclid(TAU) - PI;
     let line = |behind: bool| -> (f64, f64) {
@@ -115,8 +133,8 @@ fn reversal(angle: &[f64], deviation: &[f64], at: f64) -> (f64, f64) {
     };
     let (before, behind) = (line(false), line(true));
     let over = |a: f64, d: f64| {
-        let (base, slope) = if a >= 0.0 { behind } else { before };
-        d - base - slope * a
+        let [one, other] = [before, behind].map(|(base, slope)| d - base - slope * a);
+        if one * other <= 0.0 { 0.0 } else { one.signum() * one.abs().min(other.abs()) }
     };
     let near = angle.iter().zip(deviation).map(|(a, d)| (offset(*a), *d)).filter(|(a, _)| a.abs() < NEAR);
     let peak = near.fold(0.0, |peak: f64, (a, d)| if over(a, d).abs() > peak.abs() { over(a, d) } else { peak });
@@ -167,6 +185,19 @@ mod tests {
         // The step's radial part falls with the cosine of the angle, which the lines follow to some per cent.
         assert!((r.steps[0] - 6e-6).abs() < 2e-7 && (r.steps[2] - 6e-6).abs() < 2e-7, "{r:?}");
         assert!(r.reversals[0].abs() < 2e-7 && r.steps[1].abs() < 1e-7, "{r:?}");
+        // Taken late, it is still a step and no peak.
+        let late = |a: f64| behind((a - 0.03).rem_euclid(TAU));
+        let r = Roundness::of(&path(|a| (0.05 * a.cos() + late(a), 0.05 * a.sin())), 0.05).expect("a circle");
+        assert!((r.steps[0] - 6e-6).abs() < 2e-7 && r.reversals[0].abs() < 2e-7, "{r:?}");
+    }
+
+    #[test]
+    fn two_ellipses_across_each_other_widen_the_ring_of_both() {
+        let ellipse = |e: f64| path(move |a| ((0.05 + e) * a.cos(), (0.05 - e) * a.sin()));
+        let one = Roundness::of(&ellipse(1e-5), 0.05).expect("a circle").deviation;
+        let g = bidirectional(&[ellipse(1e-5), ellipse(2e-5)]).expect("a circle");
+        assert!((one - 2e-5).abs() < 1e-8 && (g - 4e-5).abs() < 1e-8, "{one} {g}");
+        assert_eq!(bidirectional(&[Path::default(), Path::default()]), None);
     }
 
     #[test]

@@ -168,10 +168,11 @@ fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::
     write_text(&file("diagnosis.html"), html::page(&diagnosis::report(&findings)).as_bytes())?;
 
     steps.next("turning a circle");
+    let (parameters, effects) = (outcome.improved.parameters, outcome.improved.effects);
+    let found = Machine { parameters, effects, ..machine.clone() };
     machine.name = "an XY table with the diagnosed axis".to_owned();
-    machine.parameters = outcome.improved.parameters;
-    machine.effects = outcome.improved.effects;
-    let circle = super::circle::findings(&machine, &machine, &super::circle::Test::default())?;
+    let found = [found.clone(), found];
+    let circle = super::circle::findings(&[machine.clone(), machine], Some(&found), &super::circle::Test::default())?;
     write_text(&file("circle.html"), html::page(&crate::report::circle::report(&circle)).as_bytes())?;
     let mut blocks = diagnosis::short(&findings);
     blocks.extend(crate::report::circle::short(&circle).into_iter().take(1));

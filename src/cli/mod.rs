@@ -20,6 +20,7 @@ pub struct Cli {
     pub command: Command,
 }
 
+mod diagnosed;
 mod drives;
 
 macro_rules! commands {

@@ -1,13 +1,26 @@
-//! The report of a circular test: the polar plot, its figures, and what they mean.
+//! The report of a circular test: the polar plots, their figures, and what they mean.
 
 use std::sync::Arc;
 
 use super::chart::{Axis, Chart, Colour, Dash, Series};
 use super::format::{self, Medium};
-use super::polar::{PolarPlot, PolarTrace};
+use super::polar::{PolarPlot, PolarTrace, Ring};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::circle::roundness::{Roundness, deviations};
 use crate::circle::{CircleTest, Feedback, Path, Servo};
+
+/// A pair of axes turned through the circle in both directions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Name of the pair.
+    pub name: String,
+    /// The path in the direction of the test, and the other way round.
+    pub paths: [Path; 2],
+    /// Their figures.
+    pub roundness: [Roundness; 2],
+    /// Bi-directional circular deviation G(b), m.
+    pub both: f64,
+}
 
 /// What a circular test found.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,60 +31,121 @@ pub struct Findings {
     pub test: CircleTest,
     /// The drives of X and Y.
     pub servos: [Servo; 2],
-    /// Runs to be compared: name, path and figures; the last is what the verdict speaks of.
-    pub runs: Vec<(String, Path, Roundness)>,
+    /// Runs to be compared; the last is what the verdict speaks of.
+    pub runs: Vec<Run>,
+    /// The first run with one thing more of what the last has, for each such thing.
+    pub alone: Vec<Run>,
     /// What acts on the axes in the last run.
     pub effects: Vec<String>,
+}
+
+/// Colours of a run: in the direction of the test, and the other way round.
+const NOMINAL: [Colour; 2] = [Colour::Blue, Colour::Sky];
+const LAST: [Colour; 2] = [Colour::Vermillion, Colour::Purple];
+
+impl Findings {
+    fn directions(&self) -> [&'static str; 2] {
+        if self.test.clockwise { ["clockwise", "counter-clockwise"] } else { ["counter-clockwise", "clockwise"] }
+    }
+
+    /// Largest deviation of any run, m: all plots have one scale.
+    fn reach(&self) -> f64 {
+        let all = self.runs.iter().chain(&self.alone).flat_map(|r| &r.roundness);
+        all.fold(0.0, |m: f64, r| m.max(r.largest.abs()).max(r.smallest.abs()))
+    }
+
+    fn polar(&self, run: &Run, colours: [Colour; 2], title: &str) -> PolarPlot {
+        let radius = self.test.radius;
+        let traces = run.paths.iter().zip(self.directions()).zip(colours).zip([Dash::Solid, Dash::Dashed]);
+        let traces = traces.map(|(((path, name), colour), dash)| {
+            let (angle, deviation) = deviations(path, radius);
+            let (angle, deviation): (Arc<[f64]>, Arc<[f64]>) = (angle.into(), deviation.into());
+            PolarTrace { name: name.to_owned(), angle, deviation, colour: Some(colour), dash }
+        });
+        let r = &run.roundness[0];
+        PolarPlot {
+            title: title.to_owned(),
+            unit: "m".into(),
+            traces: traces.collect(),
+            reach: Some(self.reach()),
+            radius: Some(radius),
+            ring: Some(Ring { centre: r.centre, low: r.low - radius, high: r.high - radius, colour: colours[0] }),
+        }
+    }
 }
 
 /// The whole report.
 #[must_use]
 pub fn report(f: &Findings) -> Report {
     let radius = f.test.radius;
-    let mut polar = PolarPlot { title: "Radial deviation, magnified".into(), unit: "m".into(), ..PolarPlot::default() };
     let mut unrolled =
         Chart::new("Radial deviation over the angle", Axis::linear("angle", "°"), Axis::linear("deviation", "m"));
-    for (k, (name, path, _)) in f.runs.iter().enumerate() {
-        let (angle, deviation) = deviations(path, radius);
-        let colour = if k + 1 == f.runs.len() { Colour::Vermillion } else { Colour::Blue };
-        let dash = if k + 1 == f.runs.len() { Dash::Solid } else { Dash::Dashed };
+    for (k, run) in f.runs.iter().enumerate() {
+        let (angle, deviation) = deviations(&run.paths[0], radius);
+        let last = k + 1 == f.runs.len();
+        let (colour, dash) = if last { (LAST[0], Dash::Solid) } else { (NOMINAL[0], Dash::Dashed) };
         let mut order: Vec<(f64, f64)> =
             angle.iter().zip(&deviation).map(|(a, d)| (a.to_degrees().rem_euclid(360.0), *d)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (degrees, sorted): (Vec<f64>, Vec<f64>) = order.into_iter().unzip();
-        unrolled.series.push(Series::line(&**name, degrees, sorted).in_colour(colour).with_dash(dash));
-        let (angle, deviation): (Arc<[f64]>, Arc<[f64]>) = (angle.into(), deviation.into());
-        polar.traces.push(PolarTrace { name: name.clone(), angle, deviation, colour: Some(colour), dash });
+        unrolled.series.push(Series::line(&*run.name, degrees, sorted).in_colour(colour).with_dash(dash));
     }
-    let direction = if f.test.clockwise { "clockwise" } else { "counter-clockwise" };
+    let polars = f.runs.iter().enumerate().map(|(k, run)| {
+        let last = k + 1 == f.runs.len();
+        let title = format!("{}: radial deviation, magnified", capital(&run.name));
+        Figure::new(f.polar(run, if last { LAST } else { NOMINAL }, &title), caption(run))
+    });
+    let mut sections = vec![Section::new(
+        "",
+        vec![
+            Block::Verdict(verdict(f)),
+            Block::Figures(polars.collect()),
+            Block::Figure(Figure::new(unrolled, format!("Turning {}.", f.directions()[0]))),
+        ],
+    )];
+    if !f.alone.is_empty() {
+        let each = f.alone.iter().map(|run| {
+            Figure::new(f.polar(run, LAST, &format!("{} with {}", capital(&f.runs[0].name), run.name)), caption(run))
+        });
+        sections.push(Section::new(
+            "What each does by itself",
+            vec![
+                Block::Paragraph("One cause at a time, on the same scale as above.".to_owned()),
+                Block::Figures(each.collect()),
+            ],
+        ));
+    }
+    sections.push(Section::new("Figures", vec![Block::Table(table(f)), Block::Paragraph(READING.to_owned())]));
+    sections.push(Section::new("The drives", vec![Block::Table(drives(f)), Block::Paragraph(STACKED.to_owned())]));
     Report {
         title: format!("Circular test of {}", f.machine),
         subject: format!(
-            "radius {} mm, feed {} m/min, {direction}, in simulation",
+            "radius {} mm, feed {} m/min, both directions, in simulation",
             format::number(1e3 * radius, 4, Medium::Page),
             format::number(60.0 * f.test.feed, 4, Medium::Page)
         ),
-        sections: vec![
-            Section::new(
-                "",
-                vec![
-                    Block::Verdict(verdict(f)),
-                    Block::Figures(vec![
-                        Figure::new(polar, "The grey circle is the programmed one."),
-                        Figure::new(unrolled, ""),
-                    ]),
-                ],
-            ),
-            Section::new("Figures", vec![Block::Table(table(f)), Block::Paragraph(READING.to_owned())]),
-            Section::new("The drives", vec![Block::Table(drives(f))]),
-        ],
+        sections,
         footer: format!("eixo {}", env!("CARGO_PKG_VERSION")),
     }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn caption(run: &Run) -> String {
+    format!(
+        "Circular deviation G = {}: the width of the shaded ring. Grey: the programmed circle.",
+        format::cell(&micro(run.roundness[0].deviation), Medium::Page)
+    )
 }
 
 const READING: &str = "A peak at a reversal is friction that the drive has not yet overcome; a step that stays is lost motion; an ellipse \
      along the axes is a scale, an ellipse at 45 degrees a difference of the loops (it turns with the direction) or axes that are not \
      square (it does not).";
+
+const STACKED: &str = "Y is stacked on X: X carries the mass of Y, which X's I2 contains as it was identified in place, or with --carried.";
 
 /// The short form for the terminal.
 #[must_use]
@@ -86,14 +160,16 @@ fn micro(metres: f64) -> Cell {
 
 fn verdict(f: &Findings) -> Verdict {
     let text = |m: f64| format::cell(&micro(m), Medium::Page);
-    let Some((_, _, last)) = f.runs.last() else {
+    let Some(run) = f.runs.last() else {
         return Verdict { tone: Tone::Unsure, sentence: "No path.".into(), detail: String::new(), figures: Vec::new() };
     };
+    let last = &run.roundness[0];
     let sentence = match f.runs.first() {
-        Some((name, _, first)) if f.runs.len() > 1 => format!(
-            "The circular deviation is {}; for the {name} it is {}.",
+        Some(first) if f.runs.len() > 1 => format!(
+            "The circular deviation is {}; for the {} it is {}.",
             text(last.deviation),
-            text(first.deviation)
+            first.name,
+            text(first.roundness[0].deviation)
         ),
         _ => format!("The circular deviation is {}.", text(last.deviation)),
     };
@@ -105,30 +181,33 @@ fn verdict(f: &Findings) -> Verdict {
     Verdict { tone: Tone::Neutral, sentence, detail, figures: Vec::new() }
 }
 
-type Figures = fn(&Roundness) -> f64;
+type Figures = fn(&Run) -> f64;
 type Gain = fn(&Servo) -> f64;
 
 fn table(f: &Findings) -> Table {
-    let mut table =
-        Table::new("Circular test", std::iter::once("figure").chain(f.runs.iter().map(|(name, ..)| name.as_str())));
-    let rows: [(&str, Figures); 14] = [
-        ("circular deviation G", |r| r.deviation),
-        ("largest radial deviation", |r| r.largest),
-        ("smallest radial deviation", |r| r.smallest),
-        ("mean radial deviation", |r| r.mean),
-        ("peak at +X", |r| r.reversals[0]),
-        ("peak at +Y", |r| r.reversals[1]),
-        ("peak at −X", |r| r.reversals[2]),
-        ("peak at −Y", |r| r.reversals[3]),
-        ("step at +X", |r| r.steps[0]),
-        ("step at +Y", |r| r.steps[1]),
-        ("step at −X", |r| r.steps[2]),
-        ("step at −Y", |r| r.steps[3]),
-        ("ellipse along the axes", |r| r.ellipse_axes),
-        ("ellipse at 45 degrees", |r| r.ellipse_diagonal),
+    let names = f.runs.iter().chain(&f.alone).map(|run| run.name.as_str());
+    let mut table = Table::new("Circular test", std::iter::once("figure").chain(names));
+    let rows: [(&str, Figures); 16] = [
+        ("circular deviation G", |r| r.roundness[0].deviation),
+        ("bi-directional deviation G(b)", |r| r.both),
+        ("radial deviation, largest", |r| r.roundness[0].largest),
+        ("radial deviation, smallest", |r| r.roundness[0].smallest),
+        ("radial deviation, mean", |r| r.roundness[0].mean),
+        ("peak at +X", |r| r.roundness[0].reversals[0]),
+        ("peak at +Y", |r| r.roundness[0].reversals[1]),
+        ("peak at −X", |r| r.roundness[0].reversals[2]),
+        ("peak at −Y", |r| r.roundness[0].reversals[3]),
+        ("step at +X", |r| r.roundness[0].steps[0]),
+        ("step at +Y", |r| r.roundness[0].steps[1]),
+        ("step at −X", |r| r.roundness[0].steps[2]),
+        ("step at −Y", |r| r.roundness[0].steps[3]),
+        ("ellipse along the axes", |r| r.roundness[0].ellipse_axes),
+        ("ellipse at 45 degrees", |r| r.roundness[0].ellipse_diagonal),
+        ("  the other way round", |r| r.roundness[1].ellipse_diagonal),
     ];
     for (name, value) in rows {
-        table.row(std::iter::once(Cell::text(name)).chain(f.runs.iter().map(|(_, _, r)| micro(value(r)))).collect());
+        let cells = f.runs.iter().chain(&f.alone).map(|run| micro(value(run)));
+        table.row(std::iter::once(Cell::text(name)).chain(cells).collect());
     }
     table
 }

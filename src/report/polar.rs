@@ -22,6 +22,23 @@ pub struct PolarPlot {
     pub traces: Vec<PolarTrace>,
     /// Deviation at the outer circle; none takes the largest one and a margin.
     pub reach: Option<f64>,
+    /// Radius of the commanded circle, in the unit of the deviations: where it is known, the magnification is told.
+    pub radius: Option<f64>,
+    /// The ring that holds the path.
+    pub ring: Option<Ring>,
+}
+
+/// A ring about a centre of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ring {
+    /// Its centre, from that of the commanded circle.
+    pub centre: (f64, f64),
+    /// Its inner circle, as a deviation.
+    pub low: f64,
+    /// Its outer circle, as a deviation.
+    pub high: f64,
+    /// Its colour.
+    pub colour: Colour,
 }
 
 /// One turn (or more) of the path.
@@ -41,6 +58,9 @@ pub struct PolarTrace {
 
 /// Share of the drawing's radius at which the commanded circle stands.
 const BASE: f64 = 0.62;
+
+/// Corners of a ring's circles.
+const RING: usize = 180;
 
 /// The plot as one `svg` element.
 pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
@@ -73,6 +93,13 @@ pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
                     path class=[(k % 2 == 1).then_some("minor")] d=(path(&[(cx, cy), end])) {}
                 }
             }
+            @if let Some(ring) = plot.ring {
+                @let circle = |d: f64| path(&(0..=RING).map(|k| {
+                    let a = TAU * k as f64 / RING as f64;
+                    at(a, radius(d + ring.centre.0 * a.cos() + ring.centre.1 * a.sin()))
+                }).collect::<Vec<_>>());
+                path class={ "ring " (ring.colour.class()) } fill-rule="evenodd" d={ (circle(ring.low)) (circle(ring.high)) } {}
+            }
             @for (i, t) in plot.traces.iter().enumerate() {
                 g class=(t.colour.unwrap_or(Colour::nth(i)).class()) {
                     title { (t.name) }
@@ -93,6 +120,11 @@ pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
                     text class="halo" x=(px(p.0)) y=(px(p.1 + 4.0)) text-anchor="middle" { (label(f64::from(k) * step)) }
                 }
                 text x=(px(cx)) y=(px(cy + 4.0)) text-anchor="middle" class="halo" { "deviation [" (unit) "]" }
+                @if let Some(magnified) = plot.radius.map(|r| scale * r / (full * BASE)) {
+                    text x=(px(cx)) y=(px(cy + 20.0)) text-anchor="middle" class="halo" {
+                        "magnified " (format::number(magnified, 3, Medium::Page)) " times"
+                    }
+                }
             }
         }
     }
