@@ -11,7 +11,7 @@ from pathlib import Path
 PICTURES = [
     (1, "The chain from command to trace", "diagnosis-chain.svg"),
     (1, "Plot: Against omega1.", "diagnosis-residual.svg"),
-    (2, "Polar plot: Radial deviation", "circle.svg"),
+    (2, "Polar plot: Diagnosed model", "circle.svg"),
 ]
 
 for report, label, name in PICTURES:

@@ -63,8 +63,8 @@ fn the_circular_test_names_what_acts_on_the_axes_and_refuses_nonsense() {
     let output = eixo(&["circle", "x.toml", "--report", "c.html", "-o", "c.csv"], folder.path());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(said.contains("coulomb_motor on X, coulomb_motor on Y") && said.contains("peak at +X"), "{said}");
-    assert!(text(folder.path(), "c.html").contains("Radial deviation, magnified"));
+    assert!(said.contains("coulomb_motor on X and Y") && said.contains("peak at +X"), "{said}");
+    assert!(text(folder.path(), "c.html").contains("Axes with their effects: radial deviation, magnified"));
     assert!(text(folder.path(), "c.csv").starts_with("x [m],y [m]\n"));
     let output = eixo(&["circle", "--feed", "0"], folder.path());
     assert_eq!(output.status.code(), Some(2));
