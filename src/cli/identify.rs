@@ -16,7 +16,9 @@ use crate::axis::{Scheme, Structure};
 use crate::fleet::{Found, Tracked};
 use crate::identify::result::{Estimate, Identification};
 use crate::identify::run::{Method, Request, identify};
+use crate::identify::stream;
 use crate::report::{Block, Cell, Table, terminal};
+use crate::trace::stream::Stream;
 use crate::trace::{Hold, Machine, load, write_text};
 
 /// Estimators on offer.
@@ -63,6 +65,7 @@ pub enum Holds {
 #[command(after_help = "Examples:
   eixo identify trace.csv --axis axis.toml --report identification.html
   eixo identify machines/ --axis axis.toml --output identifications
+  eixo identify year.parquet --stream --method ls,rls
   eixo identify --paper-tables")]
 pub struct Args {
     /// Traces (CSV, Parquet, MATLAB 5) with time, T, theta1, theta2 (and omega1, omega2), or logs that --axis maps to them; with
@@ -103,6 +106,9 @@ pub struct Args {
     /// Integration of the simulations
     #[arg(long, value_enum, default_value_t = Integration::Auto)]
     integration: Integration,
+    /// Read the trace piece by piece, for one larger than memory (CSV or Parquet): LS and RLS alone
+    #[arg(long, conflicts_with_all = ["from", "to", "period", "paper", "paper_tables"])]
+    stream: bool,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE", conflicts_with = "output")]
     json: Option<PathBuf>,
@@ -135,7 +141,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     anyhow::ensure!(args.p0 > 0.0 && args.p0.is_finite(), "--p0 is {}: it must be greater than zero", args.p0);
     if args.many.is_wanted(&args.traces)? {
         // All that bears on the result, in words.
-        let settings = format!("{:?} {:?} {:?} {:?}", request(&args, true), args.hold, args.from, args.to);
+        let settings =
+            format!("{:?} {:?} {:?} {:?} {}", request(&args, true), args.hold, args.from, args.to, args.stream);
         return args.many.run("identify", &FACTS, settings, &args.traces, args.axis.as_deref(), &|item| {
             let (_, result) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
             found(&result)
@@ -182,10 +189,22 @@ fn examine(
         Some(Holds::Linear) => machine.signals.hold = Hold::Linear,
         None => {}
     }
+    let file = path.display().to_string();
     progress("reading the trace");
+    if args.stream {
+        anyhow::ensure!(
+            machine.structure == Structure::TwoInertia,
+            "{file}: a rigid axis is not identified piece by piece; leave --stream out, or cut the trace into parts"
+        );
+        let stream = Stream::open(path, &machine.signals)?;
+        let mut request = request(args, axis.is_some());
+        request.methods.retain(|m| stream::METHODS.contains(m));
+        anyhow::ensure!(!request.methods.is_empty(), "--stream: only --method ls and rls are computed piece by piece");
+        let result = stream::identify(&stream, &machine, &request, &file, progress).context(file)?;
+        return Ok((machine, result));
+    }
     let loaded = load(path, &machine.signals)?;
     let trace = cut(loaded.trace, args.from, args.to, path)?;
-    let file = path.display().to_string();
     let mut result = identify(&trace, &machine, &request(args, axis.is_some()), &file, progress).context(file)?;
     result.warnings.splice(0..0, loaded.warnings);
     Ok((machine, result))
@@ -216,7 +235,7 @@ fn found(result: &Identification) -> anyhow::Result<Found> {
     let tracked = |e: &Estimate| Tracked { name: e.name.to_owned(), unit: e.unit.to_owned(), value: e.value, std: e.std };
     Ok(Found {
         facts: vec![
-            json!(if white { "white" } else { "not_white" }),
+            json!(if method.explains_exactly() || white { "explained" } else { "not_explained" }),
             json!(method.method),
             json!(fit),
             json!(best.why),

@@ -99,6 +99,8 @@ fn words(answer: &str) -> &str {
     match answer {
         "no_gap" => "no gap",
         "effect" => "an effect",
+        "explained" => "explained down to the noise",
+        "not_explained" => "not fully explained",
         other => other,
     }
 }
@@ -215,7 +217,7 @@ fn traces(plan: &Plan, rows: &[Placed], trends: &[Trend]) -> Table {
 fn drifts(trends: &[Trend]) -> Vec<Block> {
     let mut table = Table::new(
         "First and last estimate, and the rise of the line through all of them, relative to their mean",
-        ["machine", "parameter", "records", "first", "last", "change", "drift over the period"],
+        ["machine", "parameter", "records", "drift over the period", "first", "last"],
     );
     for t in trends {
         let estimate = |v: Option<&(f64, Option<f64>)>| match v {
@@ -227,10 +229,9 @@ fn drifts(trends: &[Trend]) -> Vec<Block> {
             Cell::text(t.machine),
             Cell::text(&*t.parameter.name),
             Cell::Count(t.at.len() as u64),
+            if t.drift().is_some() { drift(t) } else { t.change().map_or(Cell::Empty, Cell::Percent) },
             estimate(t.values.first()),
             estimate(t.values.last()),
-            t.change().map_or(Cell::Empty, Cell::Percent),
-            drift(t),
         ];
         if t.stands_out() { table.strong_row(cells) } else { table.row(cells) }
     }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Rows of a block: with a handful of columns it stays in the first-level cache.
-const BLOCK: usize = 512;
+pub const BLOCK: usize = 512;
 /// Smallest singular value of the unit-norm triangle, relative to the largest, that counts as rank.
 pub const RANK_TOLERANCE: f64 = 1e-12;
 
@@ -65,36 +65,9 @@ pub fn triangularise<F>(rows: usize, regressors: usize, outputs: usize, fill: F)
 where
     F: Fn(usize, &mut [f64]) + Sync,
 {
-    let width = regressors + outputs;
-    let blocks = rows.div_ceil(BLOCK);
-    let triangles: Vec<Vec<f64>> = (0..blocks)
-        .into_par_iter()
-        .map_init(
-            || (vec![0.0; BLOCK * width], vec![0.0; width]),
-            |(block, row), b| {
-                let first = b * BLOCK;
-                let count = BLOCK.min(rows - first);
-                for i in 0..count {
-                    fill(first + i, row);
-                    for (j, value) in row.iter().enumerate() {
-                        block[j * count + i] = *value;
-                    }
-                }
-                reduce(&mut block[..count * width], count, width)
-            },
-        )
-        .collect();
-    // The order of merging is that of the blocks, whichever thread made them.
-    let mut total = vec![0.0; width * width];
-    let mut stacked = vec![0.0; 2 * width * width];
-    for triangle in triangles {
-        for j in 0..width {
-            stacked[j * 2 * width..][..width].copy_from_slice(&total[j * width..][..width]);
-            stacked[j * 2 * width + width..][..width].copy_from_slice(&triangle[j * width..][..width]);
-        }
-        total = reduce(&mut stacked, 2 * width, width);
-    }
-    Triangle { r: DMatrix::from_column_slice(width, width, &total), regressors, rows }
+    let mut triangle = Triangle::empty(regressors, outputs);
+    triangle.extend(rows, fill);
+    triangle
 }
 
 /// Householder triangularisation of a column-major m x w block, in place; gives the w x w triangle.
@@ -144,6 +117,52 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Triangle {
+    /// Of no rows yet.
+    #[must_use]
+    pub fn empty(regressors: usize, outputs: usize) -> Self {
+        Self { r: DMatrix::zeros(regressors + outputs, regressors + outputs), regressors, rows: 0 }
+    }
+
+    /// Takes `rows` more rows, each written by `fill(row, numbers)` with `row` from 0. The result is that of all rows at
+    /// once, to the bit, where every part but the last has a multiple of [`BLOCK`] rows.
+    pub fn extend<F>(&mut self, rows: usize, fill: F)
+    where
+        F: Fn(usize, &mut [f64]) + Sync,
+    {
+        debug_assert!(self.rows.is_multiple_of(BLOCK), "parts of whole blocks");
+        let width = self.r.ncols();
+        let blocks = rows.div_ceil(BLOCK);
+        let triangles: Vec<Vec<f64>> = (0..blocks)
+            .into_par_iter()
+            .map_init(
+                || (vec![0.0; BLOCK * width], vec![0.0; width]),
+                |(block, row), b| {
+                    let first = b * BLOCK;
+                    let count = BLOCK.min(rows - first);
+                    for i in 0..count {
+                        fill(first + i, row);
+                        for (j, value) in row.iter().enumerate() {
+                            block[j * count + i] = *value;
+                        }
+                    }
+                    reduce(&mut block[..count * width], count, width)
+                },
+            )
+            .collect();
+        // The order of merging is that of the blocks, whichever thread made them.
+        let mut total = self.r.as_slice().to_vec();
+        let mut stacked = vec![0.0; 2 * width * width];
+        for triangle in triangles {
+            for j in 0..width {
+                stacked[j * 2 * width..][..width].copy_from_slice(&total[j * width..][..width]);
+                stacked[j * 2 * width + width..][..width].copy_from_slice(&triangle[j * width..][..width]);
+            }
+            total = reduce(&mut stacked, 2 * width, width);
+        }
+        self.r.copy_from_slice(&total);
+        self.rows += rows;
+    }
+
     /// Root mean square of a column of `[X | Y]`.
     #[must_use]
     pub fn rms(&self, column: usize) -> f64 {

@@ -3,8 +3,10 @@
 pub mod excitation;
 pub mod frequency;
 pub mod instrumental;
+mod judge;
 pub mod levenberg;
 pub mod lsq;
+mod methods;
 pub mod output_error;
 pub mod paper;
 pub mod parameters;
@@ -15,6 +17,7 @@ pub mod result;
 pub mod rigid;
 pub mod run;
 pub mod statistics;
+pub mod stream;
 pub mod tables;
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::axis::Hold;
 use crate::trace::{Signal, Trace, TraceError};
 
 /// Twist offset, in standard deviations of the twist, from which the encoders' zeros are taken to differ.
-const DIFFERENT_ZEROS: f64 = 20.0;
+pub(super) const DIFFERENT_ZEROS: f64 = 20.0;
 
 /// The record of a two-inertia axis.
 #[derive(Debug, Clone)]

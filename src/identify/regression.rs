@@ -10,9 +10,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::lsq::{Deficient, Solution, triangularise};
+use super::lsq::{Deficient, Solution, Triangle, triangularise};
 use super::parameters::{Estimated, Rows};
-use super::record::Record;
+use super::record::{Record, Row};
 use super::recursive::{Els, Rls};
 use super::result::History;
 
@@ -73,8 +73,7 @@ fn unexcited(side: &'static str, names: &[&str], e: &Deficient) -> RegressionErr
 const MOTOR: [&str; 3] = ["K", "B", "I1"];
 const TABLE: [&str; 2] = ["K/I2", "B/I2"];
 
-fn long_enough(record: &Record, unknowns: usize) -> Result<usize, RegressionError> {
-    let rows = record.rows();
+fn long_enough(rows: usize, unknowns: usize) -> Result<usize, RegressionError> {
     if rows < 4 * unknowns { Err(RegressionError::TooShort { rows, unknowns }) } else { Ok(rows) }
 }
 
@@ -93,47 +92,89 @@ pub fn least_squares(record: &Record) -> Result<Estimated, RegressionError> {
 
 /// Least squares for both rows.
 pub(super) fn rows(record: &Record) -> Result<Rows, RegressionError> {
-    let n = long_enough(record, 5)?;
-    let motor = triangularise(n, 3, 1, |k, out| {
-        let r = record.row(k);
-        out.copy_from_slice(&[-r.twist, -r.rate, r.torque, r.a1]);
-    });
-    let table = triangularise(n, 2, 1, |k, out| {
-        let r = record.row(k);
-        out.copy_from_slice(&[r.twist, r.rate, r.a2]);
-    });
-    let m = motor.solve().map_err(|e| unexcited("motor", &MOTOR, &e))?;
-    let t = table.solve().map_err(|e| unexcited("table", &TABLE, &e))?;
-    if t.phi.iter().all(|v| *v == 0.0) {
-        let why = "the table does not move".to_owned();
-        return Err(RegressionError::Unexcited { side: "table", parameters: "I2".to_owned(), why });
+    let mut squares = LeastSquares::new();
+    squares.extend(record, record.rows());
+    squares.rows()
+}
+
+/// Least squares that takes the rows part by part.
+pub(super) struct LeastSquares {
+    motor: Triangle,
+    table: Triangle,
+    count: usize,
+}
+
+impl LeastSquares {
+    pub fn new() -> Self {
+        Self { motor: Triangle::empty(3, 1), table: Triangle::empty(2, 1), count: 0 }
     }
-    let (vm, vt) = (variance(&m, motor.rms(3)), variance(&t, table.rms(2)));
-    Ok(Rows {
-        motor: SVector::from_fn(|i, _| m.phi[(i, 0)]),
-        motor_covariance: SMatrix::from_fn(|i, j| m.inverse[(i, j)] * vm),
-        table: SVector::from_fn(|i, _| t.phi[(i, 0)]),
-        table_covariance: SMatrix::from_fn(|i, j| t.inverse[(i, j)] * vt),
-    })
+
+    /// Takes the first `count` rows of a record, a multiple of [`super::lsq::BLOCK`] in every part but the last.
+    pub fn extend(&mut self, record: &Record, count: usize) {
+        self.motor.extend(count, |k, out| {
+            let r = record.row(k);
+            out.copy_from_slice(&[-r.twist, -r.rate, r.torque, r.a1]);
+        });
+        self.table.extend(count, |k, out| {
+            let r = record.row(k);
+            out.copy_from_slice(&[r.twist, r.rate, r.a2]);
+        });
+        self.count += count;
+    }
+
+    /// The estimates.
+    pub fn rows(&self) -> Result<Rows, RegressionError> {
+        long_enough(self.count, 5)?;
+        let m = self.motor.solve().map_err(|e| unexcited("motor", &MOTOR, &e))?;
+        let t = self.table.solve().map_err(|e| unexcited("table", &TABLE, &e))?;
+        if t.phi.iter().all(|v| *v == 0.0) {
+            let why = "the table does not move".to_owned();
+            return Err(RegressionError::Unexcited { side: "table", parameters: "I2".to_owned(), why });
+        }
+        let (vm, vt) = (variance(&m, self.motor.rms(3)), variance(&t, self.table.rms(2)));
+        Ok(Rows {
+            motor: SVector::from_fn(|i, _| m.phi[(i, 0)]),
+            motor_covariance: SMatrix::from_fn(|i, j| m.inverse[(i, j)] * vm),
+            table: SVector::from_fn(|i, _| t.phi[(i, 0)]),
+            table_covariance: SMatrix::from_fn(|i, j| t.inverse[(i, j)] * vt),
+        })
+    }
 }
 
 /// Scales that bring regressors and left sides to unit rms.
-struct Scales {
+pub(super) struct Scales {
     motor: [f64; 4],
     table: [f64; 3],
 }
 
+/// Sums of squares of what a row holds.
+#[derive(Default)]
+pub(super) struct Sums {
+    sums: [f64; 5],
+    count: usize,
+}
+
+impl Sums {
+    /// Takes one row.
+    pub fn take(&mut self, r: &Row) {
+        for (sum, v) in self.sums.iter_mut().zip([r.twist, r.rate, r.torque, r.a1, r.a2]) {
+            *sum += v * v;
+        }
+        self.count += 1;
+    }
+}
+
 impl Scales {
     fn new(record: &Record) -> Result<Self, RegressionError> {
-        let n = long_enough(record, 5)?;
-        let mut sums = [0.0; 5];
-        for k in 0..n {
-            let r = record.row(k);
-            for (sum, v) in sums.iter_mut().zip([r.twist, r.rate, r.torque, r.a1, r.a2]) {
-                *sum += v * v;
-            }
-        }
-        let [twist, rate, torque, a1, a2] = sums.map(|s| (s / n as f64).sqrt());
+        let mut sums = Sums::default();
+        (0..record.rows()).for_each(|k| sums.take(&record.row(k)));
+        Self::of(&sums)
+    }
+
+    /// From the sums over all rows.
+    pub fn of(sums: &Sums) -> Result<Self, RegressionError> {
+        let n = long_enough(sums.count, 5)?;
+        let [twist, rate, torque, a1, a2] = sums.sums.map(|s| (s / n as f64).sqrt());
         for (value, name) in [(twist, "K"), (rate, "B"), (torque, "I1"), (a1, "I1"), (a2, "I2")] {
             if value == 0.0 || !value.is_finite() {
                 let why = "the signal that goes with it is zero throughout".to_owned();
@@ -208,36 +249,72 @@ impl Recorder {
 /// # Errors
 /// When the record is too short or a signal is zero throughout.
 pub fn recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
-    let scales = Scales::new(record)?;
     let n = record.rows();
-    let (mut motor, mut table) = (Rls::<3, 1>::new(lambda, p0), Rls::<2, 1>::new(lambda, p0));
-    let (mut vm, mut vt) = (Variance::default(), Variance::default());
-    let mut recorder = Recorder::new(n);
-    let mut last = None;
+    let mut recursion = Recursion::new(Scales::new(record)?, n, lambda, p0);
     for k in 0..n {
-        let r = record.row(k);
-        let s = &scales.motor;
-        let f = SVector::from([-r.twist / s[0], -r.rate / s[1], r.torque / s[2]]);
-        let y = r.a1 / s[3];
-        motor.update(&f, &[y].into());
-        vm.add(lambda, (y - motor.theta.column(0).dot(&f)).powi(2));
-        let s = &scales.table;
-        let f = SVector::from([r.twist / s[0], r.rate / s[1]]);
-        let y = r.a2 / s[2];
-        table.update(&f, &[y].into());
-        vt.add(lambda, (y - table.theta.column(0).dot(&f)).powi(2));
-        if recorder.wants(k, n) {
-            let estimated = scales
-                .rows(
-                    (motor.theta.column(0).into(), motor.covariance * vm.value()),
-                    (table.theta.column(0).into(), table.covariance * vt.value()),
-                )
-                .reconcile();
-            recorder.take(record.time(k), &estimated);
-            last = Some(estimated);
+        recursion.take(&record.row(k), k, record.time(k));
+    }
+    recursion.finish()
+}
+
+/// Recursive least squares that takes the rows one by one.
+pub(super) struct Recursion {
+    scales: Scales,
+    rows: usize,
+    lambda: f64,
+    motor: Rls<3, 1>,
+    table: Rls<2, 1>,
+    variances: (Variance, Variance),
+    recorder: Recorder,
+    last: Option<Estimated>,
+}
+
+impl Recursion {
+    /// For so many rows.
+    pub fn new(scales: Scales, rows: usize, lambda: f64, p0: f64) -> Self {
+        Self {
+            scales,
+            rows,
+            lambda,
+            motor: Rls::new(lambda, p0),
+            table: Rls::new(lambda, p0),
+            variances: Default::default(),
+            recorder: Recorder::new(rows),
+            last: None,
         }
     }
-    last.map(|e| (e, recorder.history)).ok_or(RegressionError::Diverged { what: "RLS" })
+
+    /// Takes row `k`, which lies at `time` (s).
+    pub fn take(&mut self, r: &Row, k: usize, time: f64) {
+        let (lambda, s) = (self.lambda, &self.scales.motor);
+        let f = SVector::from([-r.twist / s[0], -r.rate / s[1], r.torque / s[2]]);
+        let y = r.a1 / s[3];
+        self.motor.update(&f, &[y].into());
+        self.variances.0.add(lambda, (y - self.motor.theta.column(0).dot(&f)).powi(2));
+        let s = &self.scales.table;
+        let f = SVector::from([r.twist / s[0], r.rate / s[1]]);
+        let y = r.a2 / s[2];
+        self.table.update(&f, &[y].into());
+        self.variances.1.add(lambda, (y - self.table.theta.column(0).dot(&f)).powi(2));
+        if self.recorder.wants(k, self.rows) {
+            let (motor, table) = (&self.motor, &self.table);
+            let estimated = self
+                .scales
+                .rows(
+                    (motor.theta.column(0).into(), motor.covariance * self.variances.0.value()),
+                    (table.theta.column(0).into(), table.covariance * self.variances.1.value()),
+                )
+                .reconcile();
+            self.recorder.take(time, &estimated);
+            self.last = Some(estimated);
+        }
+    }
+
+    /// The estimate at the end and its history.
+    pub fn finish(self) -> Result<(Estimated, History), RegressionError> {
+        let history = self.recorder.history;
+        self.last.map(|e| (e, history)).ok_or(RegressionError::Diverged { what: "RLS" })
+    }
 }
 
 /// Extended least squares, recursive: a moving-average noise model of order [`NOISE_ORDER`] in each row.
@@ -292,7 +369,7 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
 /// # Errors
 /// When the record is too short, does not excite a direction, or the rounds do not settle.
 pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
-    let n = long_enough(record, MOTOR_ELS)?;
+    let n = long_enough(record.rows(), MOTOR_ELS)?;
     let plain = rows(record)?;
     let motor_row = |k: usize| {
         let r = record.row(k);

@@ -3,7 +3,10 @@
 use serde::Serialize;
 
 use super::levenberg::Termination;
-use crate::trace::Signal;
+use super::parameters::Estimated;
+use super::run::NOISE_FREE;
+use crate::axis::Parameters;
+use crate::trace::{Motion, Signal};
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "eixo.identification/1";
@@ -214,6 +217,65 @@ pub struct ResponseOf {
     pub resonance: Option<f64>,
 }
 
+impl OutputFit {
+    /// Whether what is left is rounding, of which whiteness says nothing.
+    #[must_use]
+    pub fn is_rounding(&self) -> bool {
+        self.rms_error <= NOISE_FREE * self.rms
+    }
+}
+
+impl MethodResult {
+    /// A method that has found nothing yet.
+    #[must_use]
+    pub fn empty(method: &'static str, title: &str) -> Self {
+        Self {
+            method,
+            title: title.to_owned(),
+            formulation: String::new(),
+            parameters: Vec::new(),
+            modal: Vec::new(),
+            outputs: Vec::new(),
+            history: None,
+            excitation: None,
+            termination: None,
+            iterations: None,
+            notes: Vec::new(),
+            failure: None,
+        }
+    }
+
+    /// Whether a simulation with the estimates is the record to within rounding: what is left then has a shape, but no cause.
+    #[must_use]
+    pub fn explains_exactly(&self) -> bool {
+        !self.outputs.is_empty() && self.outputs.iter().all(OutputFit::is_rounding)
+    }
+
+    /// Takes the estimates in, against a reference where there is one, with what is to be said of them.
+    pub(super) fn judge(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion) {
+        self.parameters = estimated.estimates(reference, motion);
+        if !estimated.is_physical() {
+            self.notes.push(
+                "the estimates are not physical (an inertia or the stiffness is not positive): noise or an unmodelled \
+                 effect rules this regression; use OE, or diagnose the record"
+                    .to_owned(),
+            );
+            return;
+        }
+        self.modal = estimated.modal(reference);
+        for e in &self.parameters {
+            if let Some(std) = e.std.filter(|s| *s > 0.5 * e.value.abs()) {
+                self.notes.push(format!(
+                    "{} is hardly determined by this record (standard error {:.0} % of the estimate); excite the axis \
+                     more around its natural frequency, or trust the modal parameters",
+                    e.name,
+                    100.0 * std / e.value.abs()
+                ));
+            }
+        }
+    }
+}
+
 impl Estimate {
     /// An estimate against a reference.
     #[must_use]
@@ -243,28 +305,54 @@ impl Series {
 
 /// Indices to plot: all, or the smallest and the largest of each bucket.
 fn thin(values: &[f64]) -> Vec<usize> {
-    if values.len() <= POINTS {
-        return (0..values.len()).collect();
+    let mut thinned = Thinned::new(values.len());
+    values.iter().for_each(|v| thinned.take(*v));
+    thinned.kept.into_iter().map(|(k, _)| k).collect()
+}
+
+/// The points of a long curve that are plotted, taken value by value.
+pub(super) struct Thinned {
+    length: usize,
+    next: usize,
+    /// The end of the bucket that is being filled, and its smallest and largest.
+    bucket: usize,
+    extremes: Option<[(usize, f64); 2]>,
+    /// Index and value.
+    pub kept: Vec<(usize, f64)>,
+}
+
+impl Thinned {
+    /// For so many values.
+    pub const fn new(length: usize) -> Self {
+        Self { length, next: 0, bucket: 0, extremes: None, kept: Vec::new() }
     }
-    let buckets = POINTS / 2;
-    let mut kept = Vec::with_capacity(POINTS);
-    for b in 0..buckets {
-        let range = b * values.len() / buckets..(b + 1) * values.len() / buckets;
-        let (mut low, mut high) = (range.start, range.start);
-        for k in range {
-            if values[k] < values[low] {
-                low = k;
-            }
-            if values[k] > values[high] {
-                high = k;
-            }
+
+    /// Takes the next value.
+    pub fn take(&mut self, value: f64) {
+        let k = self.next;
+        self.next += 1;
+        if self.length <= POINTS {
+            self.kept.push((k, value));
+            return;
         }
-        kept.push(low.min(high));
-        if low != high {
-            kept.push(low.max(high));
+        let [low, high] = self.extremes.get_or_insert([(k, value); 2]);
+        if value < low.1 {
+            *low = (k, value);
+        }
+        if value > high.1 {
+            *high = (k, value);
+        }
+        let buckets = POINTS / 2;
+        if self.next == (self.bucket + 1) * self.length / buckets {
+            let (first, last) = if low.0 < high.0 { (*low, *high) } else { (*high, *low) };
+            self.kept.push(first);
+            if first.0 != last.0 {
+                self.kept.push(last);
+            }
+            self.extremes = None;
+            self.bucket += 1;
         }
     }
-    kept
 }
 
 #[cfg(test)]

@@ -17,11 +17,12 @@
 
 use nalgebra::{DMatrix, DVector, Vector4};
 
+use super::judge::output_fit;
 use super::lsq::triangularise;
 use super::result::{
     Estimate, ExcitationEstimate, Identification, MethodResult, OutputFit, Recommendation, SCHEMA, Series,
 };
-use super::run::{Request, output_fit, summary};
+use super::run::{Request, summary};
 use super::statistics::{rms, spectrum};
 use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
 
@@ -199,20 +200,8 @@ pub(super) fn identify(
     let theta = trace.require(Signal::Theta1)?;
     let motion = machine.signals.motion;
     progress("weak-form least squares");
-    let mut result = MethodResult {
-        method: "ls",
-        title: "Least squares, weak form".to_owned(),
-        formulation: "T = I*a + D*w + F*sign(w) + L".to_owned(),
-        parameters: Vec::new(),
-        modal: Vec::new(),
-        outputs: Vec::new(),
-        history: None,
-        excitation: None,
-        termination: None,
-        iterations: None,
-        notes: Vec::new(),
-        failure: None,
-    };
+    let mut result = MethodResult::empty("ls", "Least squares, weak form");
+    result.formulation = "T = I*a + D*w + F*sign(w) + L".to_owned();
     let unit = Signal::T.unit(motion);
     let mut recommended = None;
     match weak_least_squares(torque, theta, trace.dt, trace.start) {

@@ -1,17 +1,13 @@
 //! One identification from start to finish: every method asked for, its fit, and which one to trust.
 
-use super::frequency::{self, Measured};
-use super::instrumental::instrumental;
-use super::output_error::{Fit, Free, OutputError};
-use super::parameters::Estimated;
+use super::frequency;
+use super::methods::Run;
+use super::output_error::OutputError;
 use super::record::{Record, period};
-use super::regression::{NOISE_ORDER, RegressionError, extended_batch, extended_recursive, least_squares, recursive};
-use super::result::{
-    ExcitationEstimate, History, Identification, MethodResult, OutputFit, Recommendation, SCHEMA, Series, TraceSummary,
-};
-use super::statistics::{deviation, noise_level, rms, spectrum, whiteness};
-use super::{paper, rigid};
-use crate::axis::{Hold, Parameters, Scheme, Structure};
+use super::result::{Identification, MethodResult, Recommendation, SCHEMA, Series, TraceSummary};
+use super::rigid;
+use super::statistics::{noise_level, rms, spectrum};
+use crate::axis::{Hold, Scheme, Structure};
 use crate::effects::EFFECTS;
 use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
 
@@ -52,7 +48,7 @@ impl Method {
         }
     }
 
-    const fn title(self) -> &'static str {
+    pub(super) const fn title(self) -> &'static str {
         match self {
             Self::Ls => "Least squares",
             Self::Rls => "Recursive least squares",
@@ -66,10 +62,10 @@ impl Method {
 }
 
 /// Noise below this share of a signal is rounding: the record was simulated.
-const NOISE_FREE: f64 = 1e-9;
+pub(super) const NOISE_FREE: f64 = 1e-9;
 
 /// Relative difference of a logged speed from the derivative of its angle from which it is left out.
-const DIFFERENT_SPEED: f64 = 0.5;
+pub(super) const DIFFERENT_SPEED: f64 = 0.5;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,7 +109,7 @@ pub const fn hold_name(hold: Hold) -> &'static str {
     }
 }
 
-fn torque_unit(motion: Motion) -> &'static str {
+pub(super) fn torque_unit(motion: Motion) -> &'static str {
     Signal::T.unit(motion)
 }
 
@@ -137,11 +133,7 @@ pub fn identify(
         let off = speed_error(trace, angle, speed);
         if off > DIFFERENT_SPEED {
             consistent.remove(speed);
-            warnings.push(format!(
-                "{speed} is not the derivative of {angle} (they differ by {:.0} %): a filtered, delayed or differently \
-                 scaled speed; it is left out. Leave it out of [signals], or mend its scale there",
-                100.0 * off
-            ));
+            warnings.push(different_speed(speed, angle, off));
         }
     }
     let trace = &consistent;
@@ -244,6 +236,15 @@ pub fn identify(
     })
 }
 
+/// What to tell of a speed that is left out.
+pub(super) fn different_speed(speed: Signal, angle: Signal, off: f64) -> String {
+    format!(
+        "{speed} is not the derivative of {angle} (they differ by {:.0} %): a filtered, delayed or differently scaled \
+         speed; it is left out. Leave it out of [signals], or mend its scale there",
+        100.0 * off
+    )
+}
+
 /// How far a logged speed is from the derivative of its angle, relative root mean square: the angle's way over eight
 /// samples against the integral of the speed. Zero where one of them is not logged.
 fn speed_error(trace: &Trace, angle: Signal, speed: Signal) -> f64 {
@@ -273,322 +274,6 @@ pub(super) fn summary(trace: &Trace, file: &str, period: Option<usize>) -> Trace
     }
 }
 
-struct Run<'a> {
-    trace: &'a Trace,
-    /// What simulations are compared with.
-    compared: &'a Trace,
-    machine: &'a Machine,
-    request: &'a Request,
-    record: &'a Record<'a>,
-    outputs: &'a OutputError<'a>,
-    measured: Option<&'a Measured>,
-    estimates: Vec<(&'static str, Estimated)>,
-    oe: Option<Fit>,
-}
-
-type Found = (Estimated, Option<History>);
-
-impl Run<'_> {
-    fn method(&mut self, method: Method) -> MethodResult {
-        let (lambda, p0) = (self.request.forgetting, self.request.p0);
-        let mut result = MethodResult {
-            method: method.name(),
-            title: method.title().to_owned(),
-            formulation: String::new(),
-            parameters: Vec::new(),
-            modal: Vec::new(),
-            outputs: Vec::new(),
-            history: None,
-            excitation: None,
-            termination: None,
-            iterations: None,
-            notes: Vec::new(),
-            failure: None,
-        };
-        let plain = format!("F5, {}", self.record.equations());
-        let recursive_words = format!("forgetting factor {lambda}, P(0) = {p0:e}");
-        let found: Result<Found, String> = match method {
-            _ if self.request.paper && matches!(method, Method::Ls | Method::Rls | Method::Els | Method::ElsBatch) => {
-                result.formulation = "Euler 5x4 (paper, eq. 6)".to_owned();
-                result.notes.push(paper::EULER_NOTE.to_owned());
-                self.euler(method)
-            }
-            Method::Ls => {
-                result.formulation = format!("{plain}; QR");
-                least_squares(self.record).map(|e| (e, None)).map_err(|e| e.to_string())
-            }
-            Method::Rls => {
-                result.formulation = format!("{plain}; {recursive_words}");
-                recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
-            }
-            Method::Els => {
-                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}; {recursive_words}");
-                extended_recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
-            }
-            Method::ElsBatch => {
-                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}");
-                extended_batch(self.record).map(|e| (e, None)).map_err(|e| e.to_string())
-            }
-            Method::Iv => {
-                result.formulation = format!("S4, {}; instruments simulated", self.record.equations());
-                self.instrumental(&mut result).map(|e| (e, None)).map_err(|e| e.to_string())
-            }
-            Method::Oe => self.output_error(&mut result).map(|e| (e, None)),
-            Method::Frequency => self.frequency(&mut result).map(|e| (e, None)),
-        };
-        match found {
-            Ok((estimated, history)) => {
-                result.history = history;
-                self.take(&mut result, estimated);
-            }
-            Err(why) => result.failure = Some(why),
-        }
-        result
-    }
-
-    fn take(&mut self, result: &mut MethodResult, estimated: Estimated) {
-        let reference = self.request.reference.then_some(&self.machine.parameters);
-        result.parameters = estimated.estimates(reference, self.machine.signals.motion);
-        if estimated.is_physical() {
-            result.modal = estimated.modal(reference);
-            for e in &result.parameters {
-                if e.std.is_some_and(|s| s > 0.5 * e.value.abs()) {
-                    result.notes.push(format!(
-                        "{} is hardly determined by this record (standard error {:.0} % of the estimate); excite the \
-                         axis more around its natural frequency, or trust the modal parameters",
-                        e.name,
-                        100.0 * e.std.unwrap_or_default() / e.value.abs()
-                    ));
-                }
-            }
-        } else {
-            result.notes.push(
-                "the estimates are not physical (an inertia or the stiffness is not positive): noise or an unmodelled \
-                 effect rules this regression; use OE, or diagnose the record"
-                    .to_owned(),
-            );
-        }
-        self.estimates.push((result.method, estimated));
-    }
-
-    fn euler(&self, method: Method) -> Result<Found, String> {
-        let (lambda, p0) = (self.request.forgetting, self.request.p0);
-        match method {
-            Method::Ls => paper::euler_least_squares(self.record).map(|e| (e, None)),
-            Method::Rls => paper::euler_recursive(self.record, lambda, p0, false).map(|(e, h)| (e, Some(h))),
-            Method::Els => paper::euler_recursive(self.record, lambda, p0, true).map(|(e, h)| (e, Some(h))),
-            _ => Err(RegressionError::Diverged { what: "batch ELS has no Euler form; it" }),
-        }
-        .map_err(|e| e.to_string())
-    }
-
-    /// The start that simulates best, of all estimates so far and the axis file.
-    fn start(&self) -> Option<Parameters> {
-        let rho = self.machine.parameters.rho;
-        let mut starts: Vec<Parameters> = self
-            .estimates
-            .iter()
-            .filter(|(_, e)| e.is_physical())
-            .map(|(_, e)| e.parameters(rho))
-            .map(|p| Parameters { b: p.b.max(0.0), ..p })
-            .collect();
-        if starts.is_empty() {
-            // Nothing was asked for that could serve: least squares costs next to nothing.
-            starts.extend(least_squares(self.record).ok().filter(Estimated::is_physical).map(|e| e.parameters(rho)));
-        }
-        if let Some(measured) = self.measured {
-            starts.extend(measured.guess(rho));
-        }
-        starts.push(self.machine.parameters);
-        let free = Free { parameters: false, offset: self.record.zero_offset != 0.0, bias: true };
-        starts
-            .into_iter()
-            .filter(|p| p.check(Structure::TwoInertia).is_ok() && p.k > 0.0)
-            .map(|p| (likelihood(&self.outputs.fit(&p, Scheme::Exact, free), self.record.len()), p))
-            .filter(|(l, _)| l.is_finite())
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, p)| p)
-    }
-
-    fn instrumental(&self, result: &mut MethodResult) -> Result<Estimated, RegressionError> {
-        let start = self.start().ok_or(RegressionError::Diverged { what: "the search for a start" })?;
-        let (estimated, rounds) = instrumental(self.record, self.outputs, &start)?;
-        result.iterations = Some(rounds);
-        Ok(estimated)
-    }
-
-    fn output_error(&mut self, result: &mut MethodResult) -> Result<Estimated, String> {
-        let start = self.start().ok_or("no physical start was found: give one with --axis")?;
-        let offset = self.record.zero_offset != 0.0;
-        let plain = Free { parameters: true, offset, bias: false };
-        let schemes = self.request.scheme.map_or_else(|| vec![Scheme::Exact, Scheme::NEWMARK], |s| vec![s]);
-        let n = self.compared.len();
-        let better = |a: Fit, b: Fit| if likelihood(&b, n) > likelihood(&a, n) { b } else { a };
-        let mut best = schemes
-            .iter()
-            .map(|s| self.outputs.fit(&start, *s, plain))
-            .reduce(better)
-            .ok_or("no integration scheme was asked for")?;
-        // A constant torque (amplifier offset, gravity) joins where it explains more than chance would.
-        let exact = best.sigma.iter().zip(self.outputs.outputs()).all(|(s, (_, y))| *s < 1e-9 * rms(y));
-        if !exact {
-            let rho = self.machine.parameters.rho;
-            let with = self.outputs.fit(&best.estimated.parameters(rho), best.scheme, Free { bias: true, ..plain });
-            if likelihood(&with, n) - likelihood(&best, n) > (n as f64).ln() + 10.0 {
-                best = with;
-            }
-        }
-        let integration = match best.scheme {
-            Scheme::Exact => "exact integration",
-            Scheme::Newmark { .. } => "Newmark integration at the sampling interval",
-        };
-        let hold = hold_name(self.trace.hold);
-        let channels: Vec<&str> = self.outputs.outputs().map(|(s, _)| s.name()).collect();
-        result.formulation = format!("simulation of {} against the record; {integration}, {hold}", channels.join(", "));
-        if best.bias != 0.0 {
-            let unit = torque_unit(self.machine.signals.motion);
-            result.notes.push(format!("a constant torque of {:.6e} {unit} was fitted with the parameters", best.bias));
-        }
-        result.termination = Some(best.termination);
-        result.iterations = Some(best.iterations);
-        if !best.termination.is_converged() {
-            result.notes.push("the fit did not converge: give a nearer start with --axis".to_owned());
-        }
-        let estimated = best.estimated.clone();
-        self.oe = Some(best);
-        Ok(estimated)
-    }
-
-    fn frequency(&self, result: &mut MethodResult) -> Result<Estimated, String> {
-        let measured = self.measured.ok_or("the record is not periodic")?;
-        let rho = self.machine.parameters.rho;
-        let scheme = self.request.scheme.unwrap_or(Scheme::Exact);
-        let mut starts: Vec<Parameters> = measured.guess(rho).into_iter().collect();
-        starts.extend(self.estimates.iter().filter(|(_, e)| e.is_physical()).map(|(_, e)| e.parameters(rho)));
-        starts.push(self.machine.parameters);
-        let fit = starts
-            .iter()
-            .filter(|p| p.check(Structure::TwoInertia).is_ok() && p.k > 0.0)
-            .map(|p| measured.fit(p, scheme))
-            .min_by(|a, b| a.model_error.total_cmp(&b.model_error))
-            .ok_or("no physical start was found: give one with --axis")?;
-        let f = measured.frequencies();
-        result.formulation = format!(
-            "response averaged over {} periods of {} samples, {} lines from {:.4} to {:.4} Hz",
-            measured.periods,
-            measured.period,
-            f.len(),
-            f.first().copied().unwrap_or_default(),
-            f.last().copied().unwrap_or_default()
-        );
-        result.notes.push(format!(
-            "the linear model leaves {:.1} % of the response unexplained beyond its noise; the standard errors take \
-             that error as independent from line to line",
-            100.0 * fit.model_error
-        ));
-        result.termination = Some(fit.termination);
-        result.iterations = Some(fit.iterations);
-        Ok(fit.estimated)
-    }
-
-    /// The integration that fits the record: as output error found it, else as asked for.
-    fn scheme(&self) -> Scheme {
-        self.oe.as_ref().map(|f| f.scheme).or(self.request.scheme).unwrap_or(Scheme::Exact)
-    }
-
-    /// Fit, whiteness and excitation estimate of a method's parameters.
-    fn judge(&self, result: &mut MethodResult, scheme: Scheme) {
-        let Some((_, estimated)) = self.estimates.iter().find(|(name, _)| *name == result.method) else { return };
-        result.excitation = Some(self.excitation(estimated));
-        let p = estimated.parameters(self.machine.parameters.rho);
-        if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
-            return;
-        }
-        let free = Free {
-            parameters: false,
-            offset: self.record.zero_offset != 0.0,
-            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
-        };
-        let refit;
-        let fit = match &self.oe {
-            Some(fit) if result.method == Method::Oe.name() => fit,
-            _ => {
-                refit = self.outputs.fit(&p, scheme, free);
-                &refit
-            }
-        };
-        let residuals = self.outputs.residuals(fit);
-        for ((signal, measured), (_, residual)) in self.outputs.outputs().zip(residuals) {
-            result.outputs.push(output_fit(signal, measured, &residual, self.compared, self.machine.signals.motion));
-        }
-    }
-
-    /// The torque from the motion (Inverse Problem 2): `I1*a1 + I2*a2` with measured accelerations, else row 1 of (2)
-    /// between samples.
-    fn excitation(&self, estimated: &Estimated) -> ExcitationEstimate {
-        let v = &estimated.values;
-        let (start, dt) = (self.trace.start, self.trace.dt);
-        let accelerations = self.trace.get(Signal::Alpha1).zip(self.trace.get(Signal::Alpha2));
-        let (formulation, first, estimate, truth): (_, f64, Vec<f64>, Vec<f64>) = match accelerations {
-            Some((a1, a2)) => (
-                "I1*alpha1 + I2*alpha2",
-                start,
-                a1.iter().zip(a2).map(|(a1, a2)| v[0] * a1 + v[1] * a2).collect(),
-                self.trace.get(Signal::T).map_or_else(Vec::new, <[f64]>::to_vec),
-            ),
-            None => {
-                let rows: Vec<_> = (0..self.record.rows()).map(|k| self.record.row(k)).collect();
-                (
-                    "I1*a1 + B*(w1 - w2) + K*(th1 - th2) between samples",
-                    self.record.time(0),
-                    rows.iter().map(|r| v[0] * r.a1 + v[2] * r.rate + v[3] * r.twist).collect(),
-                    rows.iter().map(|r| r.torque).collect(),
-                )
-            }
-        };
-        let error: Vec<f64> = estimate.iter().zip(&truth).map(|(a, b)| a - b).collect();
-        let unit = torque_unit(self.machine.signals.motion);
-        ExcitationEstimate {
-            formulation,
-            error_percent: 100.0 * rms(&error) / rms(&truth).max(f64::MIN_POSITIVE),
-            estimate: Series::over_time("estimated T", unit, first, dt, &estimate),
-            error: Series::over_time("error of T", unit, first, dt, &error),
-            spectrum: spectrum("estimated T", unit, dt, &estimate),
-        }
-    }
-}
-
-/// Fit and whiteness of one output.
-pub(super) fn output_fit(
-    signal: Signal,
-    measured: &[f64],
-    residual: &[f64],
-    trace: &Trace,
-    motion: Motion,
-) -> OutputFit {
-    let size = deviation(measured);
-    let error = rms(residual);
-    OutputFit {
-        signal,
-        rms: size,
-        rms_error: error,
-        fit_percent: 100.0 * (1.0 - error / size.max(f64::MIN_POSITIVE)),
-        whiteness: whiteness(residual),
-        residual: Series::over_time(
-            format!("{signal}: measured - simulated"),
-            signal.unit(motion),
-            trace.start,
-            trace.dt,
-            residual,
-        ),
-    }
-}
-
-/// Twice the logarithm of the likelihood, but for a constant, at the levels of the residuals.
-fn likelihood(fit: &Fit, samples: usize) -> f64 {
-    -2.0 * samples as f64 * fit.sigma.iter().map(|s| s.ln()).sum::<f64>()
-}
-
 fn recommend(methods: &[MethodResult], speeds: bool) -> Option<Recommendation> {
     let usable = |m: &&(usize, &MethodResult)| m.1.failure.is_none() && !m.1.modal.is_empty();
     let all: Vec<(usize, &MethodResult)> = methods.iter().enumerate().collect();
@@ -601,6 +286,10 @@ fn recommend(methods: &[MethodResult], speeds: bool) -> Option<Recommendation> {
     let frequency =
         find("frequency").filter(|(_, m)| m.termination.is_some_and(super::levenberg::Termination::is_converged));
     if let Some((index, m)) = oe {
+        if m.explains_exactly() {
+            let why = "its simulation is the record to within rounding: nothing is left to explain";
+            return Some(Recommendation { method: *index, why: why.to_owned() });
+        }
         let white = m.outputs.iter().all(|o| o.whiteness.white);
         if let (Some((other, _)), false) = (frequency, white) {
             return Some(Recommendation {

@@ -195,8 +195,8 @@ fn fits(found: &Identification) -> Table {
             cells.push(fit.map_or(Cell::Empty, |o| Cell::Percent(o.fit_percent / 100.0)));
         }
         let coloured: Vec<&str> =
-            m.outputs.iter().filter(|o| !o.whiteness.white && !is_rounding(o)).map(|o| o.signal.name()).collect();
-        cells.push(Cell::text(if m.outputs.iter().all(is_rounding) {
+            m.outputs.iter().filter(|o| !o.whiteness.white && !o.is_rounding()).map(|o| o.signal.name()).collect();
+        cells.push(Cell::text(if m.outputs.iter().all(OutputFit::is_rounding) {
             "nothing is left but rounding".to_owned()
         } else if coloured.is_empty() {
             "yes".to_owned()
@@ -206,11 +206,6 @@ fn fits(found: &Identification) -> Table {
         table.row(cells);
     }
     table
-}
-
-/// Whether what is left is rounding, of which whiteness says nothing.
-fn is_rounding(o: &OutputFit) -> bool {
-    o.rms_error <= 1e-10 * o.rms
 }
 
 fn fit(found: &Identification) -> Vec<Block> {
@@ -227,7 +222,7 @@ fn fit(found: &Identification) -> Vec<Block> {
                 )
                 .with(line("", &o.residual));
                 let w = &o.whiteness;
-                let caption = if is_rounding(o) {
+                let caption = if o.is_rounding() {
                     "Rounding of the simulation: nothing is left.".to_owned()
                 } else {
                     format!(
@@ -483,7 +478,11 @@ fn excitation(found: &Identification) -> Vec<Block> {
         .with(line("", &e.error).in_colour(colour));
         errors.push(Figure::new(error, ""));
     }
-    let mut figures = vec![Figure::new(spectrum("Spectrum of the excitation").with(own), "")];
+    let mut figures = Vec::new();
+    // A streamed record has none.
+    if !own.x.is_empty() {
+        figures.push(Figure::new(spectrum("Spectrum of the excitation").with(own), ""));
+    }
     if !errors.is_empty() {
         figures.push(Figure::new(estimated, ""));
     }

@@ -1,0 +1,104 @@
+//! What a method's estimates are worth: a simulation against the record, and the torque that they make of the motion.
+
+use super::methods::Run;
+use super::output_error::Free;
+use super::parameters::Estimated;
+use super::result::{ExcitationEstimate, MethodResult, OutputFit, Series};
+use super::run::{Method, torque_unit};
+use super::statistics::{deviation, rms, spectrum, whiteness};
+use crate::axis::{Scheme, Structure};
+use crate::trace::{Motion, Signal, Trace};
+
+impl Run<'_> {
+    /// The integration that fits the record: as output error found it, else as asked for.
+    pub fn scheme(&self) -> Scheme {
+        self.oe.as_ref().map(|f| f.scheme).or(self.request.scheme).unwrap_or(Scheme::Exact)
+    }
+
+    /// Fit, whiteness and excitation estimate of a method's parameters.
+    pub fn judge(&self, result: &mut MethodResult, scheme: Scheme) {
+        let Some((_, estimated)) = self.estimates.iter().find(|(name, _)| *name == result.method) else { return };
+        result.excitation = Some(self.excitation(estimated));
+        let p = estimated.parameters(self.machine.parameters.rho);
+        if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
+            return;
+        }
+        let free = Free {
+            parameters: false,
+            offset: self.record.zero_offset != 0.0,
+            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
+        };
+        let refit;
+        let fit = match &self.oe {
+            Some(fit) if result.method == Method::Oe.name() => fit,
+            _ => {
+                refit = self.outputs.fit(&p, scheme, free);
+                &refit
+            }
+        };
+        let residuals = self.outputs.residuals(fit);
+        for ((signal, measured), (_, residual)) in self.outputs.outputs().zip(residuals) {
+            result.outputs.push(output_fit(signal, measured, &residual, self.compared, self.machine.signals.motion));
+        }
+    }
+
+    /// The torque from the motion (Inverse Problem 2): `I1*a1 + I2*a2` with measured accelerations, else row 1 of (2)
+    /// between samples.
+    fn excitation(&self, estimated: &Estimated) -> ExcitationEstimate {
+        let v = &estimated.values;
+        let (start, dt) = (self.trace.start, self.trace.dt);
+        let accelerations = self.trace.get(Signal::Alpha1).zip(self.trace.get(Signal::Alpha2));
+        let (formulation, first, estimate, truth): (_, f64, Vec<f64>, Vec<f64>) = match accelerations {
+            Some((a1, a2)) => (
+                "I1*alpha1 + I2*alpha2",
+                start,
+                a1.iter().zip(a2).map(|(a1, a2)| v[0] * a1 + v[1] * a2).collect(),
+                self.trace.get(Signal::T).map_or_else(Vec::new, <[f64]>::to_vec),
+            ),
+            None => {
+                let rows: Vec<_> = (0..self.record.rows()).map(|k| self.record.row(k)).collect();
+                (
+                    "I1*a1 + B*(w1 - w2) + K*(th1 - th2) between samples",
+                    self.record.time(0),
+                    rows.iter().map(|r| v[0] * r.a1 + v[2] * r.rate + v[3] * r.twist).collect(),
+                    rows.iter().map(|r| r.torque).collect(),
+                )
+            }
+        };
+        let error: Vec<f64> = estimate.iter().zip(&truth).map(|(a, b)| a - b).collect();
+        let unit = torque_unit(self.machine.signals.motion);
+        ExcitationEstimate {
+            formulation,
+            error_percent: 100.0 * rms(&error) / rms(&truth).max(f64::MIN_POSITIVE),
+            estimate: Series::over_time("estimated T", unit, first, dt, &estimate),
+            error: Series::over_time("error of T", unit, first, dt, &error),
+            spectrum: spectrum("estimated T", unit, dt, &estimate),
+        }
+    }
+}
+
+/// Fit and whiteness of one output.
+pub(super) fn output_fit(
+    signal: Signal,
+    measured: &[f64],
+    residual: &[f64],
+    trace: &Trace,
+    motion: Motion,
+) -> OutputFit {
+    let size = deviation(measured);
+    let error = rms(residual);
+    OutputFit {
+        signal,
+        rms: size,
+        rms_error: error,
+        fit_percent: 100.0 * (1.0 - error / size.max(f64::MIN_POSITIVE)),
+        whiteness: whiteness(residual),
+        residual: Series::over_time(
+            format!("{signal}: measured - simulated"),
+            signal.unit(motion),
+            trace.start,
+            trace.dt,
+            residual,
+        ),
+    }
+}

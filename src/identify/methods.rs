@@ -1,0 +1,208 @@
+//! Each method on a record: what it starts from, what it is called, how it ended.
+
+use super::frequency::Measured;
+use super::instrumental::instrumental;
+use super::output_error::{Fit, Free, OutputError};
+use super::paper;
+use super::parameters::Estimated;
+use super::record::Record;
+use super::regression::{NOISE_ORDER, RegressionError, extended_batch, extended_recursive, least_squares, recursive};
+use super::result::{History, MethodResult};
+use super::run::{Method, Request, hold_name, torque_unit};
+use super::statistics::rms;
+use crate::axis::{Parameters, Scheme, Structure};
+use crate::trace::{Machine, Trace};
+
+/// One record with what the methods share.
+pub(super) struct Run<'a> {
+    pub trace: &'a Trace,
+    /// What simulations are compared with.
+    pub compared: &'a Trace,
+    pub machine: &'a Machine,
+    pub request: &'a Request,
+    pub record: &'a Record<'a>,
+    pub outputs: &'a OutputError<'a>,
+    pub measured: Option<&'a Measured>,
+    pub estimates: Vec<(&'static str, Estimated)>,
+    pub oe: Option<Fit>,
+}
+
+type Found = (Estimated, Option<History>);
+
+impl Run<'_> {
+    /// Runs a method; the estimates so far are starts for it.
+    pub fn method(&mut self, method: Method) -> MethodResult {
+        let (lambda, p0) = (self.request.forgetting, self.request.p0);
+        let mut result = MethodResult::empty(method.name(), method.title());
+        let plain = format!("F5, {}", self.record.equations());
+        let recursive_words = format!("forgetting factor {lambda}, P(0) = {p0:e}");
+        let found: Result<Found, String> = match method {
+            _ if self.request.paper && matches!(method, Method::Ls | Method::Rls | Method::Els | Method::ElsBatch) => {
+                result.formulation = "Euler 5x4 (paper, eq. 6)".to_owned();
+                result.notes.push(paper::EULER_NOTE.to_owned());
+                self.euler(method)
+            }
+            Method::Ls => {
+                result.formulation = format!("{plain}; QR");
+                least_squares(self.record).map(|e| (e, None)).map_err(|e| e.to_string())
+            }
+            Method::Rls => {
+                result.formulation = format!("{plain}; {recursive_words}");
+                recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
+            }
+            Method::Els => {
+                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}; {recursive_words}");
+                extended_recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
+            }
+            Method::ElsBatch => {
+                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}");
+                extended_batch(self.record).map(|e| (e, None)).map_err(|e| e.to_string())
+            }
+            Method::Iv => {
+                result.formulation = format!("S4, {}; instruments simulated", self.record.equations());
+                self.instrumental(&mut result).map(|e| (e, None)).map_err(|e| e.to_string())
+            }
+            Method::Oe => self.output_error(&mut result).map(|e| (e, None)),
+            Method::Frequency => self.frequency(&mut result).map(|e| (e, None)),
+        };
+        match found {
+            Ok((estimated, history)) => {
+                result.history = history;
+                self.take(&mut result, estimated);
+            }
+            Err(why) => result.failure = Some(why),
+        }
+        result
+    }
+
+    fn take(&mut self, result: &mut MethodResult, estimated: Estimated) {
+        let reference = self.request.reference.then_some(&self.machine.parameters);
+        result.judge(&estimated, reference, self.machine.signals.motion);
+        self.estimates.push((result.method, estimated));
+    }
+
+    fn euler(&self, method: Method) -> Result<Found, String> {
+        let (lambda, p0) = (self.request.forgetting, self.request.p0);
+        match method {
+            Method::Ls => paper::euler_least_squares(self.record).map(|e| (e, None)),
+            Method::Rls => paper::euler_recursive(self.record, lambda, p0, false).map(|(e, h)| (e, Some(h))),
+            Method::Els => paper::euler_recursive(self.record, lambda, p0, true).map(|(e, h)| (e, Some(h))),
+            _ => Err(RegressionError::Diverged { what: "batch ELS has no Euler form; it" }),
+        }
+        .map_err(|e| e.to_string())
+    }
+
+    /// The start that simulates best, of all estimates so far and the axis file.
+    fn start(&self) -> Option<Parameters> {
+        let rho = self.machine.parameters.rho;
+        let mut starts: Vec<Parameters> = self
+            .estimates
+            .iter()
+            .filter(|(_, e)| e.is_physical())
+            .map(|(_, e)| e.parameters(rho))
+            .map(|p| Parameters { b: p.b.max(0.0), ..p })
+            .collect();
+        if starts.is_empty() {
+            // Nothing was asked for that could serve: least squares costs next to nothing.
+            starts.extend(least_squares(self.record).ok().filter(Estimated::is_physical).map(|e| e.parameters(rho)));
+        }
+        if let Some(measured) = self.measured {
+            starts.extend(measured.guess(rho));
+        }
+        starts.push(self.machine.parameters);
+        let free = Free { parameters: false, offset: self.record.zero_offset != 0.0, bias: true };
+        starts
+            .into_iter()
+            .filter(|p| p.check(Structure::TwoInertia).is_ok() && p.k > 0.0)
+            .map(|p| (likelihood(&self.outputs.fit(&p, Scheme::Exact, free), self.record.len()), p))
+            .filter(|(l, _)| l.is_finite())
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, p)| p)
+    }
+
+    fn instrumental(&self, result: &mut MethodResult) -> Result<Estimated, RegressionError> {
+        let start = self.start().ok_or(RegressionError::Diverged { what: "the search for a start" })?;
+        let (estimated, rounds) = instrumental(self.record, self.outputs, &start)?;
+        result.iterations = Some(rounds);
+        Ok(estimated)
+    }
+
+    fn output_error(&mut self, result: &mut MethodResult) -> Result<Estimated, String> {
+        let start = self.start().ok_or("no physical start was found: give one with --axis")?;
+        let offset = self.record.zero_offset != 0.0;
+        let plain = Free { parameters: true, offset, bias: false };
+        let schemes = self.request.scheme.map_or_else(|| vec![Scheme::Exact, Scheme::NEWMARK], |s| vec![s]);
+        let n = self.compared.len();
+        let better = |a: Fit, b: Fit| if likelihood(&b, n) > likelihood(&a, n) { b } else { a };
+        let mut best = schemes
+            .iter()
+            .map(|s| self.outputs.fit(&start, *s, plain))
+            .reduce(better)
+            .ok_or("no integration scheme was asked for")?;
+        // A constant torque (amplifier offset, gravity) joins where it explains more than chance would.
+        let exact = best.sigma.iter().zip(self.outputs.outputs()).all(|(s, (_, y))| *s < 1e-9 * rms(y));
+        if !exact {
+            let rho = self.machine.parameters.rho;
+            let with = self.outputs.fit(&best.estimated.parameters(rho), best.scheme, Free { bias: true, ..plain });
+            if likelihood(&with, n) - likelihood(&best, n) > (n as f64).ln() + 10.0 {
+                best = with;
+            }
+        }
+        let integration = match best.scheme {
+            Scheme::Exact => "exact integration",
+            Scheme::Newmark { .. } => "Newmark integration at the sampling interval",
+        };
+        let hold = hold_name(self.trace.hold);
+        let channels: Vec<&str> = self.outputs.outputs().map(|(s, _)| s.name()).collect();
+        result.formulation = format!("simulation of {} against the record; {integration}, {hold}", channels.join(", "));
+        if best.bias != 0.0 {
+            let unit = torque_unit(self.machine.signals.motion);
+            result.notes.push(format!("a constant torque of {:.6e} {unit} was fitted with the parameters", best.bias));
+        }
+        result.termination = Some(best.termination);
+        result.iterations = Some(best.iterations);
+        if !best.termination.is_converged() {
+            result.notes.push("the fit did not converge: give a nearer start with --axis".to_owned());
+        }
+        let estimated = best.estimated.clone();
+        self.oe = Some(best);
+        Ok(estimated)
+    }
+
+    fn frequency(&self, result: &mut MethodResult) -> Result<Estimated, String> {
+        let measured = self.measured.ok_or("the record is not periodic")?;
+        let rho = self.machine.parameters.rho;
+        let scheme = self.request.scheme.unwrap_or(Scheme::Exact);
+        let mut starts: Vec<Parameters> = measured.guess(rho).into_iter().collect();
+        starts.extend(self.estimates.iter().filter(|(_, e)| e.is_physical()).map(|(_, e)| e.parameters(rho)));
+        starts.push(self.machine.parameters);
+        let fit = starts
+            .iter()
+            .filter(|p| p.check(Structure::TwoInertia).is_ok() && p.k > 0.0)
+            .map(|p| measured.fit(p, scheme))
+            .min_by(|a, b| a.model_error.total_cmp(&b.model_error))
+            .ok_or("no physical start was found: give one with --axis")?;
+        let f = measured.frequencies();
+        result.formulation = format!(
+            "response averaged over {} periods of {} samples, {} lines from {:.4} to {:.4} Hz",
+            measured.periods,
+            measured.period,
+            f.len(),
+            f.first().copied().unwrap_or_default(),
+            f.last().copied().unwrap_or_default()
+        );
+        result.notes.push(format!(
+            "the linear model leaves {:.1} % of the response unexplained beyond its noise; the standard errors take \
+             that error as independent from line to line",
+            100.0 * fit.model_error
+        ));
+        result.termination = Some(fit.termination);
+        result.iterations = Some(fit.iterations);
+        Ok(fit.estimated)
+    }
+}
+
+/// Twice the logarithm of the likelihood, but for a constant, at the levels of the residuals.
+fn likelihood(fit: &Fit, samples: usize) -> f64 {
+    -2.0 * samples as f64 * fit.sigma.iter().map(|s| s.ln()).sum::<f64>()
+}

@@ -1,0 +1,84 @@
+//! `eixo identify --stream`: the memory it takes does not grow with the record.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+
+/// A record of so many rows: a table of 1000 rows of a motion in closed form, time after time.
+fn long(path: &Path, rows: usize) {
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path).expect("the file"));
+    let period: Vec<[f64; 3]> = (0..1000)
+        .map(|k| {
+            let (mut torque, mut theta1, mut theta2) = (0.0, 0.0, 0.0);
+            for h in 1..40_u32 {
+                let phase = f64::from(k) * f64::from(h) * std::f64::consts::TAU / 1000.0 + f64::from(h * h);
+                torque += phase.sin();
+                theta1 += (phase - 0.3).sin() / f64::from(h * h);
+                theta2 += (phase - 0.5).sin() / f64::from(h * h);
+            }
+            [1e-2 * torque, theta1, theta2]
+        })
+        .collect();
+    let mut text = String::from("time,T,theta1,theta2\n");
+    for k in 0..rows {
+        let [torque, theta1, theta2] = period[k % 1000];
+        writeln!(text, "{:.4},{torque:.12},{theta1:.12},{theta2:.12}", k as f64 * 1e-3).expect("text");
+        if text.len() > 1 << 20 || k + 1 == rows {
+            std::io::Write::write_all(&mut file, text.as_bytes()).expect("the file");
+            text.clear();
+        }
+    }
+}
+
+/// Largest resident memory of `eixo identify --stream`, bytes: the last that the kernel says before the process ends.
+fn peak(path: &Path) -> u64 {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_eixo"))
+        .args(["identify", "--stream", "--method", "ls,rls"])
+        .arg(path)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .expect("eixo");
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0;
+    loop {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+        if let Some(kib) = line.and_then(|l| l.trim().strip_suffix("kB")).and_then(|n| n.trim().parse::<u64>().ok()) {
+            peak = peak.max(kib << 10);
+        }
+        if let Some(ended) = child.try_wait().expect("the process") {
+            // Fine, or findings: a record made up in closed form is no axis.
+            assert!(matches!(ended.code(), Some(0 | 1)), "{ended}");
+            return peak;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn memory_stays_the_same_where_the_record_is_five_times_as_long() {
+    if !Path::new("/proc/self/status").exists() {
+        eprintln!("SKIPPED: no /proc to read the memory of a process from");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let measured = |name: &str, rows: usize| {
+        let path = folder.path().join(name);
+        long(&path, rows);
+        (std::fs::metadata(&path).unwrap().len(), peak(&path))
+    };
+    let (short_file, short) = measured("short.csv", 400_000);
+    let (long_file, long) = measured("long.csv", 2_000_000);
+    eprintln!(
+        "{} MB of file: {} MB of memory; {} MB of file: {} MB of memory",
+        short_file >> 20,
+        short >> 20,
+        long_file >> 20,
+        long >> 20
+    );
+    let more = long_file - short_file;
+    assert!(more > 70 << 20);
+    assert!(short > 1 << 20 && long < short + more / 8, "{short} bytes, then {long} bytes");
+    assert!(long < long_file, "{long} bytes for a file of {long_file}");
+}
