@@ -26,9 +26,10 @@ pub struct Many {
     /// Traces at a time; all cores without
     #[arg(long, value_name = "N", requires = "output", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// Keep the results only: another run over all traces puts the summary together
-    #[arg(long, requires = "output")]
-    part: bool,
+    /// Work on this one of the traces only (may be given many times) and keep its result: another run, over all of them, puts
+    /// the summary together
+    #[arg(long, value_name = "TRACE", requires = "output")]
+    part: Vec<PathBuf>,
     /// Print the traces that would be worked on, one a line, and stop
     #[arg(long, requires = "output")]
     list: bool,
@@ -61,7 +62,18 @@ impl Many {
         work: &(dyn Fn(&Item) -> anyhow::Result<Found> + Sync),
     ) -> anyhow::Result<ExitCode> {
         let output = self.output.as_deref().context("no --output folder")?;
-        let items = find(traces, axis, output)?;
+        let mut items = find(traces, axis, output)?;
+        for wanted in &self.part {
+            anyhow::ensure!(
+                items.iter().any(|item| item.path == *wanted),
+                "--part {}: it is not one of the {} traces; --list prints them",
+                wanted.display(),
+                items.len()
+            );
+        }
+        if !self.part.is_empty() {
+            items.retain(|item| self.part.contains(&item.path));
+        }
         if self.list {
             items.iter().for_each(|item| println!("{}", item.path.display()));
             return Ok(ExitCode::SUCCESS);
@@ -70,8 +82,15 @@ impl Many {
             // The pool of the process, once: how many traces are worked on follows from it.
             rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global()?;
         }
-        let plan =
-            Plan { command, facts, settings, items: &items, output, summary: self.summary.as_deref(), part: self.part };
+        let plan = Plan {
+            command,
+            facts,
+            settings,
+            items: &items,
+            output,
+            summary: self.summary.as_deref(),
+            part: !self.part.is_empty(),
+        };
         let bar = progress(items.len() as u64);
         let done = run(&plan, &|item| work(item).map_err(|e| format!("{e:#}")), &|item, words| {
             bar.set_message(item.path.display().to_string());
@@ -82,7 +101,7 @@ impl Many {
         });
         bar.finish_and_clear();
         let outcome = done?;
-        if !self.part {
+        if self.part.is_empty() {
             let colour = std::io::stdout().is_terminal();
             print!("{}", terminal::blocks(&outcome.short, terminal::Layout { colour, width: 120 }));
             println!("\n{}", output.join("index.html").display());
