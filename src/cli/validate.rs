@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::fmu::isolation::{self, Bounds};
 use crate::fmu::output;
 use crate::fmu::validation::{Options, validate};
+use crate::trace::write_text;
 
 use super::FINDINGS;
 
@@ -134,10 +135,6 @@ fn write(args: &Args, text: &str) -> anyhow::Result<()> {
             other => Ok(other?),
         };
     };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| std::path::Path::new("."));
-    let fail = || format!("cannot write {}", path.display());
-    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(fail)?;
-    file.write_all(text.as_bytes()).with_context(fail)?;
-    file.persist(path).with_context(fail)?;
+    write_text(path, text.as_bytes())?;
     Ok(())
 }

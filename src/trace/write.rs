@@ -1,7 +1,11 @@
 //! Trace files out: written beside the target and renamed, so that no half file is left behind.
 
+use std::collections::HashSet;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use sha2::{Digest, Sha256};
 
 use super::error::TraceError;
 use super::signal::Motion;
@@ -55,24 +59,117 @@ pub(crate) fn append_number(text: &mut String, value: f64) {
     debug_assert!(written.is_ok(), "writing to a string");
 }
 
-/// Writes a whole file at once: beside the target first, then renamed.
+/// Writes a whole file at once: beside the target first, then renamed. A file that stands under the final name is complete,
+/// or as it was before, whenever the process ends; what an ended process left beside it is taken away by the next one.
 ///
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
 pub fn write_text(path: &Path, bytes: &[u8]) -> Result<(), TraceError> {
     let failed = |reason| TraceError::Write { path: path.to_owned(), reason };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        // A temporary file is private by default; a result is not: the usual permissions, less the user's mask.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    let mut pending = Pending::in_folder(folder).map_err(failed)?;
+    pending.file.write_all(bytes).map_err(failed)?;
+    pending.persist(path).map_err(failed)
+}
+
+/// What begins the name of a file on its way.
+const PREFIX: &str = ".eixo-";
+/// A file left beside its target for so long belongs to nobody, whichever machine it came from, s.
+const ABANDONED: u64 = 24 * 3600;
+
+/// Files on their way: an interrupt takes them away before the process ends.
+static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A file on its way.
+struct Pending {
+    file: tempfile::NamedTempFile,
+}
+
+impl Pending {
+    fn in_folder(folder: &Path) -> std::io::Result<Self> {
+        prepare(folder);
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            // A temporary file is private by default; a result is not: the usual permissions, less the user's mask.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let prefix = format!("{PREFIX}{}-{}-", processes(), std::process::id());
+        // Made while the list is held, so that no interrupt comes between the file and its entry.
+        let mut all = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        let file = builder.prefix(&prefix).tempfile_in(folder)?;
+        all.push(file.path().to_owned());
+        Ok(Self { file })
     }
-    let mut file = builder.prefix(".eixo-").tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.persist(path).map_err(|e| failed(e.error))?;
-    Ok(())
+
+    fn persist(self, path: &Path) -> std::io::Result<()> {
+        // On the disk before it has its name, so that a power cut leaves no empty file under it.
+        self.file.as_file().sync_all()?;
+        let temporary = self.file.path().to_owned();
+        let mut all = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        let done = self.file.persist(path).map(|_| ()).map_err(|e| e.error);
+        all.retain(|p| *p != temporary);
+        done
+    }
+}
+
+/// Once a process: Ctrl-C and a request to end take the files on their way along. Once a folder: what ended processes left.
+fn prepare(folder: &Path) {
+    static SEEN: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
+    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let folders = seen.get_or_insert_with(|| {
+        // Where a handler is set already, that one decides.
+        let _ = ctrlc::try_set_handler(|| {
+            let all = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+            for path in all.iter() {
+                let _ = std::fs::remove_file(path);
+            }
+            // 128 + SIGINT, as shells have it; with the list held, so that nothing is renamed any more.
+            std::process::exit(130);
+        });
+        HashSet::new()
+    });
+    if folders.insert(folder.to_owned()) {
+        sweep(folder);
+    }
+}
+
+/// Takes away what ended processes left in a folder. A process that runs, here or on another machine that shares the folder,
+/// keeps its own.
+fn sweep(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let mut parts = name.strip_prefix(PREFIX).into_iter().flat_map(|rest| rest.splitn(3, '-'));
+        let (Some(of), Some(process), Some(_)) = (parts.next(), parts.next(), parts.next()) else { continue };
+        let Ok(process) = process.parse::<u32>() else { continue };
+        let ended = of == processes() && of != UNKNOWN && !Path::new("/proc").join(process.to_string()).exists();
+        let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+        if entry.file_type().is_ok_and(|t| t.is_file()) && (ended || age().is_some_and(|a| a.as_secs() > ABANDONED)) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Where no list of processes is known.
+const UNKNOWN: &str = "0";
+
+/// Whose process numbers these are: a hash of the machine's boot and of the container, or [`UNKNOWN`].
+fn processes() -> &'static str {
+    static OWN: OnceLock<String> = OnceLock::new();
+    OWN.get_or_init(|| {
+        let boot = std::fs::read("/proc/sys/kernel/random/boot_id").ok();
+        let space = std::fs::read_link("/proc/self/ns/pid").ok();
+        match (boot, space) {
+            (Some(boot), Some(space)) => {
+                let hash = Sha256::new().chain_update(boot).chain_update(space.to_string_lossy().as_bytes()).finalize();
+                hash.iter().take(6).map(|b| format!("{b:02x}")).collect()
+            }
+            _ => UNKNOWN.to_owned(),
+        }
+    })
 }
 
 #[cfg(test)]
@@ -92,6 +189,26 @@ mod tests {
         write_csv(&path, &trace, Motion::Rotary).unwrap();
         assert_eq!(load(&path, &Mapping::default()).unwrap().trace, trace);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_an_ended_process_left_is_taken_away_and_what_a_running_one_writes_is_not() {
+        if processes() == UNKNOWN {
+            eprintln!("SKIPPED: no list of processes here");
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let mut ended = std::process::Command::new("true").spawn().unwrap();
+        ended.wait().unwrap();
+        let name = |of: &str, process: u32| folder.path().join(format!("{PREFIX}{of}-{process}-abc"));
+        let gone = name(processes(), ended.id());
+        let kept =
+            [name(processes(), std::process::id()), name("0123456789ab", ended.id()), folder.path().join(".eixo-x")];
+        std::fs::write(&gone, "half").unwrap();
+        kept.iter().for_each(|path| std::fs::write(path, "half").unwrap());
+        write_text(&folder.path().join("result.csv"), b"whole").unwrap();
+        assert!(!gone.exists());
+        kept.iter().for_each(|path| assert!(path.exists(), "{}", path.display()));
     }
 
     #[test]

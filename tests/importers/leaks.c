@@ -54,6 +54,70 @@ int main(int argc, char **argv) {
          double *)
     FIND(int, SetRealInputDerivatives, Component, const Reference *, size_t, const int *, const double *)
     FIND(int, GetRealOutputDerivatives, Component, const Reference *, size_t, const int *, double *)
+    /* What an importer must not do: refused with a status, never a bad access. */
+    Callbacks sound = {logger, calloc, free, NULL, NULL}, silent = {NULL, NULL, NULL, NULL, NULL};
+    for (int cycle = 0; cycle < atoi(argv[3]) / 10; ++cycle) {
+        const Reference known = 0;
+        double value = 0.0;
+        State state = NULL;
+        size_t size = 0;
+        char garbage[512];
+        memset(garbage, 0x5a, sizeof garbage);
+        if (Instantiate(NULL, 1, argv[2], NULL, &sound, 0, 1) || Instantiate("axis", 1, NULL, NULL, &sound, 0, 1)
+            || Instantiate("axis", 1, "{not this one}", NULL, &sound, 0, 1) || Instantiate("axis", 1, argv[2], NULL, NULL, 0, 1)
+            || Instantiate("axis", 0, argv[2], NULL, &sound, 0, 1)) return 1;
+        FreeInstance(NULL);
+        EXPECT(3, DoStep(NULL, 0.0, 1e-3, 1));
+        EXPECT(3, GetReal(NULL, &known, 1, &value));
+        EXPECT(3, SetupExperiment(NULL, 0, 0.0, 0.0, 0, 0.0));
+        EXPECT(3, GetFMUstate(NULL, &state));
+        EXPECT(3, Terminate(NULL));
+        EXPECT(3, Reset(NULL));
+        /* An importer without callbacks of its own is served, silently. */
+        Component c = Instantiate("axis", 1, argv[2], NULL, cycle % 2 ? &sound : &silent, 0, 1);
+        if (!c) return 1;
+        EXPECT(3, GetReal(c, NULL, 1, &value));
+        EXPECT(3, GetReal(c, &known, 1, NULL));
+        EXPECT(3, ExitInitializationMode(c));
+        EXPECT(3, Terminate(c));
+        EXPECT(3, SetFMUstate(c, NULL));
+        EXPECT(3, GetFMUstate(c, NULL));
+        EXPECT(3, SerializedFMUstateSize(c, NULL, &size));
+        EXPECT(3, DeSerializeFMUstate(c, garbage, sizeof garbage, &state));
+        EXPECT(3, DeSerializeFMUstate(c, garbage, 0, &state));
+        EXPECT(3, DeSerializeFMUstate(c, NULL, sizeof garbage, &state));
+        EXPECT(0, SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0));
+        EXPECT(0, EnterInitializationMode(c));
+        EXPECT(0, GetReal(c, NULL, 0, NULL));
+        EXPECT(0, ExitInitializationMode(c));
+        EXPECT(0, GetFMUstate(c, &state));
+        EXPECT(0, SerializedFMUstateSize(c, state, &size));
+        char *bytes = malloc(size);
+        EXPECT(3, SerializeFMUstate(c, state, bytes, size - 1));
+        EXPECT(3, SerializeFMUstate(c, state, NULL, size));
+        EXPECT(0, SerializeFMUstate(c, state, bytes, size));
+        State cut = NULL;
+        EXPECT(3, DeSerializeFMUstate(c, bytes, size - 1, &cut));
+        for (size_t k = 0; k < size; k += 97) {
+            /* A byte of it changed: refused, or a state that can be gone back to and stepped. */
+            bytes[k] ^= 0x41;
+            if (DeSerializeFMUstate(c, bytes, size, &cut) == 0) {
+                SetFMUstate(c, cut);
+                DoStep(c, 0.0, 1e-3, 1);
+                EXPECT(0, FreeFMUstate(c, &cut));
+                EXPECT(0, SetFMUstate(c, state));
+            }
+            bytes[k] ^= 0x41;
+        }
+        free(bytes);
+        EXPECT(3, DoStep(c, 0.0, -1e-3, 1));
+        EXPECT(0, Terminate(c));
+        EXPECT(3, DoStep(c, 0.0, 1e-3, 1));
+        EXPECT(0, FreeFMUstate(c, &state));
+        EXPECT(0, FreeFMUstate(c, &state));
+        FreeInstance(c);
+    }
+    messages = 0;
     const double step = 1e-3, torque = 0.01, one = 1.0;
     const Reference input = 0, outputs[] = {1, 2, 3, 4, 5, 6, 7}, wrong = 4000000000u;
     const int orders[] = {1, 1, 1, 1, 1, 1, 1};
