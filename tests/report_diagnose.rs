@@ -80,6 +80,7 @@ fn friction(machine: &str) -> Diagnosis {
             json!({ "I1": { "nominal": 2.3e-4, "reidentified": 2.5e-4, "fitted": 2.3701e-4, "std": 1.2e-7 } }),
         ),
         warnings: vec!["One encoder only.".into()],
+        closed_loop: None,
     }
 }
 

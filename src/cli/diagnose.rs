@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::many::Many;
 use crate::axis::Structure;
-use crate::diagnose::{CHANNELS, Case, Model, NoiseEstimate, Outcome, Record, Replay, diagnose, estimate_noise};
+use crate::diagnose::{CHANNELS, Case, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise};
 use crate::effects::{EFFECTS, Effect};
 use crate::fleet::{Found, Tracked};
 use crate::identify::parameters::{NAMES, units as base_units};
@@ -98,7 +98,7 @@ fn examine(
     progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
     let machine = Machine::read(axis)?;
-    let Recorded { record: train, noise, mut warnings } = record(trace, &machine)?;
+    let Recorded { record: train, noise, mut warnings, reference, command } = record(trace, &machine)?;
     let holdout = holdout.map(|p| record(p, &machine).map(|r| (r, p))).transpose()?;
     warnings.extend(holdout.iter().flat_map(|(r, _)| r.warnings.iter().cloned()));
     let case = Case {
@@ -109,7 +109,20 @@ fn examine(
         holdout: holdout.as_ref().map(|(r, _)| &r.record),
         library,
     };
-    let outcome = diagnose(&case, progress);
+    let mut outcome = diagnose(&case, progress);
+    if let Some(controller) = &machine.controller {
+        match &reference {
+            Some(reference) => {
+                let command = command.as_deref().unwrap_or(&train.torque);
+                let seen = UnderControl { record: &train, reference, command, controller };
+                outcome.diagnosis.closed_loop = Some(seen.judge(&outcome.decision));
+            }
+            None => warnings.push(format!(
+                "{}: [controller] is given, but the trace has no column of the reference: the loop is not simulated.",
+                trace.display()
+            )),
+        }
+    }
     let described = format!(
         "{}: {} samples at {} Hz{}",
         trace.display(),
@@ -247,6 +260,10 @@ pub(super) struct Recorded {
     pub noise: NoiseEstimate,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Reference of the drive, where the trace has it.
+    pub reference: Option<Vec<f64>>,
+    /// Its command, where that is another than the torque.
+    pub command: Option<Vec<f64>>,
 }
 
 /// Reads a trace as the diagnosis needs it.
@@ -277,5 +294,6 @@ pub(super) fn record(path: &Path, machine: &Machine) -> anyhow::Result<Recorded>
         noise.std[i].max(1e-9 * span).max(1e-12)
     });
     let record = Record { start: trace.start, dt: trace.dt, hold: trace.hold, torque, channels, noise: std };
-    Ok(Recorded { record, noise, warnings })
+    let [reference, command] = [Signal::Reference, Signal::Command].map(|s| trace.get(s).map(<[f64]>::to_vec));
+    Ok(Recorded { record, noise, warnings, reference, command })
 }

@@ -199,6 +199,7 @@ fn build(
         },
         parameters: parameters(case, decision),
         warnings: warnings(case),
+        closed_loop: None,
     }
 }
 

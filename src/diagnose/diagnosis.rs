@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::closed_loop::ClosedLoop;
 use super::decide::Verdict;
 use super::gap::Figures;
 
@@ -37,6 +38,9 @@ pub struct Diagnosis {
     pub parameters: Map<String, Value>,
     /// What the user should know of the data.
     pub warnings: Vec<String>,
+    /// What the drive's loop says, for a record under control whose drive is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closed_loop: Option<ClosedLoop>,
 }
 
 /// A cause.

@@ -1,6 +1,7 @@
 //! The gap between model and machine: where, which, how far.
 
 mod assess;
+mod closed_loop;
 mod decide;
 mod diagnosis;
 mod evidence;
@@ -20,6 +21,7 @@ mod windows;
 mod words;
 
 pub use assess::{Case, Outcome, Replay, diagnose};
+pub use closed_loop::{ClosedLoop, LoopErrors, UnderControl};
 pub use decide::{Decision, Verdict};
 pub use diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
 pub use evidence::{Evidence, Overlay};

@@ -6,7 +6,7 @@ use super::chain::{ChainDiagram, Symbol};
 use super::chart::{Axis, Chart, Mark, Series, Shape};
 use super::format::{self, Medium};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict, chain, residual};
-use crate::diagnose::{Diagnosis, Evidence, Levels, Verdict as Answer};
+use crate::diagnose::{Diagnosis, Evidence, Levels, LoopErrors, Verdict as Answer};
 use crate::effects::{EFFECTS, EffectInfo, Family, Place};
 use crate::trace::Motion;
 
@@ -34,6 +34,10 @@ pub fn report(f: &Findings) -> Report {
         sections.push(Section::new("What it is", what(f)));
     }
     sections.push(Section::new("How far the gap shrinks", how_far(f)));
+    let under_control = under_control(f);
+    if !under_control.is_empty() {
+        sections.push(Section::new("In the drive's loop", under_control));
+    }
     if let Some(e) = f.evidence {
         sections.push(Section::new("Where the gap shows", residual::blocks(&e.located, f.diagnosis, f.motion)));
     }
@@ -59,6 +63,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
         blocks.push(Block::Table(causes(f)));
     }
     blocks.push(Block::Table(levels(f)));
+    blocks.extend(under_control(f));
     blocks.push(Block::Table(ranking(f, 5)));
     blocks.push(Block::Steps(next(f)));
     blocks
@@ -298,6 +303,38 @@ fn levels(f: &Findings) -> Table {
     }
     row("noise floor", |l| l.noise_floor, false);
     table
+}
+
+/// What the drive's loop says, where it was simulated.
+fn under_control(f: &Findings) -> Vec<Block> {
+    let Some(l) = &f.diagnosis.closed_loop else { return Vec::new() };
+    let mut table = Table::new(
+        "In the drive's loop, driven by the reference alone: error, rms over rms of the signal",
+        ["model", "command", "position"],
+    );
+    let cells =
+        |name: &str, e: &LoopErrors| vec![Cell::text(name), Cell::Percent(e.command), Cell::Percent(e.position)];
+    table.row(cells("as given", &l.before));
+    table.row(cells("parameters re-identified", &l.reidentified));
+    match f.diagnosis.verdict {
+        Answer::Effect => table.strong_row(cells("with the effect", &l.after)),
+        Answer::Unexplained => table.row(cells("with the nearest effect", &l.after)),
+        Answer::Parameters | Answer::NoGap => {}
+    }
+    let sentence = if l.agrees {
+        format!(
+            "The loop agrees: of everything tried, nothing closes more of the command's gap than this ({}).",
+            percent(l.closure)
+        )
+    } else {
+        format!(
+            "The loop does not agree: {} closes {} of the command's gap, this {}.",
+            title(&l.best),
+            percent(l.best_closure),
+            percent(l.closure)
+        )
+    };
+    vec![Block::Table(table), Block::Paragraph(sentence)]
 }
 
 fn how_far(f: &Findings) -> Vec<Block> {

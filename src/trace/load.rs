@@ -90,7 +90,7 @@ pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError
     for (signal, column) in wanted {
         let mut values = values(table, &column, signal.name(), signal.quantity(mapping.motion))?;
         // The torque belongs to its sample under either hold: only the motion is read off at the grid's times.
-        if let (Some(time), true) = (&jittered, signal != Signal::T) {
+        if let (Some(time), true) = (&jittered, !matches!(signal, Signal::T | Signal::Command)) {
             values = resample(time, &values, &grid);
         }
         trace.set(signal, values)?;
@@ -107,14 +107,22 @@ pub(super) fn wanted(
     mapping: &Mapping,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<(Signal, Column)>, TraceError> {
-    if mapping.signals.is_empty() {
+    if mapping.signals.iter().all(|(s, _)| s.is_of_the_loop()) {
         let by_name = |s: &Signal| table.position(s.name()).is_some();
-        return Ok(Signal::ALL.into_iter().filter(by_name).map(|s| (s, Column::named(s.name()))).collect());
+        let mut all: Vec<_> = Signal::ALL.into_iter().filter(by_name).map(|s| (s, Column::named(s.name()))).collect();
+        let there = mapping.signals.iter().filter(|(_, c)| table.position(&c.column).is_some());
+        for (signal, column) in there {
+            all.retain(|(s, _)| s != signal);
+            all.push((*signal, column.clone()));
+        }
+        return Ok(all);
     }
     // The log of the axis file, or a trace this program wrote: one or the other, never a mixture.
     let mapped = |c: &Column| table.position(&c.column).is_some();
     let own = |s: Signal| table.position(s.name()).is_some();
-    if !mapping.signals.iter().any(|(_, c)| mapped(c)) && mapping.signals.iter().any(|(s, _)| own(*s)) {
+    if !mapping.signals.iter().any(|(s, c)| !s.is_of_the_loop() && mapped(c))
+        && mapping.signals.iter().any(|(s, _)| own(*s))
+    {
         warnings.push(format!(
             "{}: none of the columns that [signals] maps are there; the columns with the signals' own names are used, \
              in SI units without scale or offset",
@@ -123,12 +131,14 @@ pub(super) fn wanted(
         let present = mapping.signals.iter().filter(|(s, _)| own(*s));
         return Ok(present.map(|(s, _)| (*s, Column::named(s.name()))).collect());
     }
-    for (signal, column) in &mapping.signals {
+    let mut there = mapping.signals.clone();
+    there.retain(|(signal, column)| !signal.is_of_the_loop() || mapped(column));
+    for (signal, column) in &there {
         if !mapped(column) {
             return Err(missing(table, signal.name(), &column.column));
         }
     }
-    Ok(mapping.signals.clone())
+    Ok(there)
 }
 
 fn missing(table: &Table, signal: &'static str, wanted: &str) -> TraceError {

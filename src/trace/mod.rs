@@ -23,7 +23,7 @@ pub use crate::axis::Hold;
 pub use error::TraceError;
 pub(crate) use error::nearest;
 pub use load::{Column, Loaded, Mapping, from_table, load};
-pub use machine::{Machine, MachineError};
+pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
 pub use signal::{Motion, Quantity, Signal};
 pub use table::{Header, Table};

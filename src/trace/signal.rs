@@ -55,15 +55,37 @@ pub enum Signal {
     /// Table position, `x2 = rho*theta2`.
     #[serde(rename = "x2")]
     X2,
+    /// Reference of the drive: the angle that it follows.
+    #[serde(rename = "reference")]
+    Reference,
+    /// Command of the drive, where it is another than T.
+    #[serde(rename = "command")]
+    Command,
 }
 
 impl Signal {
     /// How many signals there are.
-    pub const COUNT: usize = 8;
+    pub const COUNT: usize = 10;
 
     /// All signals, in the order of a trace file.
-    pub const ALL: [Self; Self::COUNT] =
-        [Self::T, Self::Theta1, Self::Omega1, Self::Alpha1, Self::Theta2, Self::Omega2, Self::Alpha2, Self::X2];
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::T,
+        Self::Theta1,
+        Self::Omega1,
+        Self::Alpha1,
+        Self::Theta2,
+        Self::Omega2,
+        Self::Alpha2,
+        Self::X2,
+        Self::Reference,
+        Self::Command,
+    ];
+
+    /// Whether the signal is of the drive's loop: it says nothing of the axis itself, and a trace may lack it.
+    #[must_use]
+    pub const fn is_of_the_loop(self) -> bool {
+        matches!(self, Self::Reference | Self::Command)
+    }
 
     /// Position in [`Signal::ALL`].
     #[must_use]
@@ -83,6 +105,8 @@ impl Signal {
             Self::Omega2 => "omega2",
             Self::Alpha2 => "alpha2",
             Self::X2 => "x2",
+            Self::Reference => "reference",
+            Self::Command => "command",
         }
     }
 
@@ -96,10 +120,10 @@ impl Signal {
     #[must_use]
     pub const fn quantity(self, motion: Motion) -> Quantity {
         match (self, motion) {
-            (Self::T, Motion::Rotary) => Quantity::Torque,
-            (Self::T, Motion::Linear) => Quantity::Force,
-            (Self::Theta1 | Self::Theta2, Motion::Rotary) => Quantity::Angle,
-            (Self::Theta1 | Self::Theta2, Motion::Linear) | (Self::X2, _) => Quantity::Length,
+            (Self::T | Self::Command, Motion::Rotary) => Quantity::Torque,
+            (Self::T | Self::Command, Motion::Linear) => Quantity::Force,
+            (Self::Theta1 | Self::Theta2 | Self::Reference, Motion::Rotary) => Quantity::Angle,
+            (Self::Theta1 | Self::Theta2 | Self::Reference, Motion::Linear) | (Self::X2, _) => Quantity::Length,
             (Self::Omega1 | Self::Omega2, Motion::Rotary) => Quantity::AngularVelocity,
             (Self::Omega1 | Self::Omega2, Motion::Linear) => Quantity::Velocity,
             (Self::Alpha1 | Self::Alpha2, Motion::Rotary) => Quantity::AngularAcceleration,

@@ -17,10 +17,17 @@
 //! theta1 = "theta_motor_rad"
 //! [effects.coulomb_motor]            # effects already known and modelled
 //! level = 0.01
+//! [controller]                       # the drive that a log was made under: see `controller`
+//! reference = "q_ref"
+//! kp = 20.0
+//! kv = 0.02
 //! ```
 
+mod controller;
 mod reader;
 mod write;
+
+pub use controller::Controller;
 
 use std::path::Path;
 
@@ -45,6 +52,8 @@ pub struct Machine {
     pub parameters: Parameters,
     /// The effects that are known and modelled; all off where the file names none.
     pub effects: Settings,
+    /// The drive that its logs were made under, where the file names one.
+    pub controller: Option<Controller>,
     /// How a log's columns become signals; [`Mapping::motion`] holds the units.
     pub signals: Mapping,
 }
@@ -69,6 +78,7 @@ impl Default for Machine {
             structure: Structure::TwoInertia,
             parameters: Parameters::PAPER,
             effects: Settings::default(),
+            controller: None,
             signals: Mapping::default(),
         }
     }
@@ -97,7 +107,11 @@ impl Machine {
     pub fn parse(text: &str, file: &str) -> Result<Self, MachineError> {
         let reader = Reader::new(text, file);
         let root = reader.root()?;
-        reader.only(&root, &["name", "structure", "parameters", "effects", "units", "signals"], "axis file")?;
+        reader.only(
+            &root,
+            &["name", "structure", "parameters", "effects", "units", "signals", "controller"],
+            "axis file",
+        )?;
         let name = match root.get("name") {
             Some(value) => reader.text(value, "name")?.to_owned(),
             None => Path::new(file).file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
@@ -118,13 +132,15 @@ impl Machine {
                 units.get("motion").map_or(Ok(Motion::Rotary), |v| reader.choice(v, "motion", &choices))?
             }
         };
-        Ok(Self {
-            name,
-            structure,
-            parameters: parameters_of(&reader, &parameters, structure)?,
-            effects: effects(&reader, root.table(&reader, "effects")?.as_ref())?,
-            signals: signals(&reader, root.table(&reader, "signals")?.as_ref(), motion)?,
-        })
+        let parameters = parameters_of(&reader, &parameters, structure)?;
+        let effects = effects(&reader, root.table(&reader, "effects")?.as_ref())?;
+        let mut signals = signals(&reader, root.table(&reader, "signals")?.as_ref(), motion)?;
+        let inertia = parameters.i1 + parameters.i2;
+        let controller = match root.table(&reader, "controller")? {
+            Some(section) => Some(controller::controller(&reader, &section, inertia, &mut signals)?),
+            None => None,
+        };
+        Ok(Self { name, structure, parameters, effects, controller, signals })
     }
 }
 
@@ -386,6 +402,30 @@ mod tests {
         assert!(outside.contains("must lie between"), "{outside}");
         let unknown = error(&format!("{PARAMETERS}[effects.{id}x]\na = 1\n"));
         assert!(unknown.contains(&format!("did you mean {id:?}")), "{unknown}");
+    }
+
+    #[test]
+    fn a_controller_is_read_with_its_columns_and_written_out_the_same() {
+        let text = format!(
+            "{PARAMETERS}[controller]\nreference = {{ column = \"r_m\", scale = 3144.65 }}\nkp = 20\nkv = 0.02\ndelay = 1\n"
+        );
+        let machine = Machine::parse(&text, "axis.toml").unwrap();
+        let controller = machine.controller.unwrap();
+        assert_eq!((controller.gains.kp, controller.delay, controller.measured_speed), (20.0, 1, false));
+        assert_eq!(controller.gains.limit, f64::INFINITY);
+        assert_eq!(machine.signals.signals[0].0, Signal::Reference);
+        let text = machine.to_toml();
+        assert_eq!(Machine::parse(&text, "axis.toml").unwrap_or_else(|e| panic!("{e}\n{text}")), machine, "{text}");
+        for (wrong, says) in [
+            ("kp = 1\nkv = 1\n", "names no column of the reference"),
+            ("reference = \"r\"\nkp = 1\n", "has no kv"),
+            ("reference = \"r\"\nkp = 1\nkv = -1\n", "kv is -1"),
+            ("reference = \"r\"\nkp = 1\nkv = 1\ndelay = 0.5\n", "whole number of samples"),
+            ("reference = \"r\"\nkp = 1\nkv = 1\nspeed = \"fast\"\n", "\"difference\" or \"measured\""),
+        ] {
+            let message = error(&format!("{PARAMETERS}[controller]\n{wrong}"));
+            assert!(message.contains(says), "{message}");
+        }
     }
 
     #[test]

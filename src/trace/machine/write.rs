@@ -61,6 +61,11 @@ impl Machine {
                 line(&format!("{} = {}", signal.name(), column(c)));
             }
         }
+        if let Some(controller) = &self.controller {
+            // Its columns stand in [signals].
+            out.push_str("\n[controller]\n");
+            out.push_str(&controller.lines());
+        }
         for &effect in EFFECTS {
             if self.effects.is_on(effect) {
                 let info = effect.info();
