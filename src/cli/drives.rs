@@ -15,7 +15,7 @@ pub struct Drives {
     /// Sampling interval of the drives, s
     #[arg(long, default_value_t = Drives::default().dt)]
     pub dt: f64,
-    /// Bandwidth of the velocity loop, rad/s
+    /// Bandwidth of the velocity loop, rad/s, where the axis file has no [controller]
     #[arg(long, default_value_t = Drives::default().bandwidth)]
     pub bandwidth: f64,
     /// Position gain, 1/s; a quarter of the bandwidth without
@@ -68,10 +68,17 @@ impl Drives {
             let p = machine.parameters;
             let parameters = Parameters { i2: p.i2 + carried * p.rho * p.rho, ..p };
             let forward = if self.no_forward { 0.0 } else { 1.0 };
-            let servo = Servo::tuned(&parameters, self.bandwidth, self.kp);
-            let gains =
-                Gains { velocity_forward: forward, acceleration_forward: forward, limit: self.limit, ..servo.gains };
-            let feedback = if self.table_scale { Feedback::Table } else { Feedback::Motor };
+            // The drive of the machine's file, or one tuned for it.
+            let own = machine.controller.map(|c| Gains { kp: self.kp.unwrap_or(c.gains.kp), ..c.gains });
+            let gains = own.unwrap_or_else(|| Servo::tuned(&parameters, self.bandwidth, self.kp).gains);
+            let gains = Gains {
+                velocity_forward: forward * gains.velocity_forward,
+                acceleration_forward: forward * gains.acceleration_forward,
+                limit: self.limit.min(gains.limit),
+                ..gains
+            };
+            let table = self.table_scale || machine.controller.is_some_and(|c| c.table);
+            let feedback = if table { Feedback::Table } else { Feedback::Motor };
             let servo = Servo { gains, feedback };
             ServoAxis { parameters, structure: machine.structure, effects: machine.effects, servo }
         };

@@ -155,7 +155,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     let file = path.display();
 
-    print!("{}", terminal::blocks(&blocks(&result), terminal::Layout::default()));
+    let mut said = blocks(&result);
+    if machine.controller.is_some() && result.recommended.is_some() {
+        said.extend(super::controlled::identified(path, &machine, &improved(&machine, &result)?)?);
+    }
+    print!("{}", terminal::blocks(&said, terminal::Layout::default()));
     if let Some(path) = &args.json {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }

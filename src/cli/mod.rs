@@ -20,6 +20,7 @@ pub struct Cli {
     pub command: Command,
 }
 
+mod controlled;
 mod diagnosed;
 mod drives;
 

@@ -48,6 +48,9 @@ pub struct Args {
     /// Communication step, s; by default the input's sampling interval
     #[arg(long)]
     pub step: Option<f64>,
+    /// Close the drive's loop of the axis.toml's [controller]: the input is the trace of the reference, T what the drive commands
+    #[arg(long, requires = "input", conflicts_with_all = ["start", "stop", "step", "step_end", "hold"])]
+    pub controlled: bool,
     /// Record the outputs as each step left them, before the next inputs are set (as most importers do)
     #[arg(long)]
     pub step_end: bool,
@@ -146,6 +149,9 @@ fn open(path: &Path) -> anyhow::Result<(Fmu, Option<Machine>)> {
 /// # Errors
 /// When the FMU or the input cannot be used, the FMU stops, or the trace cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.controlled {
+        return controlled(args);
+    }
     let (fmu, machine) = open(&args.model)?;
     let mut hold = args.hold.map(Hold::from);
     let inputs = match (&args.input, &machine) {
@@ -168,15 +174,38 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         outputs: args.outputs,
         rows: if args.step_end { Rows::StepEnd } else { Rows::InputsSet },
     };
-    let mut record = simulate(&fmu, &inputs, &options)?;
-    add_noise(&mut record, &args.noise, args.seed)?;
+    let record = simulate(&fmu, &inputs, &options)?;
+    finish(record, &args.output, &args.noise, args.seed)
+}
+
+/// The same in the drive's loop, on the model itself.
+fn controlled(args: Args) -> anyhow::Result<ExitCode> {
+    anyhow::ensure!(
+        args.model.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")),
+        "--controlled takes an axis.toml with a [controller]; {} is none",
+        args.model.display()
+    );
+    let machine = Machine::read(&args.model)?;
+    let input = args.input.as_deref().context("--controlled needs --input: the trace of the reference")?;
+    let mut record = super::controlled::simulate(&machine, input, &args.set)?;
+    if let Some(name) = args.outputs.iter().find(|name| !record.columns.iter().any(|c| c.name == **name)) {
+        let names: Vec<&str> = record.columns.iter().map(|c| c.name.as_str()).collect();
+        bail!("--outputs {name}: in the loop there are {}", names.join(", "));
+    }
+    record.columns.retain(|c| c.input || args.outputs.is_empty() || args.outputs.contains(&c.name));
+    finish(record, &args.output, &args.noise, args.seed)
+}
+
+/// Adds the noise, writes the trace, and says so.
+fn finish(mut record: Record, output: &Path, noise: &[Noise], seed: u64) -> anyhow::Result<ExitCode> {
+    add_noise(&mut record, noise, seed)?;
     let table = record.table();
     let columns: Vec<(&str, &[f64])> = table.iter().map(|(name, values)| (name.as_str(), *values)).collect();
-    write_columns(&args.output, &columns)?;
+    write_columns(output, &columns)?;
     record.notes.iter().for_each(|note| eprintln!("note: {note}"));
     println!(
         "{}: {} rows, {} s to {} s, {} columns",
-        args.output.display(),
+        output.display(),
         record.time.len(),
         record.time.first().copied().unwrap_or(0.0),
         record.time.last().copied().unwrap_or(0.0),

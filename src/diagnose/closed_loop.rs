@@ -9,8 +9,9 @@ use serde::Serialize;
 use super::decide::Decision;
 use super::model::Model;
 use super::record::Record;
+use super::search::Tested;
 use crate::axis::{Axis, Scheme, substeps};
-use crate::effects::{Ramp, SensorHistory, TorqueHistory};
+use crate::effects::{Ramp, Reading, SensorHistory, TorqueHistory};
 use crate::trace::Controller;
 
 /// A hypothesis closes as much as another when their closures differ by less than this.
@@ -40,6 +41,34 @@ pub struct LoopErrors {
     pub position: f64,
 }
 
+impl LoopErrors {
+    /// Heading of a table of these.
+    pub const TITLE: &str = "In the drive's loop, driven by the reference alone: error, rms over rms of the signal";
+}
+
+/// One sample of a model in the loop.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// What the drive has computed, N.m.
+    pub command: f64,
+    /// What acts until the next sample, N.m.
+    pub torque: f64,
+    /// What the encoders read.
+    pub reading: Reading<f64>,
+}
+
+/// A hypothesis as the loop sees it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopRanked {
+    /// Ids of its effects, joined by `+`; `parameters` or `no_gap` without any.
+    pub id: String,
+    /// Its errors.
+    #[serde(flatten)]
+    pub errors: LoopErrors,
+    /// Share of the command's squared error, as given, that it closes.
+    pub closure: f64,
+}
+
 /// What the loop says of a diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClosedLoop {
@@ -51,10 +80,8 @@ pub struct ClosedLoop {
     pub after: LoopErrors,
     /// Share of the command's squared error, as given, that the diagnosed model closes.
     pub closure: f64,
-    /// The hypothesis that closes most of it: its effects' ids, joined by `+`, or `parameters`.
-    pub best: String,
-    /// What it closes.
-    pub best_closure: f64,
+    /// Every hypothesis tried, the one that closes most first.
+    pub ranking: Vec<LoopRanked>,
     /// Whether no other hypothesis closes more than the diagnosed one by more than 0.5 %.
     pub agrees: bool,
 }
@@ -65,9 +92,19 @@ impl UnderControl<'_> {
         if self.controller.table { 2 } else { 0 }
     }
 
-    /// Command and position of a model in the loop, one value a sample, from rest at the first measured position.
+    /// Command and position of a model in the loop, one value a sample.
     #[must_use]
     pub fn run(&self, model: &Model) -> (Vec<f64>, Vec<f64>) {
+        let (mut commands, mut positions) = (Vec::new(), Vec::new());
+        self.steps(model, |_, at| {
+            commands.push(at.command);
+            positions.push(if self.controller.table { at.reading.theta2 } else { at.reading.theta1 });
+        });
+        (commands, positions)
+    }
+
+    /// Runs a model in the loop, from the first measured position (the reference's, where none is), and shows every sample.
+    pub fn steps(&self, model: &Model, mut visit: impl FnMut(usize, &Sample)) {
         let (record, dt) = (self.record, self.record.dt);
         let per = substeps(&model.parameters, model.structure, &model.effects, dt);
         let h = dt / per as f64;
@@ -80,18 +117,16 @@ impl UnderControl<'_> {
         let mut drive = crate::drive::Drive::default();
         let mut before = theta - omega * dt;
         let mut sent = [self.command.first().copied().unwrap_or_default(); DELAY];
-        let (mut commands, mut positions) = (Vec::new(), Vec::new());
         for (k, &reference) in self.reference.iter().enumerate() {
-            let read = if on.sensors().is_empty() { state.reading() } else { effects.transform_sensor(on, &seen, dt) };
-            let position = if self.controller.table { read.theta2 } else { read.theta1 };
-            let speed = if self.controller.measured_speed { read.omega1 } else { (position - before) / dt };
+            let reading =
+                if on.sensors().is_empty() { state.reading() } else { effects.transform_sensor(on, &seen, dt) };
+            let position = if self.controller.table { reading.theta2 } else { reading.theta1 };
+            let speed = if self.controller.measured_speed { reading.omega1 } else { (position - before) / dt };
             before = position;
-            let command = drive.sample(&self.controller.gains, reference, position, speed, dt);
             sent.rotate_right(1);
-            sent[0] = command;
-            commands.push(command);
-            positions.push(position);
+            sent[0] = drive.sample(&self.controller.gains, reference, position, speed, dt);
             let torque = sent[self.controller.delay.min(DELAY - 1)];
+            visit(k, &Sample { command: sent[0], torque, reading });
             for j in 0..per {
                 let held = Ramp { start: torque, end: torque };
                 let ramp =
@@ -100,7 +135,6 @@ impl UnderControl<'_> {
             }
             seen.push(state.reading());
         }
-        (commands, positions)
     }
 
     /// Position and speed at the first sample, as measured.
@@ -131,27 +165,26 @@ impl UnderControl<'_> {
         let before = of(&decision.given.fitted.model);
         let closure = |e: &LoopErrors| 1.0 - (e.command / before.command).powi(2);
         let after = of(&decision.chosen.fitted.model);
-        let (mut best, mut best_closure) = (name(&decision.chosen.ids()), closure(&after));
-        for weighed in &decision.ranking {
-            let this = closure(&of(&weighed.tested.fitted.model));
-            if this > best_closure + MATERIAL {
-                (best, best_closure) = (name(&weighed.tested.ids()), this);
-            }
-        }
+        let name = |t: &Tested| match (t.effects.is_empty(), t.freedom) {
+            (true, 0) => "no_gap".to_owned(),
+            (true, _) => "parameters".to_owned(),
+            _ => t.ids().join("+"),
+        };
+        let ranked = |t: &Tested| {
+            let errors = of(&t.fitted.model);
+            LoopRanked { id: name(t), errors, closure: closure(&errors) }
+        };
+        let mut ranking: Vec<LoopRanked> = decision.ranking.iter().map(|w| ranked(&w.tested)).collect();
+        ranking.sort_by(|a, b| b.closure.total_cmp(&a.closure));
         ClosedLoop {
             before,
             reidentified: of(&decision.parameters.fitted.model),
             after,
             closure: closure(&after),
-            agrees: best_closure <= closure(&after) + MATERIAL,
-            best,
-            best_closure,
+            agrees: ranking.first().is_none_or(|best| best.closure <= closure(&after) + MATERIAL),
+            ranking,
         }
     }
-}
-
-fn name(ids: &[&str]) -> String {
-    if ids.is_empty() { "parameters".to_owned() } else { ids.join("+") }
 }
 
 /// rms of the difference over rms of the signal about its mean.

@@ -308,10 +308,7 @@ fn levels(f: &Findings) -> Table {
 /// What the drive's loop says, where it was simulated.
 fn under_control(f: &Findings) -> Vec<Block> {
     let Some(l) = &f.diagnosis.closed_loop else { return Vec::new() };
-    let mut table = Table::new(
-        "In the drive's loop, driven by the reference alone: error, rms over rms of the signal",
-        ["model", "command", "position"],
-    );
+    let mut table = Table::new(LoopErrors::TITLE, ["model", "command", "position"]);
     let cells =
         |name: &str, e: &LoopErrors| vec![Cell::text(name), Cell::Percent(e.command), Cell::Percent(e.position)];
     table.row(cells("as given", &l.before));
@@ -321,18 +318,19 @@ fn under_control(f: &Findings) -> Vec<Block> {
         Answer::Unexplained => table.row(cells("with the nearest effect", &l.after)),
         Answer::Parameters | Answer::NoGap => {}
     }
-    let sentence = if l.agrees {
-        format!(
-            "The loop agrees: of everything tried, nothing closes more of the command's gap than this ({}).",
-            percent(l.closure)
-        )
-    } else {
-        format!(
+    let others = l.ranking.iter().find(|r| r.closure < l.closure && !r.id.is_empty() && r.errors != l.after);
+    let sentence = match (l.agrees, l.ranking.first()) {
+        (false, Some(best)) => format!(
             "The loop does not agree: {} closes {} of the command's gap, this {}.",
-            title(&l.best),
-            percent(l.best_closure),
+            title(&best.id),
+            percent(best.closure),
             percent(l.closure)
-        )
+        ),
+        _ => format!(
+            "The loop agrees: this closes {} of the command's gap, and nothing that was tried closes more{}.",
+            percent(l.closure),
+            others.map_or_else(String::new, |o| format!("; next comes {} with {}", title(&o.id), percent(o.closure)))
+        ),
     };
     vec![Block::Table(table), Block::Paragraph(sentence)]
 }
