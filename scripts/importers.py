@@ -1,7 +1,9 @@
 """Runs an exported FMU through other importers and compares each with a trace of eixo's own harness.
 
+    .venv/bin/python scripts/importers.py
     .venv/bin/python scripts/importers.py axis.fmu trace.csv [NAME=VALUE ...]
 
+Without arguments it builds eixo, exports the FMU and makes the trace itself: the Schroeder excitation on the paper's axis. Else
 trace.csv comes from `eixo simulate axis.fmu --step-end --set NAME=VALUE ...`: its columns T and the outputs, each row as the
 step before left it. Prints one line an importer; exit code 1 when one disagrees or FMPy's validation has a finding.
 An importer that is not installed is named as skipped.
@@ -12,8 +14,10 @@ import ctypes
 import glob
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 import warnings
 from pathlib import Path
 
@@ -117,6 +121,26 @@ def ecos(fmu, trace, settings):
     return largest_difference(np.array(got), trace)
 
 
+def fmi_sim(fmu, trace, settings):
+    program = shutil.which("fmi-sim", path=os.pathsep.join([str(ROOT / "target/fmi-sim/bin"), os.environ.get("PATH", "")]))
+    if program is None:
+        raise ImportError("no fmi-sim (cargo install fmi-sim@0.7.0 --locked --root target/fmi-sim)")
+    step = trace["time"][1] - trace["time"][0]
+    with tempfile.TemporaryDirectory() as folder:
+        given, result = Path(folder, "input.csv"), Path(folder, "output.csv")
+        rows = zip(trace["time"], trace["T"])
+        given.write_text("time,T\n" + "".join(f"{float(t)!r},{float(u)!r}\n" for t, u in rows))
+        command = [program, "--model", fmu, "-i", given, "-o", result, "co-simulation", "--step", repr(float(step))]
+        command += ["--output-interval", repr(float(step)), "-s", repr(float(trace["time"][0]))]
+        command += ["-f", repr(float(trace["time"][-1])), "-n", "0"]
+        for name, value in settings:
+            command += ["--init-values", f"{name}={value!r}"]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert run.returncode == 0, run.stderr.strip()[-500:]
+        got = read_trace(result)
+    return largest_difference(np.array([got[name] for name in OUTPUTS]).T, trace)
+
+
 def fmi_crate(fmu, trace, settings):
     import clang
 
@@ -150,14 +174,35 @@ IMPORTERS = [
     ("FMPy validate_fmu", fmpy_validate, 0.0),
     ("FMPy simulate_fmu", fmpy_simulate, 1e-12),
     ("fmi crate", fmi_crate, 1e-12),
+    ("fmi-sim", fmi_sim, 1e-9),
     ("libcosimpy", libcosim, 1e-9),
     ("ecospy", ecos, 1e-9),
 ]
 
 
+def own(folder):
+    """Builds eixo, exports the FMU, and makes the trace of the Schroeder excitation."""
+    subprocess.run(["cargo", "build", "--quiet", "--bin", "eixo"], cwd=ROOT, check=True)
+    eixo = ROOT / "target/debug/eixo"
+    fmu, torque, trace = (str(Path(folder, name)) for name in ("axis.fmu", "excitation.csv", "trace.csv"))
+    # Half a millisecond: a whole number of libcosim's nanoseconds.
+    for command in (
+        ["export", fmu],
+        ["excite", "-o", torque, "--samples", "2000", "--dt", "0.0005"],
+        ["simulate", fmu, "-i", torque, "-o", trace, "--step-end"],
+    ):
+        subprocess.run([eixo, *command], check=True, stdout=subprocess.DEVNULL)
+    return [fmu, trace]
+
+
 def main():
-    fmu, trace = Path(sys.argv[1]).resolve(), read_trace(sys.argv[2])
-    settings = [(name, float(value)) for name, value in (s.split("=") for s in sys.argv[3:])]
+    with tempfile.TemporaryDirectory() as folder:
+        return compare(*(sys.argv[1:] or own(folder)))
+
+
+def compare(fmu, trace, *settings):
+    fmu, trace = Path(fmu).resolve(), read_trace(trace)
+    settings = [(name, float(value)) for name, value in (s.split("=") for s in settings)]
     warnings.simplefilter("ignore")
     failed = False
     print(f"{'importer':<20} {'difference':>12}  verdict")
