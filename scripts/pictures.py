@@ -1,6 +1,6 @@
 """Cuts the README's pictures out of reports, so that they show what the program draws. See README, "Pictures".
 
-    python3 scripts/pictures.py diagnosis.html circle.html
+    python3 scripts/pictures.py diagnosis.html circle.html diagnoses/index.html
 """
 
 import re
@@ -12,9 +12,12 @@ PICTURES = [
     (1, "The chain from command to trace", "diagnosis-chain.svg"),
     (1, "Plot: Against omega1.", "diagnosis-residual.svg"),
     (2, "Polar plot: Diagnosed model", "circle.svg"),
+    (3, "Plot: K of press X.", "fleet-drift.svg"),
 ]
 
 for report, label, name in PICTURES:
+    if sys.argv[report] == "-":  # this report's pictures stay as they are
+        continue
     page = Path(sys.argv[report]).read_text()
     style = re.search(r"<style>(.*?)</style>", page, re.S).group(1)
     # A picture has a white ground, whatever the reader's colours are.

@@ -75,6 +75,7 @@ fn a_fleet_is_diagnosed_the_same_in_one_run_in_parts_and_after_an_interruption()
     assert!(reports.len() >= 6, "{links:?}");
     reports.iter().for_each(|l| assert!(root.path().join("one").join(l).is_file(), "{l}"));
     assert!(index.contains("2026-03-12 &lt;b&gt;&amp;.csv") && !index.contains("<b>"));
+    assert!(index.contains("&lt;img src=x onerror=alert(1)&gt;") && !index.contains("<img"), "a column's name is text");
 
     // In parts, in another order, with two at a time; then put together.
     let listed = eixo(&["diagnose", "machines", "--output", "two", "--list"], root.path());

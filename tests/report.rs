@@ -311,6 +311,18 @@ fn hostile_names_stay_text() {
 }
 
 #[test]
+fn a_link_leads_to_a_plain_path_beside_the_page_or_is_text() {
+    let mut table = Table::new("links", ["trace"]);
+    let paths = ["reports/a-1.html", "javascript:alert(1)", "../../etc/passwd", "//host/x", "reports/\"><script>.html"];
+    paths.iter().for_each(|path| table.row(vec![Cell::Link("name".to_owned(), (*path).to_owned())]));
+    let sections = vec![Section::new("", vec![Block::Table(table)])];
+    let page = html::page(&Report { sections, ..Report::default() });
+    let links: Vec<&str> = page.split("href=\"").skip(1).filter_map(|s| s.split('"').next()).collect();
+    assert_eq!(links, ["reports/a-1.html"]);
+    assert_eq!(page.matches(">name<").count(), 5);
+}
+
+#[test]
 fn the_page_fetches_nothing_and_runs_nothing() {
     let page = html::page(&example(200, "axis X"));
     assert!(page.contains("default-src 'none'"));

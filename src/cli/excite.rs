@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use crate::identify::excitation::{Kind, Multisine};
+use crate::report::format::{Medium, number};
 use crate::trace::{Hold, Motion, Signal, Trace, write_csv};
 
 /// Samples of a period of the paper's experiment (Table 1).
@@ -30,6 +31,7 @@ pub enum Signals {
 
 /// Arguments of `eixo excite`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example: eixo excite -o excitation.csv --kind odd --band 1:80 --periods 4 --rms 0.03")]
 pub struct Args {
     /// Where the signal goes, as CSV with the columns time and T
     #[arg(short, long, value_name = "FILE")]
@@ -117,7 +119,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         harmonic(signal.lines.first()),
         harmonic(signal.lines.last())
     );
-    println!("rms           {}", signal.rms());
+    println!("rms           {}", number(signal.rms(), 4, Medium::Terminal));
     println!("crest factor  {:.3}", signal.crest_factor());
     Ok(ExitCode::SUCCESS)
 }

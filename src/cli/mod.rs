@@ -14,6 +14,12 @@ pub const FINDINGS: u8 = 1;
 /// The drive axis of a machine tool: FMU, identification, and diagnosis of the gap between model and machine.
 #[derive(Debug, Parser)]
 #[command(name = "eixo", version, about, propagate_version = true)]
+#[command(after_help = "Exit codes: 0 fine, 1 findings, 2 could not run.
+
+Examples:
+  eixo demo
+  eixo identify trace.csv --report identification.html
+  eixo diagnose log.csv --axis axis.toml --report diagnosis.html")]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -93,5 +99,20 @@ mod tests {
     #[test]
     fn the_argument_parser_is_consistent() {
         super::Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_help_ends_with_an_example() {
+        let mut program = super::Cli::command();
+        program.build();
+        let ends = |command: &mut clap::Command, call: &str| {
+            let help = command.render_long_help().to_string();
+            let last = help.trim_end().rsplit("\n\n").next().unwrap_or_default().to_owned();
+            assert!(last.starts_with("Example") && last.contains(call), "{call}: {last}");
+        };
+        ends(&mut program.clone(), "eixo ");
+        for command in program.get_subcommands().filter(|c| c.get_name() != "help") {
+            ends(&mut command.clone(), &format!("eixo {}", command.get_name()));
+        }
     }
 }

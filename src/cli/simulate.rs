@@ -15,6 +15,9 @@ use crate::trace::{Hold, Machine, Table, load, write_columns};
 
 /// Arguments of `eixo simulate`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  eixo simulate axis.fmu --input excitation.csv -o trace.csv
+  eixo simulate axis.toml --input u.csv -o log.csv --set coulomb_motor.level=0.004 --noise theta1=1e-4 --seed 7")]
 pub struct Args {
     /// An FMU, or an axis.toml, which is exported first
     pub model: PathBuf,

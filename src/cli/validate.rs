@@ -31,13 +31,14 @@ enum Format {
 /// Arguments of `eixo validate`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Example: eixo validate axis.fmu --strict
-         eixo validate axis.fmu --format junit -o validation.xml
-
 Each behavioural rule runs the FMU in a process of its own with limits of time and memory. That contains mistakes, not
 malice: an FMU is a program, and runs with your rights.
 
-Exit code: 0 no finding of error severity (with --strict: no finding), 1 findings, 2 could not run.")]
+Exit code: 0 no finding of error severity (with --strict: no finding), 1 findings, 2 could not run.
+
+Examples:
+  eixo validate axis.fmu --strict
+  eixo validate axis.fmu --format junit -o validation.xml")]
 pub struct Args {
     /// The FMU
     #[arg(required_unless_present_any = ["rules", "child"])]

@@ -55,16 +55,16 @@ pub fn find(arguments: &[PathBuf], axis: Option<&Path>, output: &Path) -> Result
     let output = output.canonicalize().ok();
     let mut paths = BTreeSet::new();
     for argument in arguments {
-        let before = paths.len();
+        let mut own = BTreeSet::new();
         let nothing = |why: &str| FleetError::Nothing { what: argument.display().to_string(), why: why.to_owned() };
         if argument.is_dir() {
-            walk(argument, output.as_deref(), 0, &mut paths)?;
-            if paths.len() == before {
+            walk(argument, output.as_deref(), 0, &mut own)?;
+            if own.is_empty() {
                 return Err(nothing(&format!("no trace in this folder (files that end in {})", EXTENSIONS.join(", "))));
             }
         } else if argument.exists() || !is_pattern(argument) {
             // A named file that is not there is a row that says so.
-            paths.insert(argument.clone());
+            own.insert(argument.clone());
         } else {
             let text = argument.to_string_lossy();
             let matches = glob::glob(&text).map_err(|e| nothing(&format!("not a pattern: {e}")))?;
@@ -74,15 +74,16 @@ pub fn find(arguments: &[PathBuf], axis: Option<&Path>, output: &Path) -> Result
                     FleetError::Read { path, reason: e.into() }
                 })?;
                 if found.is_dir() {
-                    walk(&found, output.as_deref(), 0, &mut paths)?;
+                    walk(&found, output.as_deref(), 0, &mut own)?;
                 } else if !is_axis(&found) {
-                    paths.insert(found);
+                    own.insert(found);
                 }
             }
-            if paths.len() == before {
+            if own.is_empty() {
                 return Err(nothing("no file matches this pattern"));
             }
         }
+        paths.append(&mut own);
         if paths.len() > MOST {
             return Err(nothing(&format!("more than {MOST} traces; run it folder by folder")));
         }

@@ -36,20 +36,20 @@ impl Default for Limits {
 #[derive(Debug, thiserror::Error)]
 pub enum ArchiveError {
     /// The file itself cannot be opened or read.
-    #[error("{path}: {source}")]
+    #[error("{path}: {reason}")]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        reason: io::Error,
     },
     /// Not a ZIP archive, or a damaged one.
-    #[error("{path}: not a readable ZIP archive: {source}")]
+    #[error("{path}: not a readable ZIP archive: {reason}")]
     Zip {
         /// The file.
         path: PathBuf,
         /// What the reader says.
-        source: ZipError,
+        reason: ZipError,
     },
     /// No such entry.
     #[error("the archive has no entry {0}")]
@@ -152,7 +152,7 @@ impl Archive {
     /// # Errors
     /// When the file cannot be read, is no ZIP archive, or has too many entries.
     pub fn open(path: &Path) -> Result<Self, ArchiveError> {
-        let io = |source| ArchiveError::Io { path: path.to_owned(), source };
+        let io = |reason| ArchiveError::Io { path: path.to_owned(), reason };
         let file = File::open(path).map_err(io)?;
         if file.metadata().map_err(io)?.is_dir() {
             return Err(io(io::Error::new(io::ErrorKind::IsADirectory, "is a folder, not an FMU archive")));
@@ -169,7 +169,7 @@ impl Archive {
     }
 
     fn with_source(path: &Path, source: Box<dyn Source>, limits: Limits) -> Result<Self, ArchiveError> {
-        let zip_error = |source| ArchiveError::Zip { path: path.to_owned(), source };
+        let zip_error = |reason| ArchiveError::Zip { path: path.to_owned(), reason };
         let zip = ZipArchive::new(source).map_err(zip_error)?;
         if zip.len() > limits.entries {
             return Err(ArchiveError::TooLarge {
@@ -251,7 +251,7 @@ impl Archive {
         let folder = tempfile::Builder::new()
             .prefix("eixo-fmu-")
             .tempdir()
-            .map_err(|source| ArchiveError::Io { path: std::env::temp_dir(), source })?;
+            .map_err(|reason| ArchiveError::Io { path: std::env::temp_dir(), reason })?;
         let root = folder.path().to_owned();
         self.for_all(|archive, index, budget| archive.extract_entry(&root, index, budget))?;
         Ok(folder)
@@ -272,7 +272,7 @@ impl Archive {
     fn extract_entry(&mut self, root: &Path, index: usize, budget: u64) -> Result<u64, ArchiveError> {
         let entry = self.entries[index].clone();
         let target = root.join(&entry.name);
-        let io = |source| ArchiveError::Io { path: target.clone(), source };
+        let io = |reason| ArchiveError::Io { path: target.clone(), reason };
         if entry.is_dir {
             fs::create_dir_all(&target).map_err(io)?;
             return Ok(0);

@@ -55,6 +55,8 @@ pub fn machines(root: &Path) -> PathBuf {
         log(&folder.join("mill").join(&date), k, 0.004, 11 + u64::from(day));
     }
     std::fs::write(folder.join("mill/2026-03-12.csv"), "time,T,theta1\n0,1,2\n0.1,x\n").expect("the file");
-    std::fs::write(folder.join("press/2026-03-12 <b>&.csv"), "nothing").expect("the file");
+    let unknown =
+        format!("time,<img src=x onerror=alert(1)>\n{}", (0..20).map(|k| format!("{k},1\n")).collect::<String>());
+    std::fs::write(folder.join("press/2026-03-12 <b>&.csv"), unknown).expect("the file");
     folder
 }

@@ -1,6 +1,7 @@
 //! THE list of rules. `eixo validate --rules`, the documentation and the tests iterate it; nothing lists rules twice.
 //!
-//! Sections are those of FMI 2.0.4. What the standard leaves undefined is robustness, never conformance.
+//! Sections are those of FMI 2.0.4. What the standard leaves undefined is robustness, never conformance; and what only an
+//! importer that breaks the standard can bring out (a call out of order, an unknown reference) is a note.
 
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
@@ -192,11 +193,11 @@ rules! {
         "Calculated values keep within min and max, and to the items of their enumeration", "Correct the limits, or the model.";
     "tunable-set" Error Conformance "4.2.4" Check::Behaviour;
         "Tunable parameters can be set during a run", "Accept fmi2SetXXX between steps, or declare the parameter fixed.";
-    "fixed-set" Warning Robustness "4.2.4" Check::Behaviour;
+    "fixed-set" Note Robustness "4.2.4" Check::Behaviour;
         "Fixed and constant variables cannot be set during a run", "Return fmi2Error, or declare the parameter tunable when it takes effect.";
-    "bad-reference-get" Warning Robustness "2.1.7" Check::Behaviour;
+    "bad-reference-get" Note Robustness "2.1.7" Check::Behaviour;
         "Reading an unknown value reference is refused", "Return fmi2Error in the default branch; a wrong connection goes unnoticed otherwise.";
-    "bad-reference-set" Warning Robustness "2.1.7" Check::Behaviour;
+    "bad-reference-set" Note Robustness "2.1.7" Check::Behaviour;
         "Setting an unknown value reference is refused", "Return fmi2Error in the default branch; a wrong connection goes unnoticed otherwise.";
     "empty-call" Warning Robustness "2.1.7" Check::Behaviour;
         "Reading and setting no variables at all succeeds", "Return fmi2OK when nvr is 0, before looking at the arrays.";
@@ -214,17 +215,17 @@ rules! {
         "Results converge as the step shrinks", "Scale whatever happens once a call with the step size, or sub-step internally.";
     "step-variable" Error Conformance "4.3.1" Check::Behaviour;
         "Steps of varying size give the results of equal ones", "Use the size of the present step, or clear canHandleVariableCommunicationStepSize.";
-    "step-negative" Warning Robustness "4.2.2" Check::Behaviour;
+    "step-negative" Note Robustness "4.2.2" Check::Behaviour;
         "A step backwards is refused", "Return fmi2Error or fmi2Discard for communicationStepSize < 0.";
     "step-zero" Warning Robustness "4.2.2" Check::Behaviour;
         "A step of size 0 does no harm", "Do not divide by communicationStepSize.";
-    "step-wrong-point" Warning Robustness "4.2.2" Check::Behaviour;
+    "step-wrong-point" Note Robustness "4.2.2" Check::Behaviour;
         "A step from another point than the communication point is refused", "Compare currentCommunicationPoint with the time reached and return fmi2Error.";
-    "step-early" Warning Robustness "4.2.4" Check::Behaviour;
+    "step-early" Note Robustness "4.2.4" Check::Behaviour;
         "A step before initialisation is refused", "Keep track of the state of the calling sequence and return fmi2Error.";
-    "step-late" Warning Robustness "4.2.4" Check::Behaviour;
+    "step-late" Note Robustness "4.2.4" Check::Behaviour;
         "A step after termination is refused", "Keep track of the state of the calling sequence and return fmi2Error.";
-    "initialisation-order" Warning Robustness "4.2.4" Check::Behaviour;
+    "initialisation-order" Note Robustness "4.2.4" Check::Behaviour;
         "Initialisation out of order is refused", "Keep track of the state of the calling sequence and return fmi2Error.";
     "nan-input" Warning Robustness "2.1.7" Check::Behaviour;
         "Inputs that are NaN, infinite or huge are survived", "Bound iterations, and return fmi2Error or fmi2Discard when they do not converge.";
