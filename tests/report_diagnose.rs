@@ -2,7 +2,8 @@
 
 use eixo::diagnose::location::{Bin, FrequencyPart, Residual, Spread, StateCurve, TimeSlot};
 use eixo::diagnose::{
-    Cause, Diagnosis, Evidence, Figures, GapReport, Levels, Location, Overlay, Ranked, SCHEMA, Verdict, Where,
+    Cause, ClosedLoop, Commands, Diagnosis, Evidence, Figures, GapReport, Levels, Location, LoopErrors, LoopRanked,
+    Overlay, Ranked, SCHEMA, Verdict, Where,
 };
 use eixo::effects::Place;
 use eixo::report::diagnose::{Findings, report, short};
@@ -182,4 +183,43 @@ fn the_other_answers_claim_no_cause() {
 fn a_hostile_machine_name_stays_text() {
     let page = html::page(&made(&friction("</title><script>alert(1)</script>"), &evidence()));
     assert!(!page.contains("<script") && page.contains("&lt;script&gt;"));
+}
+
+#[test]
+fn the_drives_loop_says_whether_it_agrees() {
+    let errors = |command: f64| LoopErrors { command, position: 1e-4 };
+    let ranked = |id: &str, command: f64| LoopRanked {
+        id: id.into(),
+        errors: errors(command),
+        closure: 1.0 - (command / 0.7).powi(2),
+    };
+    let seen = ClosedLoop {
+        before: errors(0.7),
+        reidentified: errors(0.6),
+        after: errors(0.04),
+        closure: 1.0 - (0.04_f64 / 0.7).powi(2),
+        ranking: vec![ranked("coulomb_motor", 0.04), ranked("backlash", 0.3)],
+        commands: Commands {
+            time: vec![0.0, 1.0],
+            measured: vec![0.0, 1.0],
+            before: vec![0.0; 2],
+            after: vec![0.0; 2],
+        },
+        agrees: true,
+    };
+    let d = Diagnosis { closed_loop: Some(seen.clone()), ..friction("x-axis") };
+    let page = html::page(&made(&d, &evidence()));
+    for words in [
+        "In the drive",
+        "The loop agrees",
+        "next comes Play in coupling or nut",
+        "Command of the drive around the model",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    let ranking = vec![ranked("backlash", 0.01), ranked("coulomb_motor", 0.04)];
+    let d = Diagnosis { closed_loop: Some(ClosedLoop { ranking, agrees: false, ..seen }), ..friction("x-axis") };
+    let page = html::page(&made(&d, &evidence()));
+    assert!(page.contains("The loop does not agree: Play in coupling or nut"), "{page}");
+    assert!(!html::page(&made(&friction("x-axis"), &evidence())).contains("In the drive"));
 }

@@ -57,6 +57,19 @@ pub struct Sample {
     pub reading: Reading<f64>,
 }
 
+/// The drive's command over time, N.m.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Commands {
+    /// Time of each sample, s.
+    pub time: Vec<f64>,
+    /// What was measured.
+    pub measured: Vec<f64>,
+    /// Around the model as given.
+    pub before: Vec<f64>,
+    /// Around the model with the effect.
+    pub after: Vec<f64>,
+}
+
 /// A hypothesis as the loop sees it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoopRanked {
@@ -82,6 +95,9 @@ pub struct ClosedLoop {
     pub closure: f64,
     /// Every hypothesis tried, the one that closes most first.
     pub ranking: Vec<LoopRanked>,
+    /// The commands over time: for plots.
+    #[serde(skip)]
+    pub commands: Commands,
     /// Whether no other hypothesis closes more than the diagnosed one by more than 0.5 %.
     pub agrees: bool,
 }
@@ -162,6 +178,12 @@ impl UnderControl<'_> {
     #[must_use]
     pub fn judge(&self, decision: &Decision) -> ClosedLoop {
         let of = |model: &Model| self.errors(model);
+        let commands = Commands {
+            time: (0..self.reference.len()).map(|k| self.record.time(k)).collect(),
+            measured: self.command.to_vec(),
+            before: self.run(&decision.given.fitted.model).0,
+            after: self.run(&decision.chosen.fitted.model).0,
+        };
         let before = of(&decision.given.fitted.model);
         let closure = |e: &LoopErrors| 1.0 - (e.command / before.command).powi(2);
         let after = of(&decision.chosen.fitted.model);
@@ -183,6 +205,7 @@ impl UnderControl<'_> {
             closure: closure(&after),
             agrees: ranking.first().is_none_or(|best| best.closure <= closure(&after) + MATERIAL),
             ranking,
+            commands,
         }
     }
 }

@@ -21,7 +21,7 @@ mod windows;
 mod words;
 
 pub use assess::{Case, Outcome, Replay, diagnose};
-pub use closed_loop::{ClosedLoop, LoopErrors, LoopRanked, Sample, UnderControl};
+pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
 pub use decide::{Decision, Verdict};
 pub use diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
 pub use evidence::{Evidence, Overlay};

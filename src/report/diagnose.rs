@@ -5,8 +5,8 @@ use serde_json::{Map, Value};
 use super::chain::{ChainDiagram, Symbol};
 use super::chart::{Axis, Chart, Mark, Series, Shape};
 use super::format::{self, Medium};
-use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict, chain, residual};
-use crate::diagnose::{Diagnosis, Evidence, Levels, LoopErrors, Verdict as Answer};
+use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict, chain, controlled, residual};
+use crate::diagnose::{Diagnosis, Evidence, Levels, Verdict as Answer};
 use crate::effects::{EFFECTS, EffectInfo, Family, Place};
 use crate::trace::Motion;
 
@@ -34,9 +34,9 @@ pub fn report(f: &Findings) -> Report {
         sections.push(Section::new("What it is", what(f)));
     }
     sections.push(Section::new("How far the gap shrinks", how_far(f)));
-    let under_control = under_control(f);
-    if !under_control.is_empty() {
-        sections.push(Section::new("In the drive's loop", under_control));
+    let in_the_loop = controlled::blocks(f);
+    if !in_the_loop.is_empty() {
+        sections.push(Section::new("In the drive's loop", in_the_loop));
     }
     if let Some(e) = f.evidence {
         sections.push(Section::new("Where the gap shows", residual::blocks(&e.located, f.diagnosis, f.motion)));
@@ -63,7 +63,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
         blocks.push(Block::Table(causes(f)));
     }
     blocks.push(Block::Table(levels(f)));
-    blocks.extend(under_control(f));
+    blocks.extend(controlled::short(f));
     blocks.push(Block::Table(ranking(f, 5)));
     blocks.push(Block::Steps(next(f)));
     blocks
@@ -75,7 +75,7 @@ fn info(id: &str) -> Option<&'static EffectInfo> {
 }
 
 /// A hypothesis in words.
-fn title(id: &str) -> String {
+pub(super) fn title(id: &str) -> String {
     let one = |id: &str| match id {
         "no_gap" => "nothing: the model as it is".to_owned(),
         "parameters" => "parameters only".to_owned(),
@@ -89,7 +89,8 @@ fn short_title(info: &EffectInfo) -> &'static str {
     info.title.split([':', ',']).next().unwrap_or(info.title)
 }
 
-fn percent(share: f64) -> String {
+/// A share in per cent.
+pub(super) fn percent(share: f64) -> String {
     format::percent(share, Medium::Page)
 }
 
@@ -303,36 +304,6 @@ fn levels(f: &Findings) -> Table {
     }
     row("noise floor", |l| l.noise_floor, false);
     table
-}
-
-/// What the drive's loop says, where it was simulated.
-fn under_control(f: &Findings) -> Vec<Block> {
-    let Some(l) = &f.diagnosis.closed_loop else { return Vec::new() };
-    let mut table = Table::new(LoopErrors::TITLE, ["model", "command", "position"]);
-    let cells =
-        |name: &str, e: &LoopErrors| vec![Cell::text(name), Cell::Percent(e.command), Cell::Percent(e.position)];
-    table.row(cells("as given", &l.before));
-    table.row(cells("parameters re-identified", &l.reidentified));
-    match f.diagnosis.verdict {
-        Answer::Effect => table.strong_row(cells("with the effect", &l.after)),
-        Answer::Unexplained => table.row(cells("with the nearest effect", &l.after)),
-        Answer::Parameters | Answer::NoGap => {}
-    }
-    let others = l.ranking.iter().find(|r| r.closure < l.closure && !r.id.is_empty() && r.errors != l.after);
-    let sentence = match (l.agrees, l.ranking.first()) {
-        (false, Some(best)) => format!(
-            "The loop does not agree: {} closes {} of the command's gap, this {}.",
-            title(&best.id),
-            percent(best.closure),
-            percent(l.closure)
-        ),
-        _ => format!(
-            "The loop agrees: this closes {} of the command's gap, and nothing that was tried closes more{}.",
-            percent(l.closure),
-            others.map_or_else(String::new, |o| format!("; next comes {} with {}", title(&o.id), percent(o.closure)))
-        ),
-    };
-    vec![Block::Table(table), Block::Paragraph(sentence)]
 }
 
 fn how_far(f: &Findings) -> Vec<Block> {

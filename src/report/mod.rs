@@ -15,6 +15,7 @@ pub mod identify;
 pub mod polar;
 pub mod terminal;
 
+mod controlled;
 mod decimate;
 mod plot;
 mod residual;
