@@ -130,9 +130,9 @@ def fmi_sim(fmu, trace, settings):
         given, result = Path(folder, "input.csv"), Path(folder, "output.csv")
         rows = zip(trace["time"], trace["T"])
         given.write_text("time,T\n" + "".join(f"{float(t)!r},{float(u)!r}\n" for t, u in rows))
-        command = [program, "--model", fmu, "-i", given, "-o", result, "co-simulation", "--step", repr(float(step))]
+        command = [program, "--model", fmu, "-i", given, "-o", result, "co-simulation"]
         command += ["--output-interval", repr(float(step)), "-s", repr(float(trace["time"][0]))]
-        command += ["-f", repr(float(trace["time"][-1])), "-n", "0"]
+        command += ["-f", repr(float(trace["time"][-1]))]
         for name, value in settings:
             command += ["--init-values", f"{name}={value!r}"]
         run = subprocess.run(command, capture_output=True, text=True, check=False)
