@@ -95,6 +95,42 @@ fn fields_of_a_matlab_structure_are_columns_and_a_matrix_one_column_each() {
     assert_eq!(trace.get(Signal::T).unwrap()[6], 1e-3);
 }
 
+/// The files that scipy tests its own reader with, most of them written by MATLAB: 6.1 on a big-endian machine to 7.4.
+#[test]
+fn files_that_matlab_wrote_hold_what_matlab_put_there() {
+    let pattern =
+        concat!(env!("CARGO_MANIFEST_DIR"), "/.venv/lib/python3*/site-packages/scipy/io/matlab/tests/data/*.mat");
+    let files: Vec<PathBuf> = glob::glob(pattern).unwrap().map(Result::unwrap).collect();
+    if files.is_empty() {
+        eprintln!("SKIPPED: no scipy in .venv; scripts/venv.sh makes it");
+        return;
+    }
+    let (mut doubles, mut matrices) = (0, 0);
+    for path in &files {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let read = Table::read(path);
+        if let Err(error) = &read {
+            assert!(error.to_string().contains(name), "{error}");
+        }
+        let level_5 = ["6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86"].iter().any(|v| name.contains(v));
+        if name.starts_with("testdouble_") && level_5 {
+            // testdouble = 0:pi/4:2*pi
+            let expected: Vec<f64> = (0..9).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4).collect();
+            assert_eq!(column(read.as_ref().unwrap(), "testdouble"), expected, "{name}");
+            doubles += 1;
+        }
+        if name.starts_with("testmatrix_") && level_5 {
+            // A 3 x 5 matrix of zeros with 1..5 in its first row and 1..3 in its first column, stored in bytes.
+            let table = read.as_ref().unwrap();
+            assert_eq!(column(table, "testmatrix(1,:)"), [1.0, 2.0, 3.0, 4.0, 5.0], "{name}");
+            assert_eq!(column(table, "testmatrix(2,:)"), [2.0, 0.0, 0.0, 0.0, 0.0], "{name}");
+            assert_eq!(column(table, "testmatrix(3,:)"), [3.0, 0.0, 0.0, 0.0, 0.0], "{name}");
+            matrices += 1;
+        }
+    }
+    assert_eq!((doubles, matrices), (4, 4));
+}
+
 #[test]
 fn an_hdf5_file_is_refused_with_the_way_out() {
     let folder = tempfile::tempdir().unwrap();

@@ -63,6 +63,9 @@ impl Many {
     ) -> anyhow::Result<ExitCode> {
         let output = self.output.as_deref().context("no --output folder")?;
         let mut items = find(traces, axis, output)?;
+        // A summary that was written among the traces is none of them.
+        let summary = self.summary.as_deref().and_then(|path| path.canonicalize().ok());
+        items.retain(|item| summary.is_none() || item.path.canonicalize().ok() != summary);
         for wanted in &self.part {
             anyhow::ensure!(
                 items.iter().any(|item| item.path == *wanted),

@@ -21,8 +21,8 @@ use crate::trace::{Hold, Machine, Table, load, write_columns};
 pub struct Args {
     /// An FMU, or an axis.toml, which is exported first
     pub model: PathBuf,
-    /// Input trace: a column `time`, and one for each input of the FMU (T)
-    #[arg(short, long, value_name = "CSV")]
+    /// Input trace (CSV, Parquet, MATLAB 5): a column `time`, and one for each input of the FMU (T)
+    #[arg(short, long, value_name = "FILE")]
     pub input: Option<PathBuf>,
     /// Where the trace goes, as CSV
     #[arg(short, long, value_name = "CSV")]

@@ -29,6 +29,7 @@ mod mi {
     pub const UINT32: u32 = 6;
     pub const MATRIX: u32 = 14;
     pub const COMPRESSED: u32 = 15;
+    pub const UTF8: u32 = 16;
 }
 
 /// Classes of arrays (table 1-1, array types).
@@ -209,7 +210,8 @@ impl Reader {
             return Ok(());
         }
         let dimensions = self.element(flags.rest, true)?;
-        if dimensions.kind != mi::INT32 {
+        // Some writers take the unsigned type.
+        if !matches!(dimensions.kind, mi::INT32 | mi::UINT32) {
             return Err("an array has no dimensions".to_owned());
         }
         let mut sizes = Vec::new();
@@ -217,7 +219,7 @@ impl Reader {
             sizes.push(self.u32(four)? as usize);
         }
         let name = self.element(dimensions.rest, true)?;
-        if name.kind != mi::INT8 {
+        if !matches!(name.kind, mi::INT8 | mi::UTF8) {
             return Err("an array has no name".to_owned());
         }
         path.push(field.map_or_else(|| String::from_utf8_lossy(name.data).into_owned(), str::to_owned));
