@@ -15,7 +15,7 @@ pub struct Drives {
     /// Sampling interval of the drives, s
     #[arg(long, default_value_t = Drives::default().dt)]
     pub dt: f64,
-    /// Bandwidth of the velocity loop, rad/s, where the axis file has no [controller]
+    /// Bandwidth of the velocity loop, rad/s, where the axis file has no `[controller]`
     #[arg(long, default_value_t = Drives::default().bandwidth)]
     pub bandwidth: f64,
     /// Position gain, 1/s; a quarter of the bandwidth without

@@ -51,7 +51,7 @@ pub struct Args {
     /// Communication step, s; by default the input's sampling interval
     #[arg(long)]
     pub step: Option<f64>,
-    /// Close the drive's loop of the axis.toml's [controller]: the input is the trace of the reference, T what the drive commands
+    /// Close the drive's loop of the axis.toml's `[controller]`: the input is the trace of the reference, T what the drive commands
     #[arg(long, requires = "input", conflicts_with_all = ["start", "stop", "step", "step_end", "hold"])]
     pub controlled: bool,
     /// Record the outputs as each step left them, before the next inputs are set (as most importers do)

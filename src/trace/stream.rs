@@ -1,6 +1,6 @@
 //! Traces larger than memory: the rows of a CSV or Parquet file, some thousand at a time, as often as they are asked for.
 //!
-//! What a whole table is checked for ([`super::load`]) is checked here in one pass when the trace is opened and again as it
+//! What a whole table is checked for ([`super::load()`]) is checked here in one pass when the trace is opened and again as it
 //! is read; what needs all of a record at once, resampling, is refused with the way out.
 
 use std::fs::File;
@@ -164,7 +164,7 @@ impl Stream {
     /// Opens a trace, and reads its time stamps once.
     ///
     /// # Errors
-    /// As [`super::load`]; and where the file cannot be read row by row, or its time stamps would have to be resampled.
+    /// As [`super::load()`]; and where the file cannot be read row by row, or its time stamps would have to be resampled.
     pub fn open(path: &Path, mapping: &Mapping) -> Result<Self, TraceError> {
         let rows = Rows::open(path)?;
         let mut warnings = Vec::new();
