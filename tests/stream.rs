@@ -57,6 +57,32 @@ fn peak(path: &Path) -> u64 {
 }
 
 #[test]
+fn the_report_of_a_streamed_record_has_no_empty_tables_or_plots() {
+    let folder = tempfile::tempdir().unwrap();
+    long(&folder.path().join("log.csv"), 3000);
+    let run = Command::new(env!("CARGO_BIN_EXE_eixo"))
+        .args(["identify", "log.csv", "--stream", "--report", "report.html", "--json", "found.json"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(matches!(run.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&run.stderr));
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Recursive least squares") && page.contains("streamed"));
+    for empty in ["<tbody></tbody>", "How well the model follows", "Spectrum of the excitation"] {
+        assert!(!page.contains(empty), "{empty}");
+    }
+    let found = std::fs::read_to_string(folder.path().join("found.json")).unwrap();
+    assert!(found.contains("\"samples\": 3000"));
+    let refused = Command::new(env!("CARGO_BIN_EXE_eixo"))
+        .args(["identify", "log.csv", "--stream", "--method", "oe"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--method ls and rls"));
+}
+
+#[test]
 fn memory_stays_the_same_where_the_record_is_five_times_as_long() {
     if !Path::new("/proc/self/status").exists() {
         eprintln!("SKIPPED: no /proc to read the memory of a process from");

@@ -235,11 +235,17 @@ fn found(result: &Identification) -> anyhow::Result<Found> {
     let best = result.recommended.as_ref().context("no method gives an estimate to trust")?;
     let method = &result.methods[best.method];
     let fit = method.outputs.iter().map(|o| o.fit_percent / 100.0).reduce(f64::min);
-    let white = !method.outputs.is_empty() && method.outputs.iter().all(|o| o.whiteness.white);
+    let verdict = if method.outputs.is_empty() {
+        "not_compared"
+    } else if method.explains_exactly() || method.outputs.iter().all(|o| o.whiteness.white) {
+        "explained"
+    } else {
+        "not_explained"
+    };
     let tracked = |e: &Estimate| Tracked { name: e.name.to_owned(), unit: e.unit.to_owned(), value: e.value, std: e.std };
     Ok(Found {
         facts: vec![
-            json!(if method.explains_exactly() || white { "explained" } else { "not_explained" }),
+            json!(verdict),
             json!(method.method),
             json!(fit),
             json!(best.why),

@@ -101,6 +101,7 @@ fn words(answer: &str) -> &str {
         "effect" => "an effect",
         "explained" => "explained down to the noise",
         "not_explained" => "not fully explained",
+        "not_compared" => "not compared with a simulation",
         other => other,
     }
 }

@@ -22,7 +22,9 @@ pub fn report(found: &Identification) -> Report {
         top.push(Block::Table(estimates(best)));
     }
     let mut sections = vec![Section::new("", top)];
-    sections.push(Section::new("How well the model follows the machine", fit(found)));
+    if is_compared(found) {
+        sections.push(Section::new("How well the model follows the machine", fit(found)));
+    }
     if let Some(frf) = &found.frequency_response {
         sections.push(Section::new("Frequency response", frequency_response(frf)));
     }
@@ -55,11 +57,18 @@ pub fn short(found: &Identification) -> Vec<Block> {
     if has_reference(found) {
         blocks.push(Block::Table(errors(found)));
     }
-    blocks.push(Block::Table(fits(found)));
+    if is_compared(found) {
+        blocks.push(Block::Table(fits(found)));
+    }
     if let Some(frf) = &found.frequency_response {
         blocks.push(Block::Table(resonances(frf)));
     }
     blocks
+}
+
+/// Whether a simulation was compared with the record: not with a streamed one.
+fn is_compared(found: &Identification) -> bool {
+    found.methods.iter().any(|m| !m.outputs.is_empty())
 }
 
 fn subject(found: &Identification) -> String {
