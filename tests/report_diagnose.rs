@@ -209,12 +209,8 @@ fn the_drives_loop_says_whether_it_agrees() {
     };
     let d = Diagnosis { closed_loop: Some(seen.clone()), ..friction("x-axis") };
     let page = html::page(&made(&d, &evidence()));
-    for words in [
-        "In the drive",
-        "The loop agrees",
-        "next comes Play in coupling or nut",
-        "Command of the drive around the model",
-    ] {
+    for words in ["In the drive", "The loop agrees", "next comes Play in coupling or nut", "s command: model as given"]
+    {
         assert!(page.contains(words), "{words}");
     }
     let ranking = vec![ranked("backlash", 0.01), ranked("coulomb_motor", 0.04)];

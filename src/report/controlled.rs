@@ -60,8 +60,8 @@ pub(super) fn blocks(f: &Findings) -> Vec<Block> {
     let given = line("model as given", &l.commands.before).in_colour(Colour::Vermillion);
     let found = line(after, &l.commands.after).in_colour(Colour::Blue);
     blocks.push(Block::Figures(vec![
-        Figure::new(chart("Command of the drive around the model as given", given), ""),
-        Figure::new(chart(&format!("Command of the drive around the model, {after}"), found), ""),
+        Figure::new(chart("The drive's command: model as given", given), ""),
+        Figure::new(chart(&format!("The drive's command: {after}"), found), ""),
     ]));
     let mut table =
         Table::new("Every cause in the loop", ["cause", "error of the command", "gap of the command closed"]);
