@@ -35,7 +35,7 @@ def crate(draw: effects.Draw) -> dict:
             out |= {"peak": p[f"{key}_s"] / p[f"{key}_c"] - 1.0, "speed": p[f"{key}_ws"]}
         return out
     if effect.startswith("presliding_"):
-        return {"level": p[f"{key}_c"], "stiffness": p[f"{key}_s0"], "damping": p[f"{key}_s1"]}
+        return {"level": p[f"{key}_c"], "reach": p[f"{key}_c"] / p[f"{key}_s0"], "damping": p[f"{key}_s1"]}
     if effect.startswith("viscous_"):
         return {"coefficient": p[f"v{place[0]}"], "asymmetry": p.get(f"v{place[0]}_asym", 0.0)}
     if effect.startswith("load_"):

@@ -12,7 +12,7 @@ use crate::variables::{Causality, Model as Kind, Named, Starts, Values, find};
 
 /// A machine's model.
 fn model(machine: &Machine) -> Model {
-    Model { parameters: machine.parameters, structure: machine.structure, effects: machine.effects }
+    Model::new(machine.parameters, machine.structure, machine.effects)
 }
 
 /// A trace as the loop sees it: what the drive controls, without noise.

@@ -151,7 +151,7 @@ fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::
     let super::diagnose::Recorded { record, noise, .. } = super::diagnose::record(&file("machine.csv"), &machine)?;
     let case = Case {
         machine: machine.name.clone(),
-        nominal: Model { parameters: machine.parameters, structure: machine.structure, effects: machine.effects },
+        nominal: Model::new(machine.parameters, machine.structure, machine.effects),
         train: &record,
         noise: &noise,
         holdout: None,

@@ -103,7 +103,7 @@ fn examine(
     warnings.extend(holdout.iter().flat_map(|(r, _)| r.warnings.iter().cloned()));
     let case = Case {
         machine: machine.name.clone(),
-        nominal: Model { parameters: machine.parameters, structure: machine.structure, effects: machine.effects },
+        nominal: Model::new(machine.parameters, machine.structure, machine.effects),
         train: &train,
         noise: &noise,
         holdout: holdout.as_ref().map(|(r, _)| &r.record),

@@ -75,6 +75,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let search = Search {
         data,
         nominal: case.nominal,
+        coarse: lattice::dominates(case.noise),
         library: case.library.clone(),
         states: states::along(record, &case.nominal),
     };

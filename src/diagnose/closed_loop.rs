@@ -227,7 +227,7 @@ mod tests {
     use crate::effects::{Effect, Settings};
 
     fn model(effects: Settings) -> Model {
-        Model { parameters: Parameters::PAPER, structure: Structure::TwoInertia, effects }
+        Model::new(Parameters::PAPER, Structure::TwoInertia, effects)
     }
 
     #[test]

@@ -18,8 +18,12 @@ const CLOSES: f64 = 0.95;
 const FURTHER: f64 = 0.5;
 /// Share of the whole gap that a further effect must close.
 const FURTHER_OF_ALL: f64 = 2e-3;
+/// Squared residual per value that a model may take away from an error that is mostly rounding by following its pattern.
+const GRAIN: f64 = 0.05;
+/// Single effects that are given a partner, the best first.
+const BEAM: usize = 3;
 /// Most effects at once.
-const MOST: usize = 4;
+const MOST: usize = 3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
 /// Smallest relative change of the parameters that is called one.
@@ -99,18 +103,27 @@ fn bic(t: &Tested, values: f64, floor: f64) -> f64 {
 pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision {
     let values = search.data.values() as f64;
     let given = search.as_given();
-    let parameters = search.parameters_only(&given);
-    let singles = search.one_more(&Tested { effects: Vec::new(), ..parameters.clone() }, progress);
+    let mut parameters = search.parameters_only(&given);
+    let mut singles = search.one_more(&Tested { effects: Vec::new(), ..parameters.clone() }, progress);
+    // Weakly determined parameters: the fit of another hypothesis may have found the way.
+    if let Some(best) = singles.first() {
+        let again = search.parameters_again(best);
+        if again.fitted.chi2 < parameters.fitted.chi2 {
+            parameters = again;
+        }
+    }
     let mut chosen = nominal_structure(&given, &parameters, values);
     let mut shares = Vec::new();
-    if let Some(best) = singles.first().filter(|best| better(best, &chosen, values)) {
+    let grain = if search.coarse { GRAIN * values } else { 0.0 };
+    let beyond_rounding = |t: &Tested| chosen.fitted.chi2 - t.fitted.chi2 > grain;
+    if let Some(best) = singles.first().filter(|best| better(best, &chosen, values) && beyond_rounding(best)) {
         let best = alike(&singles, best, values);
         chosen = best.clone();
         shares = vec![1.0];
         if unexplained_part(&chosen, values) > 0.0 {
             let gap = parameters.fitted.chi2 - values;
-            chosen = further(search, chosen, gap, values, progress);
-            shares = shares_of(&chosen, &singles, search);
+            chosen = further(search, &singles, chosen, gap, values, progress);
+            (chosen, shares) = pruned(search, chosen, &mut singles, gap, values);
         }
     }
     let verdict = verdict(&given, &parameters, singles.first(), &chosen, values);
@@ -146,47 +159,93 @@ fn alike<'a>(singles: &'a [Tested], best: &'a Tested, values: f64) -> &'a Tested
         .unwrap_or(best)
 }
 
-/// Adds effects while a material remainder is closed by one more; each addition re-opens the choice of the others.
-fn further(search: &Search<'_>, first: Tested, gap: f64, values: f64, progress: &(dyn Fn(&str) + Sync)) -> Tested {
-    let mut chosen = first;
-    while chosen.effects.len() < MOST && unexplained_part(&chosen, values) > 0.0 {
-        let Some(next) = search.one_more(&chosen, progress).into_iter().next() else { break };
+/// Adds effects while a material remainder is closed by one more.
+///
+/// The best single effect may be the one that imitates two others at once: the best few are each given a partner.
+fn further(
+    search: &Search<'_>,
+    singles: &[Tested],
+    first: Tested,
+    gap: f64,
+    values: f64,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Tested {
+    let material = |t: &Tested| unexplained_part(t, values) > 0.0 && t.fitted.chi2 - values > FURTHER_OF_ALL * gap;
+    let closes_more = |next: &Tested, chosen: &Tested| {
         let gain = chosen.fitted.chi2 - next.fitted.chi2;
         let rest = chosen.fitted.chi2 - values;
-        if !better(&next, &chosen, values) || gain < FURTHER * rest || gain < FURTHER_OF_ALL * gap {
-            break;
-        }
-        chosen = next;
-        // With the new effect in, was the one before the right partner?
-        if chosen.effects.len() == 2 {
-            let (newest, variant) = chosen.effects[1];
-            let alone = search.only(&chosen, newest, variant);
-            if let Some(other) = search.one_more(&alone, progress).into_iter().next()
-                && other.fitted.chi2 < chosen.fitted.chi2 - DECISIVE * (other.fitted.chi2 / values).max(1.0)
-            {
-                chosen = other;
+        better(next, chosen, values) && gain >= FURTHER * rest && gain >= FURTHER_OF_ALL * gap
+    };
+    let closer = |a: &Tested, b: &Tested| a.fitted.chi2.total_cmp(&b.fitted.chi2);
+    let best_partner = |of: &Tested| search.one_more(of, progress).into_iter().next();
+    let mut chosen = first;
+    if material(&chosen) {
+        let mut pair: Option<Tested> = None;
+        for single in singles.iter().take(BEAM) {
+            pair = pair.into_iter().chain(best_partner(single)).min_by(closer);
+            if pair.as_ref().is_some_and(|p| !material(p)) {
+                break;
             }
+        }
+        if let Some(found) = pair.as_ref().filter(|p| material(p)) {
+            // With the partner in, was the first the right one?
+            let (newest, variant) = found.effects[1];
+            let turned = best_partner(&search.only(found, newest, variant));
+            pair = pair.into_iter().chain(turned).min_by(closer);
+        }
+        match pair.filter(|p| closes_more(p, &chosen)) {
+            Some(pair) => chosen = pair,
+            None => return chosen,
+        }
+    }
+    while chosen.effects.len() < MOST && material(&chosen) {
+        match best_partner(&chosen).filter(|next| closes_more(next, &chosen)) {
+            Some(next) => chosen = next,
+            None => break,
         }
     }
     chosen
 }
 
-/// Share of each effect: how much of the gap comes back without it.
-fn shares_of(chosen: &Tested, singles: &[Tested], search: &Search<'_>) -> Vec<f64> {
-    if chosen.effects.len() < 2 {
-        return vec![1.0; chosen.effects.len()];
+/// Drops effects that the others, fitted again from where the combination ended, do without; and the share of each that
+/// stays: how much of the gap comes back without it.
+///
+/// A further effect may be no more than the way by which the first came out of a local minimum.
+fn pruned(
+    search: &Search<'_>,
+    combination: Tested,
+    singles: &mut Vec<Tested>,
+    gap: f64,
+    values: f64,
+) -> (Tested, Vec<f64>) {
+    let mut chosen = combination;
+    loop {
+        if chosen.effects.len() < 2 {
+            let shares = vec![1.0; chosen.effects.len()];
+            return (chosen, shares);
+        }
+        let without: Vec<Tested> = (0..chosen.effects.len())
+            .map(|i| {
+                let keep: Vec<(Effect, usize)> =
+                    chosen.effects.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, e)| *e).collect();
+                let again = search.without(&chosen, &keep);
+                let known = singles.iter().find(|t| t.effects == keep);
+                known.filter(|t| t.fitted.chi2 < again.fitted.chi2).cloned().unwrap_or(again)
+            })
+            .collect();
+        let back: Vec<f64> = without.iter().map(|t| (t.fitted.chi2 - chosen.fitted.chi2).max(0.0)).collect();
+        let idle = (0..back.len()).min_by(|a, b| back[*a].total_cmp(&back[*b])).unwrap_or(0);
+        if better(&chosen, &without[idle], values) && back[idle] >= FURTHER_OF_ALL * gap {
+            let sum: f64 = back.iter().sum();
+            return (chosen, back.iter().map(|b| b / sum).collect());
+        }
+        chosen = without[idle].clone();
+        if let [(effect, _)] = chosen.effects[..] {
+            singles.retain(|t| t.effects[0].0 != effect);
+            singles.push(chosen.clone());
+            singles.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+        }
     }
-    let back: Vec<f64> = (0..chosen.effects.len())
-        .map(|i| {
-            let without: Vec<(Effect, usize)> =
-                chosen.effects.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, e)| *e).collect();
-            let known = singles.iter().find(|t| t.effects == without).map(|t| t.fitted.chi2);
-            let chi2 = known.unwrap_or_else(|| search.without(chosen, &without).fitted.chi2);
-            (chi2 - chosen.fitted.chi2).max(0.0)
-        })
-        .collect();
-    let sum: f64 = back.iter().sum();
-    back.iter().map(|b| if sum > 0.0 { b / sum } else { 1.0 / back.len() as f64 }).collect()
 }
 
 fn verdict(given: &Tested, parameters: &Tested, single: Option<&Tested>, chosen: &Tested, values: f64) -> Verdict {

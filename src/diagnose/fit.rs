@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::{Coordinate, Free, Model};
+use super::model::{Coordinate, Free, LOOPS, Model};
 use super::record::Record;
 use super::windows::{self, Initial, Window, local_indices, local_state};
 use crate::effects::Effect;
@@ -13,6 +13,10 @@ use crate::scalar::Dual;
 /// Prior standard deviation of the logarithm of a nominal parameter: a machine's data sheet is seldom off by more than
 /// a factor of two.
 const PRIOR: f64 = 0.5;
+/// Share of the cost that the initial states must bring to be moved.
+const SETTLED: f64 = 1e-3;
+/// Longest step of a parameter's logarithm: far off, the model's linearisation says nothing.
+const STRIDE: f64 = 1.0;
 /// Weight of the prior that ties I2, B and K together (their common factor is weakly determined; PAPER, 4.3).
 const SCALE_PRIOR: f64 = 0.3;
 
@@ -54,6 +58,9 @@ pub struct Fitted {
     /// Linearisations it took.
     pub iterations: usize,
 }
+
+/// Curvature and gradient over a window's own directions.
+type Small<const N: usize> = ([[f64; N]; N], [f64; N]);
 
 /// Sum of squares by channel, and in units of the noise.
 #[derive(Debug, Clone, Copy, Default)]
@@ -134,15 +141,18 @@ impl Shooting<'_> {
         rows
     }
 
-    fn linearise_with<const N: usize>(&self, p: &DVector<f64>) -> Normal {
-        let n = self.coordinates.len();
-        let x: Vec<Dual<N>> = (0..n).map(|i| Dual::variable(p[i], i)).collect();
+    /// Runs the model at p with derivatives to `n` shared coordinates and each window's own initial state.
+    ///
+    /// One small matrix and gradient a window, over both, and the cost without the prior.
+    fn by_window<const N: usize>(&self, p: &DVector<f64>, n: usize) -> (Vec<Small<N>>, f64) {
+        let x: Vec<Dual<N>> = (0..self.coordinates.len())
+            .map(|i| if i < n { Dual::variable(p[i], i) } else { Dual::from(p[i]) })
+            .collect();
         let model = self.start.at(self.coordinates, &x);
         let record = self.data.record;
         let weight = record.noise.map(|s| 1.0 / s);
         let locals = self.locals.len();
         let m = n + locals;
-        // One small normal matrix a window, over the shared parameters and the window's own initial state.
         let mut small = vec![([[0.0; N]; N], [0.0; N]); self.data.windows.len()];
         let mut chi2 = 0.0;
         windows::run(
@@ -179,6 +189,14 @@ impl Shooting<'_> {
                 }
             },
         );
+        (small, chi2)
+    }
+
+    fn linearise_with<const N: usize>(&self, p: &DVector<f64>) -> Normal {
+        let n = self.coordinates.len();
+        let locals = self.locals.len();
+        let m = n + locals;
+        let (small, chi2) = self.by_window::<N>(p, n);
         let total = n + locals * self.data.windows.len();
         let mut normal =
             Normal { cost: 0.5 * chi2, gradient: DVector::zeros(total), curvature: DMatrix::zeros(total, total) };
@@ -210,6 +228,38 @@ impl Problem for Shooting<'_> {
         Some(0.5 * (self.sum(p).chi2 + prior))
     }
 
+    /// Moves the windows' initial states, in which a linear axis is linear, to where they are best: what is left is a
+    /// problem in the shared coordinates alone, with far straighter valleys (Golub, Pereyra, SIAM J. Numer. Anal. 10(2),
+    /// 1973: variable projection).
+    fn settle(&self, p: &mut DVector<f64>) -> Option<f64> {
+        let (n, locals) = (self.coordinates.len(), self.locals.len());
+        let (small, chi2) = self.by_window::<6>(p, 0);
+        let prior: f64 = self.prior_rows(&p.as_slice()[..n]).iter().map(|(r, _)| r * r).sum();
+        let mut promised = 0.0;
+        let mut settled = p.clone();
+        for (w, (matrix, gradient)) in small.iter().enumerate() {
+            let scale: Vec<f64> = (0..locals).map(|i| matrix[i][i].max(f64::MIN_POSITIVE).sqrt()).collect();
+            let scaled = DMatrix::from_fn(locals, locals, |i, j| {
+                matrix[i][j] / (scale[i] * scale[j]) + if i == j { 1e-12 } else { 0.0 }
+            });
+            let right = DVector::from_fn(locals, |i, _| -gradient[i] / scale[i]);
+            let step = scaled.cholesky()?.solve(&right);
+            promised += right.dot(&step);
+            for i in 0..locals {
+                settled[n + w * locals + i] += step[i] / scale[i];
+            }
+        }
+        let cost = 0.5 * (chi2 + prior);
+        if promised > SETTLED * chi2 {
+            let better = self.cost(&settled)?;
+            if better < cost {
+                *p = settled;
+                return Some(better);
+            }
+        }
+        Some(cost)
+    }
+
     fn linearise(&self, p: &DVector<f64>) -> Option<Normal> {
         // The derivative directions are a compile-time number: the next size up.
         match self.coordinates.len() + self.locals.len() {
@@ -230,7 +280,8 @@ pub struct Effort {
     pub misfit: f64,
 }
 
-/// Fits the free numbers of `start`, and the windows' initial states from `initial`.
+/// Fits the free numbers of `start`, and the windows' initial states from `initial`; where an effect that loops stands
+/// when the record begins is such a state, too.
 ///
 /// `nominal` gives the priors' means.
 #[must_use]
@@ -242,13 +293,20 @@ pub fn fit(
     initial: &[Initial],
     effort: Effort,
 ) -> Fitted {
-    let coordinates: Vec<Coordinate> = free.iter().map(|f| Coordinate::new(*f, start)).collect();
+    let loops = LOOPS
+        .iter()
+        .enumerate()
+        .filter(|(_, e)| {
+            start.effects.is_on(**e) || free.iter().any(|f| matches!(f, Free::Effect(own, _) if own == *e))
+        })
+        .map(|(i, _)| Free::Loop(i));
+    let coordinates: Vec<Coordinate> = free.iter().copied().chain(loops).map(|f| Coordinate::new(f, start)).collect();
     let prior = coordinates.iter().map(|c| matches!(c.free, Free::Base(_)).then(|| c.x(nominal))).collect();
     let mut also: Vec<Effect> = free
         .iter()
         .filter_map(|f| match f {
             Free::Effect(e, _) => Some(*e),
-            Free::Base(_) => None,
+            Free::Base(_) | Free::Loop(_) => None,
         })
         .collect();
     also.dedup();
@@ -280,10 +338,12 @@ pub fn fit(
         cost: 1e-5,
         step: 1e-9,
         gradient: 1e-9,
+        stride: coordinates.iter().map(|c| if c.log { STRIDE } else { f64::INFINITY }).collect(),
         lower: (0..total).map(|i| coordinates.get(i).map_or(f64::NEG_INFINITY, |c| c.bounds[0])).collect(),
         upper: (0..total).map(|i| coordinates.get(i).map_or(f64::INFINITY, |c| c.bounds[1])).collect(),
         ..Options::default()
     };
+    problem.settle(&mut p);
     let report = levenberg::minimise(&problem, &p, &options);
     let sum = problem.sum(&report.parameters);
     let std = shared_std(&report.normal.curvature, n, &coordinates, report.parameters.as_slice());

@@ -48,7 +48,7 @@ type Errors = Vector4<f64>;
 pub fn errors(data: Data<'_>, model: &Model, initial: &[Initial]) -> (Vec<Errors>, Vec<Initial>) {
     let fitted = fit(data, model, model, &[], initial, Effort { iterations: 12, misfit: 1.0 });
     let mut windows = vec![Errors::zeros(); data.windows.len()];
-    for (w, k, r) in super::fit::predict(data, model, &fitted.initial) {
+    for (w, k, r) in super::fit::predict(data, &fitted.model, &fitted.initial) {
         for (c, channel) in data.record.channels.iter().enumerate() {
             if let Some(channel) = channel {
                 windows[w][c] += (r[c] - channel[k]).powi(2);

@@ -9,7 +9,14 @@ use serde_json::{Map, json};
 use super::assess::Case;
 use super::decide::{Decision, Verdict};
 use super::diagnosis::{Cause, Diagnosis};
+use super::noise::NoiseEstimate;
 use crate::effects::{Effect, Place};
+
+/// Whether rounding makes the better part of the noise of a channel.
+#[must_use]
+pub fn dominates(noise: &NoiseEstimate) -> bool {
+    noise.quantum.iter().zip(&noise.std).any(|(q, std)| q.is_some_and(|q| q * q / 12.0 > 0.5 * std * std))
+}
 
 /// Names quantisation where the record is at the floor and the lattice is what the floor is made of.
 pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
@@ -17,12 +24,12 @@ pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
     if quantum <= 0.0 || !case.library.contains(&Effect::EncoderQuantisation) {
         return;
     }
-    let coarse: Vec<usize> = (0..4).filter(|c| case.noise.quantum[*c].is_some()).collect();
+    let seen: Vec<usize> = (0..4).filter(|c| case.noise.quantum[*c].is_some()).collect();
     diagnosis.warnings.push(format!(
         "{} read in steps of {quantum:.3e}; the noise floor holds their rounding.",
-        coarse.iter().map(|c| super::record::CHANNELS[*c]).collect::<Vec<_>>().join(" and "),
+        seen.iter().map(|c| super::record::CHANNELS[*c]).collect::<Vec<_>>().join(" and "),
     ));
-    if !matches!(decision.verdict, Verdict::NoGap | Verdict::Parameters) {
+    if !matches!(decision.verdict, Verdict::NoGap | Verdict::Parameters) || !dominates(case.noise) {
         return;
     }
     let info = Effect::EncoderQuantisation.info();

@@ -13,7 +13,12 @@ pub struct Model<S = f64> {
     pub structure: Structure,
     /// The effects' parameters.
     pub effects: Settings<S>,
+    /// Where each of [`LOOPS`] stands in its loop when the record begins, -1 to 1.
+    pub loops: [S; LOOPS.len()],
 }
+
+/// Effects whose torque hangs on all the motion before the record: what they remember at its beginning is fitted.
+pub const LOOPS: [Effect; 3] = [Effect::PreslidingMotor, Effect::PreslidingTable, Effect::CouplingHysteresis];
 
 /// A parameter of the nominal axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +82,8 @@ pub enum Free {
     Base(BaseParameter),
     /// Of an effect: which parameter.
     Effect(Effect, usize),
+    /// Where an effect, one of [`LOOPS`], stands when the record begins.
+    Loop(usize),
 }
 
 /// How a free number is moved: `value = exp(x)*unit` or `value = x*unit`.
@@ -115,6 +122,7 @@ impl Coordinate {
                 };
                 Self { free, log, unit, bounds }
             }
+            Free::Loop(_) => Self { free, log: false, unit: 1.0, bounds: [-1.0, 1.0] },
         }
     }
 
@@ -135,6 +143,7 @@ impl Coordinate {
         match self.free {
             Free::Base(p) => p.value(&model.parameters),
             Free::Effect(e, i) => model.effects.of(e)[i],
+            Free::Loop(i) => model.loops[i],
         }
     }
 
@@ -151,6 +160,12 @@ impl Coordinate {
 }
 
 impl Model {
+    /// A model whose loops begin in their middle.
+    #[must_use]
+    pub const fn new(parameters: Parameters, structure: Structure, effects: Settings) -> Self {
+        Self { parameters, structure, effects, loops: [0.0; LOOPS.len()] }
+    }
+
     /// One hundredth of the critical damping.
     fn small_damping(&self) -> f64 {
         let p = &self.parameters;
@@ -163,11 +178,13 @@ impl Model {
             parameters: Parameters::lift(&self.parameters),
             structure: self.structure,
             effects: Settings::lift(&self.effects),
+            loops: self.loops.map(S::from),
         };
         for (c, &x) in coordinates.iter().zip(x) {
             match c.free {
                 Free::Base(p) => *p.slot(&mut model.parameters) = c.at(x),
                 Free::Effect(e, i) => model.effects.of_mut(e)[i] = c.at(x),
+                Free::Loop(i) => model.loops[i] = c.at(x),
             }
         }
         model

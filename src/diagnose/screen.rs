@@ -13,6 +13,10 @@ use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
 
 /// Prior standard deviation of a relative error of a nominal parameter.
 const PRIOR: f64 = 0.3;
+/// Relative errors of a nominal parameter that a regression may find.
+const ERRORS: [f64; 2] = [-0.6, 1.5];
+/// Steps of the golden section that takes a frequency off its grid.
+const SHARPENINGS: usize = 10;
 /// Most orders or frequencies tried.
 const MOST_LINES: usize = 600;
 
@@ -40,6 +44,8 @@ pub struct Screen<'a> {
     common: Vec<Column>,
     gram: DMatrix<f64>,
     right: DVector<f64>,
+    /// How many of the common columns are errors of nominal parameters.
+    errors: usize,
     scales: Scales,
 }
 
@@ -59,6 +65,7 @@ impl<'a> Screen<'a> {
             .iter()
             .map(|p| responder.torques(&base_torques(*p, model, states)))
             .collect();
+        let errors = common.len();
         for effect in found {
             let mut alone = Settings::default();
             alone.of_mut(*effect).copy_from_slice(model.effects.of(*effect));
@@ -69,13 +76,13 @@ impl<'a> Screen<'a> {
         let mut right = DVector::from_fn(n, |i, _| dot(&common[i], &residual));
         for i in 0..n {
             gram[(i, i)] += PRIOR.powi(-2);
-            if i >= BaseParameter::of(model.structure).len() {
+            if i >= errors {
                 // An effect already found has its size as prior mean.
                 right[i] += PRIOR.powi(-2);
             }
         }
         let scales = Scales::new(model, record, states);
-        Self { model, record, states, responder, residual, common, gram, right, scales }
+        Self { model, record, states, responder, residual, common, gram, right, errors, scales }
     }
 
     /// The best starts of an effect's variant, best first, at most `most`.
@@ -83,11 +90,56 @@ impl<'a> Screen<'a> {
     pub fn starts(&self, effect: Effect, variant: usize, most: usize) -> Vec<Candidate> {
         let form = &effect.info().variants[variant];
         let trials = self.scales.trials(effect, form);
-        let mut found: Vec<Candidate> =
-            trials.par_iter().filter_map(|trial| self.regress(effect, variant, form, trial)).collect();
-        found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
-        found.truncate(most);
-        found
+        let mut found: Vec<(Candidate, &Trial)> = trials
+            .par_iter()
+            .filter_map(|trial| self.regress(effect, variant, form, trial).map(|candidate| (candidate, trial)))
+            .collect();
+        found.sort_by(|a, b| a.0.chi2.total_cmp(&b.0.chi2));
+        let mut best: Vec<(Candidate, &Trial)> = Vec::new();
+        for (candidate, trial) in found {
+            if best.len() == most {
+                break;
+            }
+            if !best.iter().any(|(_, chosen)| self.scales.neighbours(effect, trial, chosen)) {
+                best.push((candidate, trial));
+            }
+        }
+        best.into_iter().map(|(candidate, trial)| self.sharpened(candidate, trial, form)).collect()
+    }
+
+    /// The candidate with its frequency or order moved off the grid to where the regression leaves least: golden
+    /// section between the grid's neighbours. Over a long record half a step of the grid is a phase of a quarter turn.
+    fn sharpened(&self, candidate: Candidate, trial: &Trial, form: &Variant) -> Candidate {
+        let Candidate { effect, variant, .. } = candidate;
+        let Some((i, line, step)) = self.scales.line(effect, trial) else { return candidate };
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let at = |value: f64| {
+            let mut moved = trial.clone();
+            moved.settings.of_mut(effect)[i] = value;
+            self.regress(effect, variant, form, &moved)
+        };
+        let cost = |c: &Option<Candidate>| c.as_ref().map_or(f64::INFINITY, |c| c.chi2);
+        let (mut low, mut high) = ((line - step).max(0.1 * step), line + step);
+        let mut left = at(high - golden * (high - low));
+        let mut right = at(low + golden * (high - low));
+        let mut best = candidate;
+        for _ in 0..SHARPENINGS {
+            if cost(&left) < cost(&right) {
+                high = low + golden * (high - low);
+                right = left;
+                left = at(high - golden * (high - low));
+            } else {
+                low = high - golden * (high - low);
+                left = right;
+                right = at(low + golden * (high - low));
+            }
+            for trial in [&left, &right].into_iter().flatten() {
+                if trial.chi2 < best.chi2 {
+                    best = trial.clone();
+                }
+            }
+        }
+        best
     }
 
     fn regress(&self, effect: Effect, variant: usize, form: &Variant, trial: &Trial) -> Option<Candidate> {
@@ -98,7 +150,8 @@ impl<'a> Screen<'a> {
             features::column(effect, settings, self.model, self.record, self.states, &self.responder)
         };
         for &i in form.free {
-            if info.parameters[i].start != Start::Linear {
+            let share = info.parameters[i].start == Start::Share;
+            if info.parameters[i].start != Start::Linear && !share {
                 continue;
             }
             let mut unit = trial.settings;
@@ -108,6 +161,9 @@ impl<'a> Screen<'a> {
                 }
             }
             unit.of_mut(effect)[i] = info.parameters[i].off + 1.0;
+            if share {
+                unit.of_mut(effect)[form.free[0]] += 1.0;
+            }
             let phase = form.free.iter().copied().find(|&j| info.parameters[j].start == Start::Phase);
             columns.push(column(&unit));
             linear.push(i);
@@ -138,6 +194,10 @@ impl<'a> Screen<'a> {
                     let (s, c) = (sizes[n], sizes[n - 1]);
                     p[linear[n - 1]] = s.hypot(c);
                     p[i] = s.atan2(c);
+                } else if info.parameters[i].start == Start::Share {
+                    // The size's torque is in both columns.
+                    p[form.free[0]] += sizes[n];
+                    p[i] = if p[form.free[0]] == 0.0 { 0.0 } else { sizes[n] / p[form.free[0]] };
                 } else {
                     p[i] = info.parameters[i].off + sizes[n];
                 }
@@ -150,6 +210,9 @@ impl<'a> Screen<'a> {
     }
 
     /// Regression on the common columns and these: what is left, and the sizes of these.
+    ///
+    /// Errors of the nominal parameters stay between [`ERRORS`]: along a measured motion I2, B and K of nothing at all
+    /// leave no error of the table, whatever acts on it.
     fn solve(&self, columns: &[Column]) -> (f64, Vec<f64>) {
         let (n, m) = (self.common.len(), columns.len());
         let mut gram = DMatrix::zeros(n + m, n + m);
@@ -164,21 +227,43 @@ impl<'a> Screen<'a> {
             }
             right[n + j] = dot(column, &self.residual);
         }
-        let scale = DVector::from_fn(n + m, |i, _| gram[(i, i)].max(1e-300_f64).sqrt());
-        let scaled = DMatrix::from_fn(n + m, n + m, |i, j| {
-            gram[(i, j)] / (scale[i] * scale[j]) + if i == j { 1e-12 } else { 0.0 }
-        });
-        let target = right.component_div(&scale);
         let total = dot(&self.residual, &self.residual);
-        match scaled.cholesky() {
-            Some(factor) => {
-                let x = factor.solve(&target);
-                let chi2 = total - target.dot(&x);
-                (chi2, (0..m).map(|j| x[n + j] / scale[n + j]).collect())
+        let mut held: Vec<(usize, f64)> = Vec::new();
+        loop {
+            let Some(x) = solve_with_held(&gram, &right, &held) else { return (total, vec![0.0; m]) };
+            let outside = (0..self.errors)
+                .map(|i| (i, x[i].clamp(ERRORS[0], ERRORS[1])))
+                .filter(|(i, bound)| (x[*i] - bound).abs() > 0.0)
+                .max_by(|a, b| (x[a.0] - a.1).abs().total_cmp(&(x[b.0] - b.1).abs()));
+            match outside {
+                Some(bound) => held.push(bound),
+                None => {
+                    let chi2 = total - 2.0 * right.dot(&x) + (&gram * &x).dot(&x);
+                    return (chi2, x.as_slice()[n..].to_vec());
+                }
             }
-            None => (total, vec![0.0; m]),
         }
     }
+}
+
+/// Least squares from its normal equations with some unknowns held at given values; `None` if it has no solution.
+fn solve_with_held(gram: &DMatrix<f64>, right: &DVector<f64>, held: &[(usize, f64)]) -> Option<DVector<f64>> {
+    let mut x = DVector::zeros(right.len());
+    for (i, value) in held {
+        x[*i] = *value;
+    }
+    let free: Vec<usize> = (0..right.len()).filter(|i| held.iter().all(|h| h.0 != *i)).collect();
+    let rest = right - gram * &x;
+    let scale: Vec<f64> = free.iter().map(|&i| gram[(i, i)].max(1e-300).sqrt()).collect();
+    let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+        gram[(free[a], free[b])] / (scale[a] * scale[b]) + if a == b { 1e-12 } else { 0.0 }
+    });
+    let target = DVector::from_fn(free.len(), |a, _| rest[free[a]] / scale[a]);
+    let solution = scaled.cholesky()?.solve(&target);
+    for (a, i) in free.iter().enumerate() {
+        x[*i] = solution[a] / scale[a];
+    }
+    Some(x)
 }
 
 /// Torques that stand for a relative error of a nominal parameter, along the motion.
@@ -207,6 +292,7 @@ fn base_torques(p: BaseParameter, model: &Model, states: &States) -> super::resp
 }
 
 /// Shapes of an effect to be tried, with the fractions they came from.
+#[derive(Clone)]
 struct Trial {
     settings: Settings,
     fractions: Vec<(usize, Scale, f64)>,
@@ -234,7 +320,7 @@ struct Scales {
     speed: [f64; 2],
     twist: f64,
     torque: f64,
-    stiffness: [f64; 2],
+    rotation: [f64; 2],
     dt: f64,
     mode: f64,
     inertia: f64,
@@ -250,22 +336,11 @@ impl Scales {
             (states.motion.iter().map(|s| f(s).powi(2)).sum::<f64>() / states.motion.len() as f64).sqrt()
         };
         let p = &model.parameters;
-        let rms_torque = (record.torque.iter().map(|t| t * t).sum::<f64>() / record.len() as f64).sqrt();
         let speed = [rms(&|s| s[1]), rms(&|s| s[3])];
-        let swing = |i: usize| {
-            let mut from = states.motion[0][i];
-            let mut direction = 0.0;
-            let mut swings = Vec::new();
-            for pair in states.motion.windows(2) {
-                let v = pair[1][i + 1];
-                if v.signum() != direction {
-                    swings.push((pair[1][i] - from).abs());
-                    from = pair[1][i];
-                    direction = v.signum();
-                }
-            }
-            swings.sort_by(f64::total_cmp);
-            swings.get(swings.len() / 2).copied().unwrap_or(1.0).max(1e-12)
+        let rotation = |i: usize| {
+            let n = states.motion.len() as f64;
+            let mean = states.motion.iter().map(|s| s[i]).sum::<f64>() / n;
+            rms(&|s| s[i] - mean).max(1e-12)
         };
         let span = |i: usize| {
             let (low, high) = states.motion.iter().fold((f64::MAX, f64::MIN), |(l, h), s| (l.min(s[i]), h.max(s[i])));
@@ -287,12 +362,34 @@ impl Scales {
             speed,
             twist: rms(&|s| s[0] - s[2]),
             torque: record.torque.iter().fold(0.0, |m, t| t.abs().max(m)),
-            stiffness: [rms_torque / swing(0), rms_torque / swing(2)],
+            rotation: [rotation(0), rotation(2)],
             dt: record.dt,
             mode,
             inertia: p.i1 + p.i2,
             frequencies: lines(0.5 / length, 0.25 / record.dt),
             travel,
+        }
+    }
+
+    /// Orders or frequencies that an effect is tried at.
+    fn lines(&self, effect: Effect, scale: Scale) -> Option<&[f64]> {
+        match scale {
+            Scale::Order => Some(&self.orders[usize::from(effect.info().place != Place::Motor)]),
+            Scale::Frequency => Some(&self.frequencies),
+            _ => None,
+        }
+    }
+
+    /// The parameter of a trial that lies on a grid of lines, its line, and the grid's step.
+    fn line(&self, effect: Effect, trial: &Trial) -> Option<(usize, f64, f64)> {
+        trial.fractions.iter().find_map(|&(i, scale, line)| self.lines(effect, scale).map(|all| (i, line, all[0])))
+    }
+
+    /// Whether two trials are the same line but for a step of the grid.
+    fn neighbours(&self, effect: Effect, a: &Trial, b: &Trial) -> bool {
+        match (self.line(effect, a), self.line(effect, b)) {
+            (Some((_, a, step)), Some((_, b, _))) => (a - b).abs() < 1.5 * step,
+            _ => false,
         }
     }
 
@@ -308,7 +405,7 @@ impl Scales {
             Scale::Speed => fraction * self.speed[side],
             Scale::Twist => fraction * self.twist,
             Scale::Torque => fraction * self.torque,
-            Scale::Stiffness => fraction * self.stiffness[side],
+            Scale::Rotation => fraction * self.rotation[side],
             Scale::Sample => fraction * self.dt,
             Scale::Mode => {
                 let w = fraction * self.mode;
@@ -330,15 +427,7 @@ impl Scales {
         order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
         for i in order {
             let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
-            let lines;
-            let fractions: &[f64] = match scale {
-                Scale::Order => {
-                    lines = &self.orders[usize::from(info.place != Place::Motor)];
-                    lines
-                }
-                Scale::Frequency => &self.frequencies,
-                _ => fractions,
-            };
+            let fractions = self.lines(effect, scale).unwrap_or(fractions);
             trials = trials
                 .iter()
                 .flat_map(|t| {

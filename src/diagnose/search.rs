@@ -8,14 +8,22 @@ use super::response::States;
 use super::screen::{Candidate, Screen};
 use super::windows::Initial;
 use crate::axis::Structure;
-use crate::effects::{Effect, Place, Settings, Variant};
+use crate::effects::{Effect, Place, Role, Settings, Variant};
 
 /// Linearisations of a first look at a start.
 const GLANCE: usize = 6;
 /// Linearisations of a fit that counts.
 const FULL: usize = 40;
-/// Starts looked at per effect.
-const STARTS: usize = 3;
+/// Linearisations of the fit that every other is measured against.
+const LONG: usize = 120;
+/// Times that a start is halved until the model runs.
+const SMALLER: usize = 5;
+/// Starts looked at per effect, alone and beside another.
+const STARTS: [usize; 2] = [3, 2];
+/// Periods of a flexible mode that a record must hold.
+const SWINGS: f64 = 2.0;
+/// Damping ratio that a flexible mode must have.
+const DECAYS: f64 = 1e-3;
 /// Effects fitted at a time.
 const BATCH: usize = 4;
 /// Squared residual per value at which a fit counts as having reached the floor,
@@ -24,12 +32,14 @@ const REACHED: f64 = 1.3;
 const REACHED_NEARLY: f64 = 1.02;
 /// An effect whose regression leaves this many times a fit at the floor is not looked at.
 const HOPELESS: f64 = 3.0;
-/// Effects that are fitted at all: the best by the regression.
-const LOOKED_AT: usize = 10;
-/// Effects whose fits are taken to the end, at most.
-const FINALISTS: usize = 6;
-/// And only those within this factor of the best at first look.
-const NEAR: f64 = 30.0;
+/// Effects that are fitted at all: the best by the regression, alone and beside another.
+const LOOKED_AT: [usize; 2] = [10, 6];
+/// Effects whose fits are taken to the end, at most, alone and beside another.
+const FINALISTS: [usize; 2] = [6, 3];
+/// And only those within this factor of the best at first look,
+const NEAR: f64 = 10.0;
+/// or within this one when the best has reached the floor.
+const NEAR_THE_FLOOR: f64 = 3.0;
 
 /// A hypothesis that was fitted.
 #[derive(Debug, Clone)]
@@ -55,6 +65,8 @@ pub struct Search<'a> {
     pub data: Data<'a>,
     /// The model as given.
     pub nominal: Model,
+    /// Whether the noise is mostly rounding, which is not white.
+    pub coarse: bool,
     /// Effects that may be named.
     pub library: Vec<Effect>,
     /// Motion along the record.
@@ -89,7 +101,7 @@ impl Search<'_> {
             self.misfit(given.fitted.chi2),
         );
         let misfit = self.misfit(look.fitted.chi2);
-        self.test(&look.fitted.model, &free, &look.fitted.initial, Vec::new(), FULL, misfit)
+        self.test(&look.fitted.model, &free, &look.fitted.initial, Vec::new(), LONG, misfit)
     }
 
     fn misfit(&self, chi2: f64) -> f64 {
@@ -114,6 +126,7 @@ impl Search<'_> {
     #[must_use]
     pub fn one_more(&self, beside: &Tested, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
         let model = Model { effects: beside.fitted.model.effects, ..self.nominal };
+        let stage = usize::from(!beside.effects.is_empty());
         let found: Vec<Effect> = beside.effects.iter().map(|(e, _)| *e).collect();
         let screen = Screen::new(&model, self.data.record, self.data.windows, &self.states, &found);
         let mut screened: Vec<Vec<Candidate>> = self
@@ -123,14 +136,15 @@ impl Search<'_> {
             .map(|&effect| {
                 progress(effect.info().id);
                 let variants = 0..effect.info().variants.len();
-                let mut starts: Vec<Candidate> = variants.flat_map(|v| screen.starts(effect, v, STARTS)).collect();
+                let mut starts: Vec<Candidate> =
+                    variants.flat_map(|v| screen.starts(effect, v, STARTS[stage])).collect();
                 starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
                 starts
             })
             .filter(|starts| !starts.is_empty())
             .collect();
         screened.sort_by(|a, b| a[0].chi2.total_cmp(&b[0].chi2));
-        screened.truncate(LOOKED_AT);
+        screened.truncate(LOOKED_AT[stage]);
         // The regression's favourites first; when they reach the floor, the others need not be looked at.
         let mut glances: Vec<(Tested, Candidate)> = Vec::new();
         for batch in screened.chunks(BATCH) {
@@ -142,26 +156,27 @@ impl Search<'_> {
                 progress(starts[0].effect.info().id);
                 starts
                     .iter()
-                    .take(STARTS)
-                    .map(|c| (self.fit_candidate(beside, c, GLANCE), c.clone()))
+                    .take(STARTS[stage])
+                    .map(|c| (self.glance(beside, c), c.clone()))
                     .min_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2))
             }));
         }
         glances.sort_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2));
-        let near = glances.first().map_or(0.0, |g| NEAR * g.0.fitted.chi2);
+        let best = glances.first().map_or(0.0, |g| g.0.fitted.chi2);
+        let near = best * if best < REACHED * self.data.values() as f64 { NEAR_THE_FLOOR } else { NEAR };
         let mut tested: Vec<Tested> = glances
             .par_iter()
             .enumerate()
             .map(|(rank, (glance, candidate))| {
                 progress(candidate.effect.info().id);
-                if rank < FINALISTS && (rank < 1 || glance.fitted.chi2 < near) {
+                if rank < FINALISTS[stage] && (rank < 1 || glance.fitted.chi2 < near) {
                     self.best_variant(beside, glance, candidate, &screen)
                 } else {
                     glance.clone()
                 }
             })
             .collect();
-        tested.retain(|t| t.fitted.chi2.is_finite());
+        tested.retain(|t| t.fitted.chi2.is_finite() && self.swings(t));
         tested.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
         tested
     }
@@ -212,6 +227,25 @@ impl Search<'_> {
         !unfit && (!rigid || !beyond_a_rigid_axis)
     }
 
+    /// Whether a flexible mode, if there is one, is one: slower than the record, it is a wall with spring and damper; free
+    /// of damping, a foreign sine that no motion excites.
+    fn swings(&self, t: &Tested) -> bool {
+        let p = t.fitted.model.effects.of(Effect::FlexibleMode);
+        let length = self.data.record.len() as f64 * self.data.record.dt;
+        let flexible = t.effects.iter().any(|(e, _)| *e == Effect::FlexibleMode);
+        let swings = p[1] > p[0] * (SWINGS * std::f64::consts::TAU / length).powi(2);
+        let decays = p[2] > 2.0 * DECAYS * (p[0] * p[1]).sqrt();
+        !flexible || (swings && decays)
+    }
+
+    /// The nominal structure with its parameters fitted, from where another hypothesis has them.
+    #[must_use]
+    pub fn parameters_again(&self, from: &Tested) -> Tested {
+        let start = Model { effects: self.nominal.effects, ..from.fitted.model };
+        let misfit = self.misfit(from.fitted.chi2);
+        self.test(&start, &self.base(), &from.fitted.initial, Vec::new(), LONG, misfit)
+    }
+
     /// One of a combination's effects alone, as it was fitted there: a start for other partners.
     #[must_use]
     pub fn only(&self, combination: &Tested, effect: Effect, variant: usize) -> Tested {
@@ -250,6 +284,23 @@ impl Search<'_> {
         let free = self.free(beside, effect, variant);
         let effects = beside.effects.iter().copied().chain([(effect, variant)]).collect();
         self.test(&from.model, &free, &from.initial, effects, iterations, self.misfit(from.chi2))
+    }
+
+    /// A first look at a start; where the model runs away (a spring that softens beyond its range), from a smaller one.
+    fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
+        let mut start = candidate.clone();
+        for _ in 0..SMALLER {
+            let tested = self.fit_candidate(beside, &start, GLANCE);
+            if tested.fitted.chi2.is_finite() {
+                return tested;
+            }
+            for (value, info) in start.settings.of_mut(start.effect).iter_mut().zip(start.effect.info().parameters) {
+                if info.role == Role::Size {
+                    *value = info.off + 0.5 * (*value - info.off);
+                }
+            }
+        }
+        self.fit_candidate(beside, &start, GLANCE)
     }
 
     fn fit_candidate(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {

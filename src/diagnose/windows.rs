@@ -7,10 +7,10 @@
 
 use std::ops::Range;
 
-use super::model::Model;
+use super::model::{LOOPS, Model};
 use super::record::Record;
 use crate::axis::{Axis, Hold, Scheme, Structure, substeps};
-use crate::effects::{Effect, MEMORY, Memory, Ramp, Reading, SensorHistory, TorqueHistory};
+use crate::effects::{Effect, MEMORY, Memory, Ramp, Reading, SensorHistory, Settings, TorqueHistory};
 use crate::scalar::Scalar;
 
 /// Samples in a window that are compared.
@@ -74,6 +74,11 @@ pub fn run<S: Scalar>(
     let sensed = !axis.on().sensors().is_empty();
     let flexible = axis.on().forces().contains(&Effect::FlexibleMode);
     let mut memory: Memory<S> = [S::default(); MEMORY];
+    for (effect, share) in LOOPS.iter().zip(&model.loops) {
+        if axis.on().forces().contains(effect) {
+            Settings::set_loop(&mut memory, *effect, *share);
+        }
+    }
     for (w, window) in windows.iter().enumerate() {
         let next = windows.get(w + 1).map_or(usize::MAX, |n| n.begin);
         let time = |k: usize| record.start + k as f64 * record.dt;

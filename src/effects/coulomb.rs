@@ -20,7 +20,8 @@ const PARAMETERS: &[ParameterInfo] = &[
         -1.0,
         1.0,
         "Direction asymmetry: level is level*(1 + asymmetry) forwards and level*(1 - asymmetry) backwards",
-    ),
+    )
+    .start(Start::Share),
 ];
 const VARIANTS: &[Variant] = &[
     Variant { name: "", free: &[0] },

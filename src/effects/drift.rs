@@ -1,10 +1,22 @@
 //! Slow changes over the record: warming, wear.
+//!
+//! What changes at a rate at first may come to rest, as a part that warms up does: after a first-order lag of rate
+//! `fade` it has changed by `rate*s`, `s = (1 - exp(-fade*t))/fade`; `fade = 0` is the straight line `s = t`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
-use super::shapes::{Base, DryFriction, Force, Moment, Reaction};
+use super::shapes::{Base, DryFriction, Force, Moment, Reaction, mean_decay};
 use crate::scalar::Scalar;
 
-/// Drift of the coupling's stiffness: `K*(1 + rate*t)`.
+/// How fast a drift comes to rest.
+const FADE: ParameterInfo =
+    ParameterInfo::shape("fade", "1/s", 0.0, 0.0, 1e3, "Rate at which the change comes to rest; 0: it goes on");
+
+/// The time that a steady drift would have needed to come as far.
+fn drifted<S: Scalar>(fade: S, time: f64) -> S {
+    mean_decay(fade * time) * time
+}
+
+/// Drift of the coupling's stiffness: `K*(1 + rate*s)`.
 pub struct StiffnessDrift;
 
 impl Force for StiffnessDrift {
@@ -13,17 +25,20 @@ impl Force for StiffnessDrift {
         place: Place::Coupling,
         family: Family::Drift,
         title: "A stiffness that changes slowly over the record",
-        equation: "f = K*rate*t*d",
+        equation: "f = K*rate*s*d, s = (1 - exp(-fade*t))/fade",
         signature: "r1 = -r2 proportional to the twist, growing over the record; lines split",
         reference: "First-order term of any slow change of K",
-        parameters: &[ParameterInfo::size("rate", "1/s", -1e3, 1e3, "Relative change of K per second").nominal(1e-2)],
+        parameters: &[
+            ParameterInfo::size("rate", "1/s", -1e3, 1e3, "Relative change of K per second").nominal(1e-2),
+            FADE,
+        ],
         memory: 0,
-        variants: &[Variant { name: "", free: &[0] }],
+        variants: &[Variant { name: "", free: &[0] }, Variant { name: "that comes to rest", free: &[0, 1] }],
     };
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
-        let k = base.k * p[0] * m.time;
+        let k = base.k * p[0] * drifted(p[1], m.time);
         Reaction { torque: k * m.end.x, stiffness: k.re(), damping: 0.0 }
     }
 }
@@ -37,7 +52,7 @@ impl DryFriction for FrictionDrift {
         place: Place::Motor,
         family: Family::Drift,
         title: "A friction of the motor that changes slowly over the record",
-        equation: "f = sgn(v)*(level_rate*t + viscous_rate*t*|v|)",
+        equation: "f = sgn(v)*s*(level_rate + viscous_rate*|v|), s = (1 - exp(-fade*t))/fade",
         signature: "r1 a square of the sign of omega1 that grows over the record",
         reference: "First-order term of any slow change of friction",
         parameters: &[
@@ -45,16 +60,20 @@ impl DryFriction for FrictionDrift {
                 .nominal(1e-3),
             ParameterInfo::size("viscous_rate", "N.m/rad", -1e6, 1e6, "Change of the viscous coefficient per second")
                 .nominal(1e-4),
+            FADE,
         ],
         memory: 0,
         variants: &[
             Variant { name: "dry", free: &[0] },
             Variant { name: "viscous", free: &[1] },
             Variant { name: "dry and viscous", free: &[0, 1] },
+            Variant { name: "dry, coming to rest", free: &[0, 2] },
+            Variant { name: "viscous, coming to rest", free: &[1, 2] },
         ],
     };
 
     fn level<S: Scalar>(p: &[S], _direction: f64, speed: S, at: f64) -> (S, f64) {
-        ((p[0] + p[1] * speed) * at, p[1].re() * at)
+        let s = drifted(p[2], at);
+        ((p[0] + p[1] * speed) * s, p[1].re() * s.re())
     }
 }

@@ -99,6 +99,8 @@ pub enum Start {
     Linear,
     /// The phase of a periodic torque whose amplitude is the parameter before: linear regression gives both.
     Phase,
+    /// The torque is proportional to it times the first size, besides the size's own torque: linear regression gives both.
+    Share,
     /// Each of these multiples of the scale is tried.
     Grid(Scale, &'static [f64]),
     /// Its off value; a variant that frees it starts from there.
@@ -116,8 +118,8 @@ pub enum Scale {
     Twist,
     /// Largest torque.
     Torque,
-    /// Root mean square torque per root mean square displacement between reversals: a stiffness that shows.
-    Stiffness,
+    /// Root mean square rotation about the mean at the effect's place.
+    Rotation,
     /// The sampling interval.
     Sample,
     /// The coupling's natural frequency, in Hz, or a tenth of the sampling rate for a rigid axis.

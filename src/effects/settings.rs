@@ -205,6 +205,12 @@ impl<S: Scalar> Settings<S> {
         memory[at + 2] = if p[0].re() > 0.0 { pull / p[0] } else { S::default() };
     }
 
+    /// Puts an effect that loops where it stands in its loop, -1 to 1.
+    #[cfg(feature = "cli")]
+    pub(crate) fn set_loop(memory: &mut Memory<S>, effect: Effect, share: S) {
+        memory[MEMORY_OFFSETS[effect as usize]] = share;
+    }
+
     /// The torque on the motor over a step, from the torque commanded over it.
     pub fn transform_input(&self, on: &ActiveEffects, ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
         on.inputs.as_slice().iter().fold(ramp, |ramp, &e| e.transform_input(self.of(e), ramp, h, history))

@@ -90,3 +90,11 @@ pub trait Sensor {
     /// What is read now: `reading` as changed by the effects before, `history` the motion up to now, `dt` s apart.
     fn transform<S: Scalar>(p: &[S], reading: Reading<S>, history: &SensorHistory<S>, dt: f64) -> Reading<S>;
 }
+
+/// `(1 - exp(-a))/a`, with its limit at zero.
+pub(super) fn mean_decay<S: Scalar>(a: S) -> S {
+    if a.re().abs() < 1e-4 {
+        return S::from(1.0) - a * 0.5 + a.squared() * (1.0 / 6.0);
+    }
+    (S::from(1.0) - (-a).exp()) / a
+}

@@ -1,12 +1,13 @@
 //! Viscous friction to ground: `f = coefficient*(1 + asymmetry*sgn(v))*v`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Start, Variant};
 use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::size("coefficient", "N.m.s/rad", 0.0, 1e6, "Friction torque per speed").nominal(1e-3),
-    ParameterInfo::shape("asymmetry", "1", 0.0, -1.0, 1.0, "Share by which forwards is more than the mean"),
+    ParameterInfo::shape("asymmetry", "1", 0.0, -1.0, 1.0, "Share by which forwards is more than the mean")
+        .start(Start::Share),
 ];
 const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0] }, Variant { name: "asymmetric", free: &[0, 1] }];
 const EQUATION: &str = "f = coefficient*(1 + asymmetry*sgn(v))*v";

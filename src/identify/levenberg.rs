@@ -71,6 +71,11 @@ pub trait Problem {
     /// `|r(p)|^2 / 2`; None where the model cannot be evaluated.
     fn cost(&self, p: &DVector<f64>) -> Option<f64>;
 
+    /// The cost at p once its nuisance parameters, if it has any, are where they are best given the others.
+    fn settle(&self, p: &mut DVector<f64>) -> Option<f64> {
+        self.cost(p)
+    }
+
     /// The normal equations at p; None where the model cannot be evaluated.
     fn linearise(&self, p: &DVector<f64>) -> Option<Normal>;
 
@@ -91,6 +96,8 @@ pub struct Options {
     pub gradient: f64,
     /// First damping, relative to the scaled curvature.
     pub damping: f64,
+    /// Longest step of each parameter, n; empty: none.
+    pub stride: Vec<f64>,
     /// Lower bounds, n; empty: none.
     pub lower: Vec<f64>,
     /// Upper bounds, n; empty: none.
@@ -105,6 +112,7 @@ impl Default for Options {
             step: 1e-10,
             gradient: 1e-10,
             damping: 1e-3,
+            stride: Vec::new(),
             lower: Vec::new(),
             upper: Vec::new(),
         }
@@ -255,15 +263,20 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 growth *= 2.0;
                 continue;
             };
-            let trial = DVector::from_fn(n, |i, _| (p[i] + step[i]).max(lower(i)).min(upper(i)));
+            let mut trial = DVector::from_fn(n, |i, _| (p[i] + step[i]).max(lower(i)).min(upper(i)));
             let moved = &trial - &p;
+            if options.stride.iter().zip(moved.iter()).any(|(most, moved)| moved.abs() > *most) {
+                damping *= growth;
+                growth *= 2.0;
+                continue;
+            }
             let small = (0..n).all(|i| moved[i].abs() <= options.step * (p[i].abs() + options.step));
             let promised = -(normal.gradient.dot(&moved) + 0.5 * moved.dot(&(&normal.curvature * &moved)));
             if small {
                 break Err(Termination::Step);
             }
             evaluations += 1;
-            let cost = problem.cost(&trial).filter(|c| c.is_finite()).unwrap_or(f64::INFINITY);
+            let cost = problem.settle(&mut trial).filter(|c| c.is_finite()).unwrap_or(f64::INFINITY);
             let brought = normal.cost - cost;
             if brought > 0.0 && promised > 0.0 {
                 let gain = brought / promised;
