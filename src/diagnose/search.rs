@@ -22,8 +22,10 @@ const SMALLER: usize = 5;
 const STARTS: [usize; 2] = [3, 2];
 /// Periods of a flexible mode that a record must hold.
 const SWINGS: f64 = 2.0;
-/// Damping ratio that a flexible mode must have.
+/// Damping ratio that a flexible mode must have,
 const DECAYS: f64 = 1e-3;
+/// and must not reach.
+const CREEPS: f64 = 1.0;
 /// Effects fitted at a time.
 const BATCH: usize = 4;
 /// Squared residual per value at which a fit counts as having reached the floor,
@@ -228,13 +230,15 @@ impl Search<'_> {
     }
 
     /// Whether a flexible mode, if there is one, is one: slower than the record, it is a wall with spring and damper; free
-    /// of damping, a foreign sine that no motion excites.
+    /// of damping, a foreign sine that no motion excites; beyond critical damping, a force that every window sets anew with
+    /// its initial state and that fades within it: any friction looks like that.
     fn swings(&self, t: &Tested) -> bool {
         let p = t.fitted.model.effects.of(Effect::FlexibleMode);
         let length = self.data.record.len() as f64 * self.data.record.dt;
         let flexible = t.effects.iter().any(|(e, _)| *e == Effect::FlexibleMode);
         let swings = p[1] > p[0] * (SWINGS * std::f64::consts::TAU / length).powi(2);
-        let decays = p[2] > 2.0 * DECAYS * (p[0] * p[1]).sqrt();
+        let critical = 2.0 * (p[0] * p[1]).sqrt();
+        let decays = (DECAYS * critical..CREEPS * critical).contains(&p[2]);
         !flexible || (swings && decays)
     }
 
