@@ -14,7 +14,7 @@ use super::noise::NoiseEstimate;
 use super::record::Record;
 use super::search::{Search, Tested};
 use super::windows::{Initial, Window, cut};
-use super::{states, words};
+use super::{lines, states, words};
 use crate::axis::Structure;
 use crate::effects::{Effect, Place};
 
@@ -67,7 +67,7 @@ pub struct Replay {
 /// Diagnoses a record.
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
-    let (record, other) = split(case);
+    let (record, other) = split(case, LONGEST);
     let record = &record;
     let train = cut(0..record.len());
     let held_windows = cut(0..other.len());
@@ -81,11 +81,18 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     };
     progress("the model as given");
     let decision = decide(&search, progress);
+    progress("lines of the excitation");
+    let linear = (decision.verdict == Verdict::Unexplained).then(|| {
+        let (record, other) = split(case, usize::MAX);
+        lines::examine(case, &record, &other)
+    });
+    let linear = linear.flatten();
     progress("where");
     let located = locate(record, &case.nominal.parameters, case.nominal.structure);
     progress("held-out data");
     let held = Held { record: &other, windows: &held_windows, states: states::along(&other, &case.nominal) };
-    let models = [case.nominal, decision.parameters.fitted.model, decision.chosen.fitted.model];
+    let improved = linear.as_ref().map_or(&decision.chosen.fitted.model, lines::Found::improved);
+    let models = [case.nominal, decision.parameters.fitted.model, *improved];
     let on_train = {
         let initial = initial(&search.states, &train);
         let e = models.map(|m| gap::errors(data, &m, &initial).0);
@@ -95,24 +102,28 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let mut diagnosis = build(case, &decision, &held, on_train, on_held, &located);
     lattice::judge(case, &decision, &mut diagnosis);
     words::fill(&mut diagnosis, &decision);
+    if let Some(linear) = &linear {
+        linear.tell(&mut diagnosis);
+    }
+    diagnosis.warnings.extend(lines::warnings(case.train, case.noise));
     let evidence = evidence::gather(located, held.record, held.windows, &initial(&held.states, held.windows), &models);
     let replay = held.replay(&models[2]);
     Outcome { diagnosis, improved: models[2], models, decision, evidence, replay }
 }
 
 /// The record that the fits see, and the one that they do not; encoders with zeros of their own are brought together.
-fn split(case: &Case<'_>) -> (Record, Record) {
+fn split(case: &Case<'_>, longest: usize) -> (Record, Record) {
     let whole = without_offset(case.train, &case.nominal.parameters, case.nominal.structure);
     let n = whole.len();
     match case.holdout {
         Some(other) => {
             let other = without_offset(other, &case.nominal.parameters, case.nominal.structure);
-            let last = other.len().min(LONGEST);
-            (whole.part(0..n.min(LONGEST)), other.part(0..last))
+            let last = other.len().min(longest);
+            (whole.part(0..n.min(longest)), other.part(0..last))
         }
         None => {
             let split = n - (n as f64 * HELD_OUT) as usize;
-            (whole.part(0..split.min(LONGEST)), whole.part(split..n.min(split + LONGEST)))
+            (whole.part(0..split.min(longest)), whole.part(split..n.min(split.saturating_add(longest))))
         }
     }
 }
