@@ -50,7 +50,7 @@ pub struct Tested {
     pub effects: Vec<(Effect, usize)>,
     /// The fit.
     pub fitted: Fitted,
-    /// Number of free parameters, initial states not counted.
+    /// Number of free parameters; of the initial states only those that the effects bring.
     pub freedom: usize,
 }
 
@@ -120,7 +120,10 @@ impl Search<'_> {
         misfit: f64,
     ) -> Tested {
         let fitted = fit(self.data, &self.nominal, start, free, initial, Effort { iterations, misfit });
-        Tested { effects, fitted, freedom: free.len() }
+        // A third inertia brings its own initial state into every window: so much noise can be followed with it.
+        let flexible = effects.iter().any(|(e, _)| *e == Effect::FlexibleMode);
+        let swinging = if flexible { 2 * self.data.windows.len() } else { 0 };
+        Tested { effects, fitted, freedom: free.len() + swinging }
     }
 
     /// Every effect of the library beside those of `beside`, best first: one [`Tested`] per effect, its best variant
