@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use eixo::axis::{Parameters, Structure};
+use eixo::axis::{Motion, Parameters, Structure};
 use eixo::diagnose::{Case, LinearCause, Model, NoiseEstimate, Record, estimate_noise, linear_cause, speed_warnings};
 use eixo::effects::{EFFECTS, Effect, Settings};
 use eixo::trace::{Hold, Table};
@@ -49,6 +49,7 @@ fn bench(torque: &str, structure: Structure, without: &[Effect]) -> Option<Optio
     let case = Case {
         machine: "bench".to_owned(),
         nominal: Model::new(parameters, structure, Settings::default()),
+        motion: Motion::Rotary,
         train: &record,
         noise: &noise,
         holdout: None,

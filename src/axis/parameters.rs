@@ -40,6 +40,30 @@ pub enum Motion {
     Linear,
 }
 
+impl Motion {
+    /// The unit that stands for one of the rotary axis: an angle becomes a length, a torque a force, an inertia a mass.
+    #[must_use]
+    pub fn unit(self, rotary: &'static str) -> &'static str {
+        const LINEAR: [(&str, &str); 11] = [
+            ("kg.m2", "kg"),
+            ("N.m", "N"),
+            ("N.m/rad", "N/m"),
+            ("N.m.s/rad", "N.s/m"),
+            ("N.m.s2/rad2", "N.s2/m2"),
+            ("N.m/s", "N/s"),
+            ("rad", "m"),
+            ("rad/s", "m/s"),
+            ("1/rad", "1/m"),
+            ("1/rad2", "1/m2"),
+            ("N.m.s", "N.s"),
+        ];
+        match self {
+            Self::Rotary => rotary,
+            Self::Linear => LINEAR.iter().find(|(from, _)| *from == rotary).map_or(rotary, |(_, to)| to),
+        }
+    }
+}
+
 /// A parameter that the model cannot work with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterError {

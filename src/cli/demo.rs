@@ -152,6 +152,7 @@ fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::
     let case = Case {
         machine: machine.name.clone(),
         nominal: Model::new(machine.parameters, machine.structure, machine.effects),
+        motion: machine.signals.motion,
         train: &record,
         noise: &noise,
         holdout: None,

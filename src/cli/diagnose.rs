@@ -104,6 +104,7 @@ fn examine(
     let case = Case {
         machine: machine.name.clone(),
         nominal: Model::new(machine.parameters, machine.structure, machine.effects),
+        motion: machine.signals.motion,
         train: &train,
         noise: &noise,
         holdout: holdout.as_ref().map(|(r, _)| &r.record),

@@ -15,7 +15,7 @@ use super::record::Record;
 use super::search::{Search, Tested};
 use super::windows::{Initial, Window, cut};
 use super::{lines, states, words};
-use crate::axis::Structure;
+use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
 
 /// Share of a single record that is held out.
@@ -30,6 +30,8 @@ pub struct Case<'a> {
     pub machine: String,
     /// The nominal model.
     pub nominal: Model,
+    /// What its numbers are units of.
+    pub motion: Motion,
     /// Record that the fits see.
     pub train: &'a Record,
     /// What is known of its noise.
@@ -103,7 +105,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     lattice::judge(case, &decision, &mut diagnosis);
     words::fill(&mut diagnosis, &decision);
     if let Some(linear) = &linear {
-        linear.tell(&mut diagnosis);
+        linear.tell(&mut diagnosis, case.motion);
     }
     diagnosis.warnings.extend(lines::warnings(case.train, case.noise));
     let evidence = evidence::gather(located, held.record, held.windows, &initial(&held.states, held.windows), &models);
@@ -188,7 +190,7 @@ fn build(
             }
         })
         .collect();
-    let causes = causes(decision);
+    let causes = causes(decision, case.motion);
     let verdict = decision.verdict;
     Diagnosis {
         schema: SCHEMA,
@@ -237,7 +239,7 @@ fn name(t: &Tested) -> (String, String, String) {
     }
 }
 
-fn causes(decision: &Decision) -> Vec<Cause> {
+fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
     if decision.verdict == Verdict::Parameters {
         let Some((gain, std)) = decision.torque_gain() else { return Vec::new() };
         let info = Effect::TorqueGain.info();
@@ -268,7 +270,7 @@ fn causes(decision: &Decision) -> Vec<Cause> {
                     let value = fitted.model.effects.of(*effect)[i];
                     parameters.insert(
                         p.name.to_owned(),
-                        json!({ "value": value, "std": finite(fitted.std[at]), "unit": p.unit }),
+                        json!({ "value": value, "std": finite(fitted.std[at]), "unit": motion.unit(p.unit) }),
                     );
                 }
             }
@@ -339,6 +341,7 @@ fn parameters(case: &Case<'_>, decision: &Decision) -> Map<String, Value> {
                 "reidentified": p.value(&decision.parameters.fitted.model.parameters),
                 "fitted": p.value(&fitted.model.parameters),
                 "std": at.map_or(Value::Null, |i| finite(fitted.std[i])),
+                "unit": case.motion.unit(p.unit()),
             });
             (p.name().to_owned(), value)
         })

@@ -34,7 +34,7 @@ pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
     }
     let info = Effect::EncoderQuantisation.info();
     let mut parameters = Map::new();
-    parameters.insert("step".to_owned(), json!({ "value": quantum, "std": 0.0, "unit": "rad" }));
+    parameters.insert("step".to_owned(), json!({ "value": quantum, "std": 0.0, "unit": case.motion.unit("rad") }));
     diagnosis.verdict = Verdict::Effect;
     diagnosis.causes = vec![Cause {
         id: info.id.to_owned(),

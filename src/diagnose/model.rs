@@ -54,6 +54,16 @@ impl BaseParameter {
         }
     }
 
+    /// Unit of the rotary axis.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::I1 | Self::I2 => "kg.m2",
+            Self::B => "N.m.s/rad",
+            Self::K => "N.m/rad",
+        }
+    }
+
     /// Its place in the parameters.
     pub fn slot<S>(self, p: &mut Parameters<S>) -> &mut S {
         match self {

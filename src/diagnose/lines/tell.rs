@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use super::Found;
 use super::data::place;
 use super::fit::Hypothesis;
+use crate::axis::Motion;
 use crate::diagnose::decide::Verdict;
 use crate::diagnose::diagnosis::{Cause, Diagnosis, Ranked};
 use crate::diagnose::model::{BaseParameter, Free};
@@ -20,17 +21,17 @@ fn finite(v: f64) -> Value {
 
 impl Found {
     /// Turns a diagnosis that abstained into one that names the linear part; the figures of the gap in time stay.
-    pub fn tell(&self, d: &mut Diagnosis) {
+    pub fn tell(&self, d: &mut Diagnosis, motion: Motion) {
         d.verdict = Verdict::Effect;
-        d.causes = self.causes();
+        d.causes = self.causes(motion);
         d.ranking = self.ranking();
-        d.parameters = self.parameters(d);
+        d.parameters = self.parameters(d, motion);
         d.confusable = self.confusable();
         self.locate(d);
         self.words(d);
     }
 
-    fn causes(&self) -> Vec<Cause> {
+    fn causes(&self, motion: Motion) -> Vec<Cause> {
         let h = &self.choice.chosen;
         let mut causes: Vec<Cause> = h
             .effects
@@ -44,7 +45,8 @@ impl Found {
                         && e == effect
                     {
                         let p = &info.parameters[i];
-                        let value = json!({ "value": c.value(&h.model), "std": finite(*std), "unit": p.unit });
+                        let value =
+                            json!({ "value": c.value(&h.model), "std": finite(*std), "unit": motion.unit(p.unit) });
                         parameters.insert(p.name.to_owned(), value);
                     }
                 }
@@ -90,7 +92,7 @@ impl Found {
         self.choice.ranking.iter().map(ranked).collect()
     }
 
-    fn parameters(&self, d: &Diagnosis) -> Map<String, Value> {
+    fn parameters(&self, d: &Diagnosis, motion: Motion) -> Map<String, Value> {
         let h = &self.choice.chosen;
         let row = |p: &BaseParameter| {
             let at = h.coordinates.iter().position(|c| c.free == Free::Base(*p));
@@ -99,6 +101,7 @@ impl Found {
                 "reidentified": d.parameters.get(p.name()).and_then(|p| p.get("reidentified")).cloned(),
                 "fitted": p.value(&h.model.parameters),
                 "std": at.map_or(Value::Null, |i| finite(h.std[i])),
+                "unit": motion.unit(p.unit()),
             });
             (p.name().to_owned(), value)
         };

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::data::{Lines, late_speeds, response};
 use super::{choose::choose, examine};
-use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
+use crate::axis::{Hold, Motion, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use crate::diagnose::{Case, Model, Record, estimate_noise};
 use crate::effects::{EFFECTS, Effect, Settings};
 use crate::identify::frequency::measure;
@@ -78,6 +78,7 @@ fn found(record: &Record, structure: Structure, without: &[Effect]) -> Option<su
     let case = Case {
         machine: "simulated".to_owned(),
         nominal: Model::new(parameters, structure, Settings::default()),
+        motion: Motion::Rotary,
         train: record,
         noise: &noise,
         holdout: None,
