@@ -118,11 +118,6 @@ EXPORT void eixo_corpus_reference(void) { eixo_corpus_no_such_function(); }
 __attribute__((destructor)) static void unload(void) { abort(); }
 #endif
 
-static void *sleeper(void *argument) {
-    for (;;) sleep(1000);
-    return argument;
-}
-
 EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                                  const Callbacks *callbacks, int visible, int logging) {
     (void)visible;
@@ -162,7 +157,8 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
         pthread_attr_t attributes;
         pthread_attr_init(&attributes);
         pthread_attr_setstacksize(&attributes, 65536);
-        pthread_create(&thread, &attributes, sleeper, NULL);
+        /* Code of the C library, which stays: a thread that first runs after the unloading would crash in ours. */
+        pthread_create(&thread, &attributes, (void *(*)(void *))(void (*)(void))pause, NULL);
         pthread_attr_destroy(&attributes);
     }
     if (IS(DAEMON) && fork() == 0) {
