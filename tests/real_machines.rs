@@ -53,7 +53,7 @@ fn bench(torque: &str, structure: Structure, without: &[Effect]) -> Option<Optio
         train: &record,
         noise: &noise,
         holdout: None,
-        library: EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect(),
+        suspects: EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect(),
     };
     let split = record.len() - record.len() / 3;
     Some(linear_cause(&case, &record.part(0..split), &record.part(split..record.len())))

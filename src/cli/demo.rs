@@ -156,7 +156,7 @@ fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::
         train: &record,
         noise: &noise,
         holdout: None,
-        library: EFFECTS.to_vec(),
+        suspects: EFFECTS.to_vec(),
     };
     let bar = &steps.0;
     let outcome = diagnose(&case, &|part| bar.set_message(format!("diagnosing: {part}")));

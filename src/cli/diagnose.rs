@@ -94,7 +94,7 @@ fn examine(
     trace: &Path,
     axis: &Path,
     holdout: Option<&Path>,
-    library: Vec<Effect>,
+    suspects: Vec<Effect>,
     progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
     let machine = Machine::read(axis)?;
@@ -108,7 +108,7 @@ fn examine(
         train: &train,
         noise: &noise,
         holdout: holdout.as_ref().map(|(r, _)| &r.record),
-        library,
+        suspects,
     };
     let mut outcome = diagnose(&case, progress);
     if let Some(controller) = &machine.controller {
@@ -139,18 +139,18 @@ fn examine(
 /// # Errors
 /// When the command could not run.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let library = library(&args.without)?;
+    let suspects = library(&args.without)?;
     if args.many.is_wanted(&args.traces)? {
-        let ids: Vec<&str> = library.iter().map(|e| e.info().id).collect();
+        let ids: Vec<&str> = suspects.iter().map(|e| e.info().id).collect();
         return args.many.run("diagnose", &FACTS, ids.join(","), &args.traces, args.axis.as_deref(), &|item| {
             let axis = item.axis.as_deref().context("no axis.toml in its folder or above, and no --axis")?;
-            Ok(found(&examine(&item.path, axis, None, library.clone(), &|_| ())?))
+            Ok(found(&examine(&item.path, axis, None, suspects.clone(), &|_| ())?))
         });
     }
     let trace = args.traces.first().context("no trace given")?;
     let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {elapsed} {msg}")?);
-    let diagnosed = examine(trace, axis, args.holdout.as_deref(), library, &|what| {
+    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, &|what| {
         bar.set_message(what.to_owned());
         bar.tick();
     })?;

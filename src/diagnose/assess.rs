@@ -39,7 +39,7 @@ pub struct Case<'a> {
     /// Record held out; without it the last third of the one given.
     pub holdout: Option<&'a Record>,
     /// Effects that may be named.
-    pub library: Vec<Effect>,
+    pub suspects: Vec<Effect>,
 }
 
 /// The diagnosis, and the improved model.
@@ -69,8 +69,8 @@ pub struct Replay {
 /// Diagnoses a record.
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
-    let (record, other) = split(case, LONGEST);
-    let record = &record;
+    let (all, all_held) = split(case);
+    let (record, other) = (&first(&all), first(&all_held));
     let train = cut(0..record.len());
     let held_windows = cut(0..other.len());
     let data = Data { record, windows: &train };
@@ -78,17 +78,14 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         data,
         nominal: case.nominal,
         coarse: lattice::dominates(case.noise),
-        library: case.library.clone(),
+        suspects: case.suspects.clone(),
         states: states::along(record, &case.nominal),
     };
     progress("the model as given");
     let decision = decide(&search, progress);
     progress("lines of the excitation");
-    let linear = (decision.verdict == Verdict::Unexplained).then(|| {
-        let (record, other) = split(case, usize::MAX);
-        lines::examine(case, &record, &other)
-    });
-    let linear = linear.flatten();
+    let unexplained = decision.verdict == Verdict::Unexplained;
+    let linear = unexplained.then(|| lines::examine(case, &all, &all_held)).flatten();
     progress("where");
     let located = locate(record, &case.nominal.parameters, case.nominal.structure);
     progress("held-out data");
@@ -114,20 +111,24 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
 }
 
 /// The record that the fits see, and the one that they do not; encoders with zeros of their own are brought together.
-fn split(case: &Case<'_>, longest: usize) -> (Record, Record) {
+fn split(case: &Case<'_>) -> (Record, Record) {
     let whole = without_offset(case.train, &case.nominal.parameters, case.nominal.structure);
     let n = whole.len();
     match case.holdout {
         Some(other) => {
             let other = without_offset(other, &case.nominal.parameters, case.nominal.structure);
-            let last = other.len().min(longest);
-            (whole.part(0..n.min(longest)), other.part(0..last))
+            (whole, other)
         }
         None => {
             let split = n - (n as f64 * HELD_OUT) as usize;
-            (whole.part(0..split.min(longest)), whole.part(split..n.min(split.saturating_add(longest))))
+            (whole.part(0..split), whole.part(split..n))
         }
     }
+}
+
+/// As much of a record as is worked on.
+fn first(record: &Record) -> Record {
+    record.part(0..record.len().min(LONGEST))
 }
 
 fn initial(states: &super::response::States, windows: &[Window]) -> Vec<Initial> {

@@ -21,7 +21,7 @@ pub fn dominates(noise: &NoiseEstimate) -> bool {
 /// Names quantisation where the record is at the floor and the lattice is what the floor is made of.
 pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
     let quantum = case.noise.quantum.iter().flatten().copied().fold(0.0, f64::max);
-    if quantum <= 0.0 || !case.library.contains(&Effect::EncoderQuantisation) {
+    if quantum <= 0.0 || !case.suspects.contains(&Effect::EncoderQuantisation) {
         return;
     }
     let seen: Vec<usize> = (0..4).filter(|c| case.noise.quantum[*c].is_some()).collect();

@@ -70,7 +70,7 @@ pub struct Search<'a> {
     /// Whether the noise is mostly rounding, which is not white.
     pub coarse: bool,
     /// Effects that may be named.
-    pub library: Vec<Effect>,
+    pub suspects: Vec<Effect>,
     /// Motion along the record.
     pub states: States,
 }
@@ -135,7 +135,7 @@ impl Search<'_> {
         let found: Vec<Effect> = beside.effects.iter().map(|(e, _)| *e).collect();
         let screen = Screen::new(&model, self.data.record, self.data.windows, &self.states, &found);
         let mut screened: Vec<Vec<Candidate>> = self
-            .library
+            .suspects
             .iter()
             .filter(|e| !found.contains(e) && self.applies(**e))
             .map(|&effect| {

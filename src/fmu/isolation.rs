@@ -24,7 +24,7 @@ use super::host::{CALL_SLOT, HostError, abi::CALLS};
 pub(crate) struct Task {
     pub rule: String,
     pub folder: PathBuf,
-    pub library: PathBuf,
+    pub binary_path: PathBuf,
     pub workplace: PathBuf,
     pub slot: PathBuf,
     pub result: PathBuf,
@@ -244,7 +244,7 @@ fn attempt(task: &Path) -> io::Result<()> {
     let setup = Setup {
         description,
         folder: task.folder,
-        library: task.library,
+        binary_path: task.binary_path,
         workplace: task.workplace,
         learned: task.learned,
     };

@@ -141,7 +141,7 @@ type Tested = (&'static Rule, Verdict, Vec<Finding>);
 
 struct Bench<'a> {
     folder: &'a Path,
-    library: PathBuf,
+    binary_path: PathBuf,
     scratch: tempfile::TempDir,
     options: &'a Options,
     progress: &'a (dyn Fn(&str, usize) + Sync),
@@ -163,12 +163,12 @@ impl<'a> Bench<'a> {
         progress: &'a (dyn Fn(&str, usize) + Sync),
     ) -> Result<Self, ValidationError> {
         let interface = description.co_simulation.as_ref().expect("`prepare` lets co-simulation through alone");
-        let library = host::binary_file(folder, interface).map_err(io::Error::other)?;
+        let binary_path = host::binary_file(folder, interface).map_err(io::Error::other)?;
         let scratch = tempfile::Builder::new().prefix("eixo-validate-").tempdir()?;
         let total = RULES.iter().filter(|r| !r.check.is_static()).count();
         Ok(Self {
             folder,
-            library,
+            binary_path,
             scratch,
             options,
             progress,
@@ -240,7 +240,7 @@ impl<'a> Bench<'a> {
         let task = Task {
             rule: rule.id.to_owned(),
             folder: self.folder.to_owned(),
-            library: self.library.clone(),
+            binary_path: self.binary_path.clone(),
             workplace,
             slot: scratch.join("slot"),
             result: scratch.join("result.json"),

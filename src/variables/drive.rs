@@ -1,32 +1,14 @@
 //! The variables of the drive.
 
-use super::{Causality, Type, Variability, Variable};
+use super::fixed::{BLANK, output};
+use super::{Causality, Variability, Variable};
 
 /// A torque that no drive reaches: no limit.
 pub const NO_LIMIT: f64 = 1e9;
 
-const BLANK: Variable = Variable {
-    reference: 0,
-    group: "",
-    name: "",
-    kind: Type::Real,
-    causality: Causality::Parameter,
-    variability: Variability::Tunable,
-    unit: "",
-    min: None,
-    max: None,
-    nominal: 1.0,
-    start: None,
-    doc: "",
-};
-
 const fn input(name: &'static str, unit: &'static str, nominal: f64, doc: &'static str) -> Variable {
     let (causality, variability) = (Causality::Input, Variability::Continuous);
     Variable { name, unit, nominal, doc, causality, variability, start: Some(0.0), ..BLANK }
-}
-
-const fn output(name: &'static str, unit: &'static str, nominal: f64, doc: &'static str) -> Variable {
-    Variable { name, unit, nominal, doc, causality: Causality::Output, variability: Variability::Continuous, ..BLANK }
 }
 
 const fn gain(name: &'static str, unit: &'static str, start: f64, doc: &'static str) -> Variable {

@@ -26,7 +26,8 @@ const DT: f64 = 5.626e-4;
 /// Smallest inertia, and other values that must be greater than zero.
 const POSITIVE: f64 = 1e-12;
 
-const BLANK: Variable = Variable {
+/// A real parameter without bounds, before anything is said of it.
+pub(super) const BLANK: Variable = Variable {
     reference: 0,
     group: "",
     name: "",
@@ -41,7 +42,8 @@ const BLANK: Variable = Variable {
     doc: "",
 };
 
-const fn output(name: &'static str, unit: &'static str, nominal: f64, doc: &'static str) -> Variable {
+/// An output that varies continuously.
+pub(super) const fn output(name: &'static str, unit: &'static str, nominal: f64, doc: &'static str) -> Variable {
     Variable { name, unit, nominal, doc, causality: Causality::Output, variability: Variability::Continuous, ..BLANK }
 }
 

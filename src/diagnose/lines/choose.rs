@@ -70,7 +70,7 @@ fn applies(effect: Effect, lines: &Lines, nominal: &Model) -> bool {
 
 /// Looks for a linear cause; `None` when there is no gap at the lines or nothing that may be named closes it.
 #[must_use]
-pub fn choose(lines: &Lines, nominal: &Model, library: &[Effect]) -> Option<Choice> {
+pub fn choose(lines: &Lines, nominal: &Model, suspects: &[Effect]) -> Option<Choice> {
     let free: Vec<Free> = BaseParameter::of(nominal.structure).iter().map(|p| Free::Base(*p)).collect();
     let given = Hypothesis::fixed(lines, nominal);
     let mut starts = vec![*nominal];
@@ -85,7 +85,7 @@ pub fn choose(lines: &Lines, nominal: &Model, library: &[Effect]) -> Option<Choi
     let mut alike: Vec<Vec<(Hypothesis, f64)>> = Vec::new();
     while chain.len() <= MOST {
         let before = &chain[chain.len() - 1];
-        let round = one_more(lines, nominal, before, &free, &starts, library);
+        let round = one_more(lines, nominal, before, &free, &starts, suspects);
         let closed = |h: &Hypothesis| closure(before.cost, h.cost, noise);
         let most = round.first().map_or(0.0, &closed);
         let near: Vec<&Hypothesis> = round.iter().filter(|h| most - closed(h) < ALIKE).collect();
@@ -176,10 +176,10 @@ fn one_more(
     beside: &Hypothesis,
     base: &[Free],
     origins: &[Model],
-    library: &[Effect],
+    suspects: &[Effect],
 ) -> Vec<Hypothesis> {
     let candidates: Vec<Effect> =
-        library.iter().copied().filter(|e| applies(*e, lines, nominal) && !beside.effects.contains(e)).collect();
+        suspects.iter().copied().filter(|e| applies(*e, lines, nominal) && !beside.effects.contains(e)).collect();
     let mut found: Vec<Hypothesis> = candidates
         .par_iter()
         .filter_map(|&effect| {

@@ -92,7 +92,7 @@ pub fn examine(case: &Case<'_>, train: &Record, held: &Record) -> Option<Found> 
     }
     let rho = case.nominal.parameters.rho;
     let lines = Lines::new(&response(train, period)?, rho);
-    let choice = choose(&lines, &case.nominal, &case.library)?;
+    let choice = choose(&lines, &case.nominal, &case.suspects)?;
     let held = response(held, period).map(|r| Lines::new(&r, rho)).filter(|h| h.channels == lines.channels);
     Some(Found { choice, lines, held })
 }

@@ -82,7 +82,7 @@ fn found(record: &Record, structure: Structure, without: &[Effect]) -> Option<su
         train: record,
         noise: &noise,
         holdout: None,
-        library: EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect(),
+        suspects: EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect(),
     };
     examine(&case, &record.part(0..7 * PERIOD), &record.part(7 * PERIOD..10 * PERIOD))
 }

@@ -17,7 +17,7 @@ const RUN: Duration = Duration::from_millis(500);
 const RUN_STEPS: usize = 20_000;
 
 pub(super) fn load(setup: &Setup) -> Tested {
-    match Binary::load(&setup.library, true) {
+    match Binary::load(&setup.binary_path, true) {
         Ok(binary) => {
             // Unloading is a rule of its own.
             std::mem::forget(binary);

@@ -24,7 +24,7 @@ pub(crate) struct Setup {
     /// The extracted FMU.
     pub folder: PathBuf,
     /// The binary.
-    pub library: PathBuf,
+    pub binary_path: PathBuf,
     /// The working directory of the rule's process.
     pub workplace: PathBuf,
     /// What earlier rules learnt.
@@ -34,7 +34,7 @@ pub(crate) struct Setup {
 impl Setup {
     /// Loads the FMU.
     pub fn probe(&self) -> Result<Probe, HostError> {
-        Probe::new(self.description.clone(), &self.folder, &self.library, false, self.learned.clone())
+        Probe::new(self.description.clone(), &self.folder, &self.binary_path, false, self.learned.clone())
     }
 }
 
@@ -151,8 +151,13 @@ pub(crate) fn behaviour(id: &str) -> Option<Behaviour> {
 impl Probe {
     /// Takes over what was learnt.
     fn learn(&mut self, learned: Learned) {
-        let fresh =
-            Self::with(self.d.clone(), self.folder.clone(), self.library.clone(), Arc::clone(&self.binary), learned);
+        let fresh = Self::with(
+            self.d.clone(),
+            self.folder.clone(),
+            self.binary_path.clone(),
+            Arc::clone(&self.binary),
+            learned,
+        );
         *self = fresh;
     }
 

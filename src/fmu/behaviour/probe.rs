@@ -81,7 +81,7 @@ pub(crate) struct Snapshot {
 pub(crate) struct Probe {
     pub d: Description,
     pub folder: PathBuf,
-    pub library: PathBuf,
+    pub binary_path: PathBuf,
     pub binary: Arc<Binary>,
     pub start: f64,
     pub stop: Option<f64>,
@@ -103,15 +103,21 @@ pub(super) fn type_index(base: BaseType) -> usize {
 }
 
 impl Probe {
-    pub fn new(d: Description, folder: &Path, library: &Path, now: bool, learned: Learned) -> Result<Self, HostError> {
-        let binary = Arc::new(Binary::load(library, now)?);
-        Ok(Self::with(d, folder.to_owned(), library.to_owned(), binary, learned))
+    pub fn new(
+        d: Description,
+        folder: &Path,
+        binary_path: &Path,
+        now: bool,
+        learned: Learned,
+    ) -> Result<Self, HostError> {
+        let binary = Arc::new(Binary::load(binary_path, now)?);
+        Ok(Self::with(d, folder.to_owned(), binary_path.to_owned(), binary, learned))
     }
 
     pub(super) fn with(
         d: Description,
         folder: PathBuf,
-        library: PathBuf,
+        binary_path: PathBuf,
         binary: Arc<Binary>,
         learned: Learned,
     ) -> Self {
@@ -123,7 +129,7 @@ impl Probe {
             observed: Default::default(),
             instances: AtomicUsize::new(0),
             folder,
-            library,
+            binary_path,
             d,
             binary,
             start,

@@ -160,7 +160,7 @@ pub(crate) fn note(call: Call) {
 /// A loaded binary.
 pub struct Binary {
     pub(crate) functions: Functions,
-    library: Option<Library>,
+    loaded: Option<Library>,
 }
 
 impl std::fmt::Debug for Binary {
@@ -190,21 +190,21 @@ impl Binary {
         // SAFETY: an FMU's symbols have the signatures of FMI 2.0.
         let functions = unsafe { Functions::load(&library) };
         note(Call::None);
-        Ok(Self { functions, library: Some(library) })
+        Ok(Self { functions, loaded: Some(library) })
     }
 
     /// Whether a symbol is exported.
     #[must_use]
     pub fn exports(&self, symbol: &str) -> bool {
         // SAFETY: the symbol's address is only looked up, never called.
-        self.library.as_ref().is_some_and(|l| unsafe { l.get::<*const ()>(symbol.as_bytes()) }.is_ok())
+        self.loaded.as_ref().is_some_and(|l| unsafe { l.get::<*const ()>(symbol.as_bytes()) }.is_ok())
     }
 }
 
 impl Drop for Binary {
     fn drop(&mut self) {
         note(Call::Unload);
-        drop(self.library.take());
+        drop(self.loaded.take());
         note(Call::None);
     }
 }
