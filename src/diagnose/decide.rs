@@ -123,7 +123,7 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
         if unexplained_part(&chosen, values) > 0.0 {
             let gap = parameters.fitted.chi2 - values;
             chosen = further(search, &singles, chosen, gap, values, progress);
-            (chosen, shares) = pruned(search, chosen, &mut singles, gap, values);
+            (chosen, shares) = pruned(search, search.closely(&chosen), &mut singles, gap, values);
         }
     }
     let verdict = verdict(&given, &parameters, singles.first(), &chosen, values);

@@ -278,6 +278,8 @@ pub struct Effort {
     pub iterations: usize,
     /// Squared residual per value to be expected, in units of the noise; at least 1.
     pub misfit: f64,
+    /// Share of the cost below which steps are no longer worth taking.
+    pub tolerance: f64,
 }
 
 /// Fits the free numbers of `start`, and the windows' initial states from `initial`; where an effect that loops stands
@@ -335,7 +337,7 @@ pub fn fit(
     }
     let options = Options {
         iterations: effort.iterations,
-        cost: 1e-5,
+        cost: effort.tolerance,
         step: 1e-9,
         gradient: 1e-9,
         stride: coordinates.iter().map(|c| if c.log { STRIDE } else { f64::INFINITY }).collect(),

@@ -18,6 +18,7 @@ mod response;
 mod screen;
 mod search;
 mod states;
+mod tones;
 mod windows;
 mod words;
 

@@ -139,6 +139,71 @@ impl<'a> Responder<'a> {
         column
     }
 
+    /// A column brought back to the torques that act at the samples, on motor and table: for every torque `u` given by
+    /// its values at the samples, `<self.torques(u), column> = <u, self.adjoint(column)>`, if the column is free of
+    /// initial states.
+    #[must_use]
+    pub fn adjoint(&self, column: &[f64]) -> Vec<[f64; 2]> {
+        let still = [0.0; 4];
+        let unit = |i: usize| std::array::from_fn::<f64, 4, _>(|j| f64::from(u8::from(i == j)));
+        let step: [Linear<f64>; 4] = std::array::from_fn(|i| self.step.apply(&unit(i), [0.0; 2], [0.0; 2]));
+        let torque = [[1.0, 0.0], [0.0, 1.0]];
+        let start = torque.map(|t| self.step.apply(&still, t, [0.0; 2]));
+        let end = torque.map(|t| self.step.apply(&still, [0.0; 2], t));
+        let product = |a: &Linear<f64>, b: &Linear<f64>| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let mut back = vec![[0.0; 2]; self.record.len()];
+        let mut from = 0;
+        for window in self.windows {
+            let to = from + window.compared.len() * self.present.len();
+            let part = &column[from..to];
+            // What a change of the state is worth from here to the window's end.
+            let mut worth = [0.0; 4];
+            for k in (window.begin..window.compared.end).rev() {
+                if k + 1 < window.compared.end {
+                    for i in 0..2 {
+                        back[k][i] += product(&start[i], &worth);
+                        back[k + 1][i] += product(&end[i], &worth);
+                    }
+                    worth = std::array::from_fn(|i| product(&step[i], &worth));
+                }
+                if k >= window.compared.start {
+                    let at = (k - window.compared.start) * self.present.len();
+                    for (value, &c) in part[at..].iter().zip(&self.present) {
+                        let v = value * self.weight[c];
+                        let side = c % 2;
+                        worth[side] += v;
+                        if c >= 2 {
+                            worth[side + 2] -= v;
+                        }
+                    }
+                }
+            }
+            from = to;
+        }
+        back
+    }
+
+    /// A column brought back to changes of one reading at the samples, as [`Responder::adjoint`]; zeros if it is not read.
+    #[must_use]
+    pub fn adjoint_of_reading(&self, column: &[f64], channel: usize) -> Vec<f64> {
+        self.along(column, channel, |part| part.iter().map(|v| v * self.weight[channel]).collect())
+    }
+
+    /// One reading's part of a column, window by window through `change`, at the samples of the record; zeros between.
+    #[must_use]
+    pub fn along(&self, column: &[f64], channel: usize, change: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+        let mut along = vec![0.0; self.record.len()];
+        let Some(offset) = self.present.iter().position(|c| *c == channel) else { return along };
+        let mut from = 0;
+        for window in self.windows {
+            let to = from + window.compared.len() * self.present.len();
+            let part: Vec<f64> = column[from..to].iter().skip(offset).step_by(self.present.len()).copied().collect();
+            along[window.compared.clone()].copy_from_slice(&change(&part));
+            from = to;
+        }
+        along
+    }
+
     /// A change of the readings themselves, freed of initial states.
     #[must_use]
     pub fn readings(&self, change: impl Fn(usize) -> [f64; 4]) -> Column {
@@ -201,8 +266,42 @@ fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
 
-fn subtract(a: &mut [f64], b: &[f64], times: f64) {
+/// `a -= times*b`.
+pub fn subtract(a: &mut [f64], b: &[f64], times: f64) {
     for (x, y) in a.iter_mut().zip(b) {
         *x -= times * y;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::windows::cut;
+    use super::*;
+    use crate::axis::{Hold, Parameters};
+    use crate::effects::Settings;
+
+    /// `<G*u, r> = <u, G'*r>` for torques and residuals of no pattern, both sides computed by their own runs.
+    #[test]
+    fn the_adjoint_is_one() {
+        let n = 700;
+        let wild = |k: usize, seed: f64| ((k as f64 + seed) * 12.9898 + (k as f64) * (k as f64) * 0.37).sin();
+        let parameters = Parameters { i1: 2.37e-4, i2: 6.07e-5, b: 5.4e-3, k: 1.76, rho: 1.0 };
+        let model = Model::new(parameters, Structure::TwoInertia, Settings::default());
+        let channel = |seed: f64| Some((0..n).map(|k| wild(k, seed)).collect::<Vec<f64>>());
+        let record = Record {
+            start: 0.0,
+            dt: 1e-3,
+            hold: Hold::Zoh,
+            torque: vec![0.0; n],
+            channels: [channel(0.1), channel(0.2), channel(0.3), None],
+            noise: [1.0, 20.0, 0.5, 1.0],
+        };
+        let windows = cut(0..n);
+        let responder = Responder::new(&model, &record, &windows);
+        let residual = responder.readings(|k| [wild(k, 3.0), wild(k, 4.0), wild(k, 5.0), 0.0]);
+        let at: Vec<[f64; 2]> = (0..n).map(|k| [wild(k, 6.0), wild(k, 7.0)]).collect();
+        let forward = dot(&responder.torques(&super::super::features::ramps(&at)), &residual);
+        let back: f64 = responder.adjoint(&residual).iter().zip(&at).map(|(a, u)| a[0] * u[0] + a[1] * u[1]).sum();
+        assert!((forward - back).abs() < 1e-9 * forward.abs(), "{forward} {back}");
     }
 }

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::features;
 use super::model::{BaseParameter, Model};
 use super::record::Record;
-use super::response::{Column, Responder, States, dot};
+use super::response::{Column, Responder, States, dot, subtract};
+use super::tones::{self, Lines};
 use super::windows::Window;
 use crate::axis::Structure;
 use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
@@ -15,10 +16,15 @@ use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
 const PRIOR: f64 = 0.3;
 /// Relative errors of a nominal parameter that a regression may find.
 const ERRORS: [f64; 2] = [-0.6, 1.5];
-/// Steps of the golden section that takes a frequency off its grid.
-const SHARPENINGS: usize = 10;
-/// Most orders or frequencies tried.
-const MOST_LINES: usize = 600;
+/// Half widths of the parabolas by which a residual torque is seen in a residual position, samples: noise asks for wide
+/// ones, a high order for narrow ones.
+const WIDTHS: [usize; 3] = [1, 3, 6];
+/// Part of a step within which two lines are one.
+const SAME: f64 = 0.1;
+/// Phase that the highest order tried turns by in a sample, at the rms speed, rad.
+const FINEST: f64 = 2.0;
+/// Highest frequency tried, as a share of the sampling rate.
+const HIGHEST: f64 = 0.45;
 
 /// An effect at a start that the regression found, and what the regression leaves.
 #[derive(Debug, Clone)]
@@ -44,6 +50,8 @@ pub struct Screen<'a> {
     common: Vec<Column>,
     gram: DMatrix<f64>,
     right: DVector<f64>,
+    /// The residual less what the common columns explain.
+    remainder: Column,
     /// How many of the common columns are errors of nominal parameters.
     errors: usize,
     scales: Scales,
@@ -82,14 +90,67 @@ impl<'a> Screen<'a> {
             }
         }
         let scales = Scales::new(model, record, states);
-        Self { model, record, states, responder, residual, common, gram, right, errors, scales }
+        let remainder = residual.clone();
+        let mut screen =
+            Self { model, record, states, responder, residual, common, gram, right, remainder, errors, scales };
+        let (_, x) = screen.solve(&[]);
+        for (column, x) in screen.common.iter().zip(&x) {
+            subtract(&mut screen.remainder, column, *x);
+        }
+        screen
+    }
+
+    /// Orders or frequencies at which an effect's sine would take most of the remainder away; empty if it has none.
+    fn tones(&self, effect: Effect, form: &Variant) -> Vec<f64> {
+        let info = effect.info();
+        let index = |wanted: fn(Start) -> bool| form.free.iter().copied().find(|&i| wanted(info.parameters[i].start));
+        let Some(at) = index(|s| matches!(s, Start::Grid(Scale::Order | Scale::Frequency, _))) else {
+            return Vec::new();
+        };
+        let Start::Grid(scale, _) = info.parameters[at].start else { return Vec::new() };
+        let Some(lines) = self.scales.lines(effect, scale) else { return Vec::new() };
+        let side = usize::from(info.place != Place::Motor);
+        let angle: Vec<f64> = (0..self.record.len())
+            .map(|k| match scale {
+                Scale::Frequency => std::f64::consts::TAU * self.record.time(k),
+                _ => self.states.motion[k][2 * side],
+            })
+            .collect();
+        let length2 = |line: f64| {
+            let mut settings = Settings::default();
+            let p = settings.of_mut(effect);
+            p[at] = line;
+            for i in form.free {
+                if info.parameters[*i].name == "amplitude" {
+                    p[*i] = 1.0;
+                }
+            }
+            let column = features::column(effect, &settings, self.model, self.record, self.states, &self.responder);
+            dot(&column, &column)
+        };
+        if effect.is_sensor() {
+            let adjoint = self.responder.adjoint_of_reading(&self.remainder, 2);
+            return lines.strongest(&angle, &adjoint, &length2);
+        }
+        let adjoint: Vec<f64> = self.responder.adjoint(&self.remainder).iter().map(|t| t[side]).collect();
+        let mut found = lines.strongest(&angle, &adjoint, &length2);
+        let channel = if self.record.channels[2 * side].is_some() { 2 * side } else { 2 - 2 * side };
+        for half in WIDTHS {
+            let curved = self.responder.along(&self.remainder, channel, |part| tones::curvature(part, half));
+            for line in lines.loudest(&angle, &curved) {
+                if found.iter().all(|f| (f - line).abs() > SAME * lines.step) {
+                    found.push(line);
+                }
+            }
+        }
+        found
     }
 
     /// The best starts of an effect's variant, best first, at most `most`.
     #[must_use]
     pub fn starts(&self, effect: Effect, variant: usize, most: usize) -> Vec<Candidate> {
         let form = &effect.info().variants[variant];
-        let trials = self.scales.trials(effect, form);
+        let trials = self.scales.trials(effect, form, &self.tones(effect, form));
         let mut found: Vec<(Candidate, &Trial)> = trials
             .par_iter()
             .filter_map(|trial| self.regress(effect, variant, form, trial).map(|candidate| (candidate, trial)))
@@ -112,34 +173,14 @@ impl<'a> Screen<'a> {
     fn sharpened(&self, candidate: Candidate, trial: &Trial, form: &Variant) -> Candidate {
         let Candidate { effect, variant, .. } = candidate;
         let Some((i, line, step)) = self.scales.line(effect, trial) else { return candidate };
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |value: f64| {
             let mut moved = trial.clone();
             moved.settings.of_mut(effect)[i] = value;
             self.regress(effect, variant, form, &moved)
         };
-        let cost = |c: &Option<Candidate>| c.as_ref().map_or(f64::INFINITY, |c| c.chi2);
-        let (mut low, mut high) = ((line - step).max(0.1 * step), line + step);
-        let mut left = at(high - golden * (high - low));
-        let mut right = at(low + golden * (high - low));
-        let mut best = candidate;
-        for _ in 0..SHARPENINGS {
-            if cost(&left) < cost(&right) {
-                high = low + golden * (high - low);
-                right = left;
-                left = at(high - golden * (high - low));
-            } else {
-                low = high - golden * (high - low);
-                left = right;
-                right = at(low + golden * (high - low));
-            }
-            for trial in [&left, &right].into_iter().flatten() {
-                if trial.chi2 < best.chi2 {
-                    best = trial.clone();
-                }
-            }
-        }
-        best
+        let left = |line: f64| at(line).map_or(f64::INFINITY, |c| c.chi2);
+        let best = at(tones::golden((line - step).max(0.1 * step), line + step, left));
+        best.filter(|b| b.chi2 < candidate.chi2).unwrap_or(candidate)
     }
 
     fn regress(&self, effect: Effect, variant: usize, form: &Variant, trial: &Trial) -> Option<Candidate> {
@@ -180,7 +221,8 @@ impl<'a> Screen<'a> {
                 columns.extend(features::free_decay(&trial.settings, self.record, &self.responder));
             }
         }
-        let (chi2, sizes) = self.solve(&columns);
+        let (chi2, x) = self.solve(&columns);
+        let sizes = &x[self.common.len()..];
         let mut settings = self.model.effects;
         settings.of_mut(effect).copy_from_slice(trial.settings.of(effect));
         if nonlinear {
@@ -209,7 +251,7 @@ impl<'a> Screen<'a> {
         settings.is_on(effect).then_some(Candidate { effect, variant, settings, chi2 })
     }
 
-    /// Regression on the common columns and these: what is left, and the sizes of these.
+    /// Regression on the common columns and these: what is left, and the sizes of all.
     ///
     /// Errors of the nominal parameters stay between [`ERRORS`]: along a measured motion I2, B and K of nothing at all
     /// leave no error of the table, whatever acts on it.
@@ -230,7 +272,7 @@ impl<'a> Screen<'a> {
         let total = dot(&self.residual, &self.residual);
         let mut held: Vec<(usize, f64)> = Vec::new();
         loop {
-            let Some(x) = solve_with_held(&gram, &right, &held) else { return (total, vec![0.0; m]) };
+            let Some(x) = solve_with_held(&gram, &right, &held) else { return (total, vec![0.0; n + m]) };
             let outside = (0..self.errors)
                 .map(|i| (i, x[i].clamp(ERRORS[0], ERRORS[1])))
                 .filter(|(i, bound)| (x[*i] - bound).abs() > 0.0)
@@ -239,7 +281,7 @@ impl<'a> Screen<'a> {
                 Some(bound) => held.push(bound),
                 None => {
                     let chi2 = total - 2.0 * right.dot(&x) + (&gram * &x).dot(&x);
-                    return (chi2, x.as_slice()[n..].to_vec());
+                    return (chi2, x.as_slice().to_vec());
                 }
             }
         }
@@ -324,8 +366,8 @@ struct Scales {
     dt: f64,
     mode: f64,
     inertia: f64,
-    orders: [Vec<f64>; 2],
-    frequencies: Vec<f64>,
+    orders: [Lines; 2],
+    frequencies: Lines,
     /// Lowest and highest angle of the table.
     travel: [f64; 2],
 }
@@ -348,8 +390,7 @@ impl Scales {
         };
         let orders = |i: usize, speed: f64| {
             let step = 0.25 * std::f64::consts::TAU / span(i).max(1e-12);
-            let most = 0.5 / (record.dt * speed.max(1e-12));
-            lines(step, most)
+            Lines::up_to(FINEST / (record.dt * speed.max(1e-12)), step)
         };
         let length = record.len() as f64 * record.dt;
         let travel = states.motion.iter().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s[2]), high.max(s[2])]);
@@ -366,23 +407,23 @@ impl Scales {
             dt: record.dt,
             mode,
             inertia: p.i1 + p.i2,
-            frequencies: lines(0.5 / length, 0.25 / record.dt),
+            frequencies: Lines::up_to(HIGHEST / record.dt, 0.5 / length),
             travel,
         }
     }
 
     /// Orders or frequencies that an effect is tried at.
-    fn lines(&self, effect: Effect, scale: Scale) -> Option<&[f64]> {
+    fn lines(&self, effect: Effect, scale: Scale) -> Option<Lines> {
         match scale {
-            Scale::Order => Some(&self.orders[usize::from(effect.info().place != Place::Motor)]),
-            Scale::Frequency => Some(&self.frequencies),
+            Scale::Order => Some(self.orders[usize::from(effect.info().place != Place::Motor)]),
+            Scale::Frequency => Some(self.frequencies),
             _ => None,
         }
     }
 
     /// The parameter of a trial that lies on a grid of lines, its line, and the grid's step.
     fn line(&self, effect: Effect, trial: &Trial) -> Option<(usize, f64, f64)> {
-        trial.fractions.iter().find_map(|&(i, scale, line)| self.lines(effect, scale).map(|all| (i, line, all[0])))
+        trial.fractions.iter().find_map(|&(i, scale, line)| self.lines(effect, scale).map(|all| (i, line, all.step)))
     }
 
     /// Whether two trials are the same line but for a step of the grid.
@@ -418,8 +459,8 @@ impl Scales {
         }
     }
 
-    /// Every combination of the starts of the variant's free parameters.
-    fn trials(&self, effect: Effect, form: &Variant) -> Vec<Trial> {
+    /// Every combination of the starts of the variant's free parameters; `tones`: the orders or frequencies to try.
+    fn trials(&self, effect: Effect, form: &Variant, tones: &[f64]) -> Vec<Trial> {
         let info = effect.info();
         let mut trials = vec![Trial { settings: Settings::default(), fractions: Vec::new() }];
         // Sizes first: shapes may hang on them.
@@ -427,7 +468,7 @@ impl Scales {
         order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
         for i in order {
             let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
-            let fractions = self.lines(effect, scale).unwrap_or(fractions);
+            let fractions = self.lines(effect, scale).map_or(fractions, |_| tones);
             trials = trials
                 .iter()
                 .flat_map(|t| {
@@ -443,10 +484,4 @@ impl Scales {
         }
         trials
     }
-}
-
-/// `step, 2*step, ...` up to `most`, thinned to a bearable number by geometric growth at the far end.
-fn lines(step: f64, most: f64) -> Vec<f64> {
-    let count = (most / step).floor().max(1.0) as usize;
-    (1..=count.min(MOST_LINES)).map(|n| n as f64 * step).collect()
 }

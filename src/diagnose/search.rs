@@ -16,6 +16,13 @@ const GLANCE: usize = 6;
 const FULL: usize = 40;
 /// Linearisations of the fit that every other is measured against.
 const LONG: usize = 120;
+/// Share of the cost by which two steps running must lower it to go on: a fit that crawls slower does not reach the
+/// floor in the linearisations it has.
+const CRAWL: f64 = 1e-3;
+/// The same for fits whose likelihoods are compared.
+const CLOSE: f64 = 1e-5;
+/// Squared residual per value up to which likelihoods are compared, not only ranked.
+const COMPARED: f64 = 3.0;
 /// Times that a start is halved until the model runs.
 const SMALLER: usize = 5;
 /// Starts looked at per effect, alone and beside another.
@@ -87,23 +94,18 @@ impl Search<'_> {
     /// The nominal model, only the windows' initial states fitted.
     #[must_use]
     pub fn as_given(&self) -> Tested {
-        self.test(&self.nominal, &[], &self.initial(), Vec::new(), FULL, 1.0)
+        let effort = Effort { iterations: FULL, misfit: 1.0, tolerance: CLOSE };
+        self.test(&self.nominal, &[], &self.initial(), Vec::new(), effort)
     }
 
     /// The nominal structure with its parameters fitted.
     #[must_use]
     pub fn parameters_only(&self, given: &Tested) -> Tested {
         let free = self.base();
-        let look = self.test(
-            &self.nominal,
-            &free,
-            &given.fitted.initial,
-            Vec::new(),
-            FULL / 2,
-            self.misfit(given.fitted.chi2),
-        );
-        let misfit = self.misfit(look.fitted.chi2);
-        self.test(&look.fitted.model, &free, &look.fitted.initial, Vec::new(), LONG, misfit)
+        let first = Effort { iterations: FULL / 2, misfit: self.misfit(given.fitted.chi2), tolerance: CLOSE };
+        let look = self.test(&self.nominal, &free, &given.fitted.initial, Vec::new(), first);
+        let long = Effort { iterations: LONG, misfit: self.misfit(look.fitted.chi2), tolerance: CLOSE };
+        self.test(&look.fitted.model, &free, &look.fitted.initial, Vec::new(), long)
     }
 
     fn misfit(&self, chi2: f64) -> f64 {
@@ -116,10 +118,9 @@ impl Search<'_> {
         free: &[Free],
         initial: &[Initial],
         effects: Vec<(Effect, usize)>,
-        iterations: usize,
-        misfit: f64,
+        effort: Effort,
     ) -> Tested {
-        let fitted = fit(self.data, &self.nominal, start, free, initial, Effort { iterations, misfit });
+        let fitted = fit(self.data, &self.nominal, start, free, initial, effort);
         // A third inertia brings its own initial state into every window: so much noise can be followed with it.
         let flexible = effects.iter().any(|(e, _)| *e == Effect::FlexibleMode);
         let swinging = if flexible { 2 * self.data.windows.len() } else { 0 };
@@ -249,8 +250,8 @@ impl Search<'_> {
     #[must_use]
     pub fn parameters_again(&self, from: &Tested) -> Tested {
         let start = Model { effects: self.nominal.effects, ..from.fitted.model };
-        let misfit = self.misfit(from.fitted.chi2);
-        self.test(&start, &self.base(), &from.fitted.initial, Vec::new(), LONG, misfit)
+        let effort = Effort { iterations: LONG, misfit: self.misfit(from.fitted.chi2), tolerance: CLOSE };
+        self.test(&start, &self.base(), &from.fitted.initial, Vec::new(), effort)
     }
 
     /// One of a combination's effects alone, as it was fitted there: a start for other partners.
@@ -266,38 +267,43 @@ impl Search<'_> {
     #[must_use]
     pub fn without(&self, combination: &Tested, keep: &[(Effect, usize)]) -> Tested {
         let mut start = combination.fitted.model;
-        let mut free = self.base();
         for (effect, _) in &combination.effects {
             if !keep.iter().any(|(e, _)| e == effect) {
                 start.effects.of_mut(*effect).copy_from_slice(self.nominal.effects.of(*effect));
             }
         }
-        for (effect, variant) in keep {
-            free.extend(effect.info().variants[*variant].free.iter().map(|i| Free::Effect(*effect, *i)));
-        }
-        let misfit = self.misfit(combination.fitted.chi2);
-        self.test(&start, &free, &combination.fitted.initial, keep.to_vec(), FULL, misfit)
+        let effort = Effort { iterations: FULL, misfit: self.misfit(combination.fitted.chi2), tolerance: CLOSE };
+        self.test(&start, &self.free(keep), &combination.fitted.initial, keep.to_vec(), effort)
     }
 
-    fn free(&self, beside: &Tested, effect: Effect, variant: usize) -> Vec<Free> {
+    fn free(&self, effects: &[(Effect, usize)]) -> Vec<Free> {
         let mut free = self.base();
-        for (e, v) in beside.effects.iter().copied().chain([(effect, variant)]) {
-            free.extend(e.info().variants[v].free.iter().map(|i| Free::Effect(e, *i)));
+        for (e, v) in effects {
+            free.extend(e.info().variants[*v].free.iter().map(|i| Free::Effect(*e, *i)));
         }
         free
     }
 
     fn refit(&self, beside: &Tested, from: &Fitted, effect: Effect, variant: usize, iterations: usize) -> Tested {
-        let free = self.free(beside, effect, variant);
-        let effects = beside.effects.iter().copied().chain([(effect, variant)]).collect();
-        self.test(&from.model, &free, &from.initial, effects, iterations, self.misfit(from.chi2))
+        let effects: Vec<(Effect, usize)> = beside.effects.iter().copied().chain([(effect, variant)]).collect();
+        let effort = Effort { iterations, misfit: self.misfit(from.chi2), tolerance: CRAWL };
+        let tested = self.test(&from.model, &self.free(&effects), &from.initial, effects, effort);
+        let compared = tested.fitted.chi2 < COMPARED * self.data.values() as f64;
+        if iterations > GLANCE && compared { self.closely(&tested) } else { tested }
+    }
+
+    /// A fit taken on from where it stands, to where likelihoods can be compared.
+    #[must_use]
+    pub fn closely(&self, from: &Tested) -> Tested {
+        let effort = Effort { iterations: FULL, misfit: self.misfit(from.fitted.chi2), tolerance: CLOSE };
+        self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
 
     /// A first look at a start; where the model runs away (a spring that softens beyond its range), from a smaller one.
     fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
         let mut start = candidate.clone();
         for _ in 0..SMALLER {
-            let tested = self.fit_candidate(beside, &start, GLANCE);
+            let tested = self.glance_once(beside, &start);
             if tested.fitted.chi2.is_finite() {
                 return tested;
             }
@@ -307,16 +313,16 @@ impl Search<'_> {
                 }
             }
         }
-        self.fit_candidate(beside, &start, GLANCE)
+        self.glance_once(beside, &start)
     }
 
-    fn fit_candidate(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {
+    fn glance_once(&self, beside: &Tested, candidate: &Candidate) -> Tested {
         let mut effects: Settings = beside.fitted.model.effects;
         effects.of_mut(candidate.effect).copy_from_slice(candidate.settings.of(candidate.effect));
         // Nominal parameters to start from: what they were refitted to without the effect leans against it.
         let base = if beside.effects.is_empty() { self.nominal } else { beside.fitted.model };
         let start = Fitted { model: Model { effects, ..base }, initial: self.initial(), ..beside.fitted.clone() };
-        self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
+        self.refit(beside, &start, candidate.effect, candidate.variant, GLANCE)
     }
 }
 
