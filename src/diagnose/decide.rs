@@ -170,11 +170,11 @@ fn further(
     values: f64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Tested {
-    let material = |t: &Tested| unexplained_part(t, values) > 0.0 && t.fitted.chi2 - values > FURTHER_OF_ALL * gap;
+    let material = |t: &Tested| unexplained_part(t, values) > 0.0;
     let closes_more = |next: &Tested, chosen: &Tested| {
         let gain = chosen.fitted.chi2 - next.fitted.chi2;
         let rest = chosen.fitted.chi2 - values;
-        better(next, chosen, values) && gain >= FURTHER * rest && gain >= FURTHER_OF_ALL * gap
+        better(next, chosen, values) && gain >= FURTHER * rest && counts(gain, rest, gap)
     };
     let closer = |a: &Tested, b: &Tested| a.fitted.chi2.total_cmp(&b.fitted.chi2);
     let best_partner = |of: &Tested| search.one_more(of, progress).into_iter().next();
@@ -207,6 +207,12 @@ fn further(
     chosen
 }
 
+/// Whether what an effect takes away counts: a share of the whole gap or, where the first cause is all but everything,
+/// what was left of it.
+fn counts(gain: f64, rest: f64, gap: f64) -> bool {
+    gain >= FURTHER_OF_ALL * gap || gain >= CLOSES * rest
+}
+
 /// Drops effects that the others, fitted again from where the combination ended, do without; and the share of each that
 /// stays: how much of the gap comes back without it.
 ///
@@ -235,7 +241,8 @@ fn pruned(
             .collect();
         let back: Vec<f64> = without.iter().map(|t| (t.fitted.chi2 - chosen.fitted.chi2).max(0.0)).collect();
         let idle = (0..back.len()).min_by(|a, b| back[*a].total_cmp(&back[*b])).unwrap_or(0);
-        if better(&chosen, &without[idle], values) && back[idle] >= FURTHER_OF_ALL * gap {
+        let rest = without[idle].fitted.chi2 - values;
+        if better(&chosen, &without[idle], values) && counts(back[idle], rest, gap) {
             let sum: f64 = back.iter().sum();
             return (chosen, back.iter().map(|b| b / sum).collect());
         }

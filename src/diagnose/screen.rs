@@ -14,6 +14,8 @@ use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
 
 /// Prior standard deviation of a relative error of a nominal parameter.
 const PRIOR: f64 = 0.3;
+/// The same of the size of an effect already found: without what is missing it leans far.
+const FOUND: f64 = 1.0;
 /// Relative errors of a nominal parameter that a regression may find.
 const ERRORS: [f64; 2] = [-0.6, 1.5];
 /// Half widths of the parabolas by which a residual torque is seen in a residual position, samples: noise asks for wide
@@ -65,7 +67,7 @@ impl<'a> Screen<'a> {
         record: &'a Record,
         windows: &'a [Window],
         states: &'a States,
-        found: &[Effect],
+        found: &[(Effect, usize)],
     ) -> Self {
         let responder = Responder::new(model, record, windows);
         let residual = responder.residual();
@@ -74,20 +76,30 @@ impl<'a> Screen<'a> {
             .map(|p| responder.torques(&base_torques(*p, model, states)))
             .collect();
         let errors = common.len();
-        for effect in found {
+        let mut means = vec![0.0; errors];
+        for &(effect, variant) in found {
             let mut alone = Settings::default();
-            alone.of_mut(*effect).copy_from_slice(model.effects.of(*effect));
-            common.push(features::column(*effect, &alone, model, record, states, &responder));
+            alone.of_mut(effect).copy_from_slice(model.effects.of(effect));
+            let column = |settings: &Settings| features::column(effect, settings, model, record, states, &responder);
+            let parts = linear_parts(effect, &effect.info().variants[variant], &alone);
+            let size = parts.iter().map(|p| p.value.abs()).fold(0.0, f64::max);
+            if size > 0.0 {
+                for part in &parts {
+                    common.push(column(&part.unit).iter().map(|v| v * size).collect());
+                    means.push(part.value / size);
+                }
+            } else {
+                common.push(column(&alone));
+                means.push(1.0);
+            }
         }
         let n = common.len();
         let mut gram = DMatrix::from_fn(n, n, |i, j| dot(&common[i], &common[j]));
         let mut right = DVector::from_fn(n, |i, _| dot(&common[i], &residual));
         for i in 0..n {
-            gram[(i, i)] += PRIOR.powi(-2);
-            if i >= errors {
-                // An effect already found has its size as prior mean.
-                right[i] += PRIOR.powi(-2);
-            }
+            let weight = if i < errors { PRIOR } else { FOUND }.powi(-2);
+            gram[(i, i)] += weight;
+            right[i] += weight * means[i];
         }
         let scales = Scales::new(model, record, states);
         let remainder = residual.clone();
@@ -185,35 +197,11 @@ impl<'a> Screen<'a> {
 
     fn regress(&self, effect: Effect, variant: usize, form: &Variant, trial: &Trial) -> Option<Candidate> {
         let info = effect.info();
-        let mut columns = Vec::new();
-        let mut linear = Vec::new();
         let column = |settings: &Settings| {
             features::column(effect, settings, self.model, self.record, self.states, &self.responder)
         };
-        for &i in form.free {
-            let share = info.parameters[i].start == Start::Share;
-            if info.parameters[i].start != Start::Linear && !share {
-                continue;
-            }
-            let mut unit = trial.settings;
-            for &j in form.free {
-                if info.parameters[j].start == Start::Linear {
-                    unit.of_mut(effect)[j] = info.parameters[j].off;
-                }
-            }
-            unit.of_mut(effect)[i] = info.parameters[i].off + 1.0;
-            if share {
-                unit.of_mut(effect)[form.free[0]] += 1.0;
-            }
-            let phase = form.free.iter().copied().find(|&j| info.parameters[j].start == Start::Phase);
-            columns.push(column(&unit));
-            linear.push(i);
-            if let Some(phase) = phase.filter(|_| info.parameters[i].name == "amplitude") {
-                unit.of_mut(effect)[phase] = std::f64::consts::FRAC_PI_2;
-                columns.push(column(&unit));
-                linear.push(phase);
-            }
-        }
+        let parts = linear_parts(effect, form, &trial.settings);
+        let mut columns: Vec<Column> = parts.iter().map(|p| column(&p.unit)).collect();
         let nonlinear = columns.is_empty();
         if nonlinear {
             columns.push(column(&trial.settings));
@@ -231,17 +219,21 @@ impl<'a> Screen<'a> {
             trial.rescale(effect, &mut settings, c, &self.scales);
         } else {
             let p = settings.of_mut(effect);
-            for (n, &i) in linear.iter().enumerate() {
-                if info.parameters[i].start == Start::Phase {
-                    let (s, c) = (sizes[n], sizes[n - 1]);
-                    p[linear[n - 1]] = s.hypot(c);
-                    p[i] = s.atan2(c);
-                } else if info.parameters[i].start == Start::Share {
-                    // The size's torque is in both columns.
-                    p[form.free[0]] += sizes[n];
-                    p[i] = if p[form.free[0]] == 0.0 { 0.0 } else { sizes[n] / p[form.free[0]] };
-                } else {
-                    p[i] = info.parameters[i].off + sizes[n];
+            for (n, part) in parts.iter().enumerate() {
+                let i = part.parameter;
+                match info.parameters[i].start {
+                    Start::Phase => {
+                        let amplitude = parts[n - 1].parameter;
+                        let (s, c) = (sizes[n], sizes[n - 1]);
+                        p[amplitude] = s.hypot(c);
+                        p[i] = s.atan2(c);
+                    }
+                    Start::Share => {
+                        // The size's torque is in both columns.
+                        p[form.free[0]] += sizes[n];
+                        p[i] = if p[form.free[0]] == 0.0 { 0.0 } else { sizes[n] / p[form.free[0]] };
+                    }
+                    _ => p[i] = info.parameters[i].off + sizes[n],
                 }
             }
         }
@@ -286,6 +278,56 @@ impl<'a> Screen<'a> {
             }
         }
     }
+}
+
+/// A column of an effect that is linear in its sizes.
+struct Part {
+    /// The parameter that it stands for.
+    parameter: usize,
+    /// The effect with this part alone, as large as one.
+    unit: Settings,
+    /// How large it is in the settings.
+    value: f64,
+}
+
+/// The columns whose sum, each times its size, is the effect of any size; none if the effect is linear in nothing.
+fn linear_parts(effect: Effect, form: &Variant, settings: &Settings) -> Vec<Part> {
+    let info = effect.info();
+    let start = |i: usize| info.parameters[i].start;
+    let now = settings.of(effect);
+    let beyond = |i: usize| now[i] - info.parameters[i].off;
+    let mut blank = *settings;
+    for &i in form.free {
+        if matches!(start(i), Start::Linear | Start::Share | Start::Phase) {
+            blank.of_mut(effect)[i] = info.parameters[i].off;
+        }
+    }
+    let phase = form.free.iter().copied().find(|&i| start(i) == Start::Phase);
+    let share = form.free.iter().copied().find(|&i| start(i) == Start::Share);
+    let mut parts = Vec::new();
+    for &i in form.free {
+        let mut unit = blank;
+        unit.of_mut(effect)[i] += 1.0;
+        match start(i) {
+            Start::Linear if info.parameters[i].name == "amplitude" && phase.is_some() => {
+                let phase = phase.unwrap_or(i);
+                let (s, c) = now[phase].sin_cos();
+                parts.push(Part { parameter: i, unit, value: beyond(i) * c });
+                unit.of_mut(effect)[phase] = std::f64::consts::FRAC_PI_2;
+                parts.push(Part { parameter: phase, unit, value: beyond(i) * s });
+            }
+            Start::Linear => {
+                let shared = share.filter(|_| i == form.free[0]).map_or(0.0, |j| now[j]);
+                parts.push(Part { parameter: i, unit, value: beyond(i) * (1.0 - shared) });
+            }
+            Start::Share => {
+                unit.of_mut(effect)[form.free[0]] += 1.0;
+                parts.push(Part { parameter: i, unit, value: beyond(form.free[0]) * now[i] });
+            }
+            _ => {}
+        }
+    }
+    parts
 }
 
 /// Least squares from its normal equations with some unknowns held at given values; `None` if it has no solution.

@@ -23,8 +23,10 @@ const CRAWL: f64 = 1e-3;
 const CLOSE: f64 = 1e-5;
 /// Squared residual per value up to which likelihoods are compared, not only ranked.
 const COMPARED: f64 = 3.0;
-/// Times that a start is halved until the model runs.
+/// Starts looked at, each half as far from off as the one before, until the model runs and
 const SMALLER: usize = 5;
+/// leaves no more than this many times what the effects already found leave.
+const FAR: f64 = 1.5;
 /// Starts looked at per effect, alone and beside another.
 const STARTS: [usize; 2] = [3, 2];
 /// Periods of a flexible mode that a record must hold.
@@ -134,7 +136,7 @@ impl Search<'_> {
         let model = Model { effects: beside.fitted.model.effects, ..self.nominal };
         let stage = usize::from(!beside.effects.is_empty());
         let found: Vec<Effect> = beside.effects.iter().map(|(e, _)| *e).collect();
-        let screen = Screen::new(&model, self.data.record, self.data.windows, &self.states, &found);
+        let screen = Screen::new(&model, self.data.record, self.data.windows, &self.states, &beside.effects);
         let mut screened: Vec<Vec<Candidate>> = self
             .suspects
             .iter()
@@ -299,13 +301,20 @@ impl Search<'_> {
         self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
 
-    /// A first look at a start; where the model runs away (a spring that softens beyond its range), from a smaller one.
+    /// A first look at a start. Where the model runs away from it (a spring that softens beyond its range), or where it
+    /// is far worse than without the effect (the regression follows the measured motion, not the model's), from a
+    /// smaller one.
     fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
         let mut start = candidate.clone();
+        let mut best = (f64::INFINITY, start.clone());
         for _ in 0..SMALLER {
-            let tested = self.glance_once(beside, &start);
-            if tested.fitted.chi2.is_finite() {
-                return tested;
+            let left = self.look(beside, &start, 0).fitted.chi2;
+            if left < best.0 {
+                best = (left, start.clone());
+            }
+            let alone = beside.effects.is_empty();
+            if best.0.is_finite() && (alone || best.0 < FAR * beside.fitted.chi2) {
+                break;
             }
             for (value, info) in start.settings.of_mut(start.effect).iter_mut().zip(start.effect.info().parameters) {
                 if info.role == Role::Size {
@@ -313,16 +322,16 @@ impl Search<'_> {
                 }
             }
         }
-        self.glance_once(beside, &start)
+        self.look(beside, &best.1, GLANCE)
     }
 
-    fn glance_once(&self, beside: &Tested, candidate: &Candidate) -> Tested {
+    fn look(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {
         let mut effects: Settings = beside.fitted.model.effects;
         effects.of_mut(candidate.effect).copy_from_slice(candidate.settings.of(candidate.effect));
         // Nominal parameters to start from: what they were refitted to without the effect leans against it.
         let base = if beside.effects.is_empty() { self.nominal } else { beside.fitted.model };
         let start = Fitted { model: Model { effects, ..base }, initial: self.initial(), ..beside.fitted.clone() };
-        self.refit(beside, &start, candidate.effect, candidate.variant, GLANCE)
+        self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
     }
 }
 

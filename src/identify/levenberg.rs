@@ -179,6 +179,8 @@ impl Report {
     }
 }
 
+/// Damping above which a step is much shorter than the Gauss-Newton step.
+const HELD_SHORT: f64 = 0.1;
 /// Relative eigenvalue below which a direction of the scaled curvature counts as undetermined.
 const RANK: f64 = 1e-13;
 
@@ -303,7 +305,9 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 normal = next;
                 iterations += 1;
                 problem.progress(iterations, normal.cost, &p);
-                calm = if brought <= options.cost * before && promised <= options.cost * before { calm + 1 } else { 0 };
+                // A step that the damping holds short promises little wherever it stands.
+                let little = brought.max(promised) <= options.cost * before && damping <= HELD_SHORT;
+                calm = if little { calm + 1 } else { 0 };
                 if calm >= 2 {
                     break Termination::Cost;
                 }
