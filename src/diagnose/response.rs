@@ -2,7 +2,7 @@
 //!
 //! `y = G*(T - f)`: with the true motion known, the torques `f` of an effect along it are known too, and what they do
 //! to the readings is linear superposition, whatever their size. So a screening of effects is a linear regression of
-//! `y - G*T` on the columns `G*f`, each freed of the windows' initial states.
+//! what a model leaves on the columns `G*f`, each freed of the windows' initial states.
 
 use super::model::Model;
 use super::record::Record;
@@ -207,30 +207,18 @@ impl<'a> Responder<'a> {
     /// A change of the readings themselves, freed of initial states.
     #[must_use]
     pub fn readings(&self, change: impl Fn(usize) -> [f64; 4]) -> Column {
+        self.compared(self.windows.iter().flat_map(|w| w.compared.clone()).map(change))
+    }
+
+    /// Readings of every compared sample, window by window, freed of initial states.
+    #[must_use]
+    pub fn compared(&self, readings: impl Iterator<Item = [f64; 4]>) -> Column {
         let mut column = Vec::with_capacity(self.values());
-        for window in self.windows {
-            for k in window.compared.clone() {
-                let change = change(k);
-                column.extend(self.present.iter().map(|&c| change[c] * self.weight[c]));
-            }
+        for reading in readings {
+            column.extend(self.present.iter().map(|&c| reading[c] * self.weight[c]));
         }
         self.free_of_initial_states(&mut column);
         column
-    }
-
-    /// What was read, less what the linear axis makes of the torque, freed of initial states.
-    #[must_use]
-    pub fn residual(&self) -> Column {
-        let zero = Ramp::default();
-        let torque: Torques =
-            (0..self.record.len()).map(|k| [self.record.hold.ramp(&self.record.torque, k), zero]).collect();
-        let answer = self.torques(&torque);
-        let mut read = self.readings(|k| {
-            let value = |c: usize| self.record.channels[c].as_ref().map_or(0.0, |v| v[k]);
-            [value(0), value(1), value(2), value(3)]
-        });
-        subtract(&mut read, &answer, 1.0);
-        read
     }
 
     fn free_of_initial_states(&self, column: &mut Column) {

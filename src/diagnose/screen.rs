@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::features;
+use super::fit::{Data, predict};
 use super::model::{BaseParameter, Model};
 use super::record::Record;
 use super::response::{Column, Responder, States, dot, subtract};
 use super::tones::{self, Lines};
-use super::windows::Window;
-use crate::axis::Structure;
+use super::windows::Initial;
+use crate::axis::{Parameters, Structure};
 use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
 
 /// Prior standard deviation of a relative error of a nominal parameter.
@@ -35,6 +36,8 @@ pub struct Candidate {
     pub effect: Effect,
     /// Which of its variants.
     pub variant: usize,
+    /// Parameters of the axis that it was found with.
+    pub parameters: Parameters,
     /// Its parameters, all other effects as in the model under test.
     pub settings: Settings,
     /// Sum of squares that the regression leaves, in units of the noise.
@@ -60,46 +63,52 @@ pub struct Screen<'a> {
 }
 
 impl<'a> Screen<'a> {
-    /// Prepares the regression; `found` are effects already taken as part of the model, refitted beside each candidate.
+    /// Prepares the regression of what `model` leaves, from its windows' initial states; `found` are its effects that
+    /// are refitted beside each candidate.
+    ///
+    /// A model's own run knows what friction does while it sticks, which the measured motion does not tell: how an
+    /// effect found acts is the difference of the runs with and without it.
     #[must_use]
     pub fn new(
         model: &'a Model,
-        record: &'a Record,
-        windows: &'a [Window],
+        data: Data<'a>,
+        initial: &[Initial],
         states: &'a States,
         found: &[(Effect, usize)],
     ) -> Self {
+        let Data { record, windows } = data;
         let responder = Responder::new(model, record, windows);
-        let residual = responder.residual();
+        let run = |m: &Model| responder.compared(predict(data, m, initial).into_iter().map(|(_, _, reading)| reading));
+        let now = run(model);
+        let mut residual =
+            responder.readings(|k| std::array::from_fn(|c| record.channels[c].as_ref().map_or(0.0, |v| v[k])));
+        subtract(&mut residual, &now, 1.0);
         let mut common: Vec<Column> = BaseParameter::of(model.structure)
             .iter()
             .map(|p| responder.torques(&base_torques(*p, model, states)))
             .collect();
         let errors = common.len();
-        let mut means = vec![0.0; errors];
         for &(effect, variant) in found {
+            let mut without = *model;
+            without.effects.of_mut(effect).copy_from_slice(Settings::default().of(effect));
+            let mut whole = now.clone();
+            subtract(&mut whole, &run(&without), 1.0);
+            common.push(whole);
             let mut alone = Settings::default();
             alone.of_mut(effect).copy_from_slice(model.effects.of(effect));
-            let column = |settings: &Settings| features::column(effect, settings, model, record, states, &responder);
             let parts = linear_parts(effect, &effect.info().variants[variant], &alone);
             let size = parts.iter().map(|p| p.value.abs()).fold(0.0, f64::max);
-            if size > 0.0 {
-                for part in &parts {
-                    common.push(column(&part.unit).iter().map(|v| v * size).collect());
-                    means.push(part.value / size);
-                }
-            } else {
-                common.push(column(&alone));
-                means.push(1.0);
+            // Its parts may change by themselves, one side of a friction more than the other.
+            for part in parts.iter().skip(1) {
+                let column = features::column(effect, &part.unit, model, record, states, &responder);
+                common.push(column.iter().map(|v| v * size).collect());
             }
         }
         let n = common.len();
         let mut gram = DMatrix::from_fn(n, n, |i, j| dot(&common[i], &common[j]));
-        let mut right = DVector::from_fn(n, |i, _| dot(&common[i], &residual));
+        let right = DVector::from_fn(n, |i, _| dot(&common[i], &residual));
         for i in 0..n {
-            let weight = if i < errors { PRIOR } else { FOUND }.powi(-2);
-            gram[(i, i)] += weight;
-            right[i] += weight * means[i];
+            gram[(i, i)] += if i < errors { PRIOR } else { FOUND }.powi(-2);
         }
         let scales = Scales::new(model, record, states);
         let remainder = residual.clone();
@@ -240,7 +249,13 @@ impl<'a> Screen<'a> {
         for (value, info) in settings.of_mut(effect).iter_mut().zip(info.parameters) {
             *value = value.clamp(info.min, info.max);
         }
-        settings.is_on(effect).then_some(Candidate { effect, variant, settings, chi2 })
+        settings.is_on(effect).then_some(Candidate {
+            effect,
+            variant,
+            parameters: self.model.parameters,
+            settings,
+            chi2,
+        })
     }
 
     /// Regression on the common columns and these: what is left, and the sizes of all.
@@ -286,7 +301,7 @@ struct Part {
     parameter: usize,
     /// The effect with this part alone, as large as one.
     unit: Settings,
-    /// How large it is in the settings.
+    /// How large it is in the settings: the effect is the sum of its parts, each times this.
     value: f64,
 }
 

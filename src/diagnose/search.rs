@@ -27,8 +27,10 @@ const COMPARED: f64 = 3.0;
 const SMALLER: usize = 5;
 /// leaves no more than this many times what the effects already found leave.
 const FAR: f64 = 1.5;
-/// Starts looked at per effect, alone and beside another.
-const STARTS: [usize; 2] = [3, 2];
+/// Starts looked at per effect alone,
+const STARTS: usize = 3;
+/// and beside another, from each of two places.
+const STARTS_BESIDE: usize = 1;
 /// Periods of a flexible mode that a record must hold.
 const SWINGS: f64 = 2.0;
 /// Damping ratio that a flexible mode must have,
@@ -133,38 +135,59 @@ impl Search<'_> {
     /// by [`simplest`].
     #[must_use]
     pub fn one_more(&self, beside: &Tested, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
-        let model = Model { effects: beside.fitted.model.effects, ..self.nominal };
         let stage = usize::from(!beside.effects.is_empty());
         let found: Vec<Effect> = beside.effects.iter().map(|(e, _)| *e).collect();
-        let screen = Screen::new(&model, self.data.record, self.data.windows, &self.states, &beside.effects);
-        let mut screened: Vec<Vec<Candidate>> = self
-            .suspects
-            .iter()
-            .filter(|e| !found.contains(e) && self.applies(**e))
-            .map(|&effect| {
-                progress(effect.info().id);
-                let variants = 0..effect.info().variants.len();
-                let mut starts: Vec<Candidate> =
-                    variants.flat_map(|v| screen.starts(effect, v, STARTS[stage])).collect();
-                starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
-                starts
-            })
-            .filter(|starts| !starts.is_empty())
-            .collect();
-        screened.sort_by(|a, b| a[0].chi2.total_cmp(&b[0].chi2));
+        // What is missing makes the parameters lean: once from where they are known to be, once from where they lean.
+        let leaning = beside.fitted.model;
+        let upright = Model { parameters: self.nominal.parameters, ..leaning };
+        let initial = self.initial();
+        let mut screens = vec![Screen::new(&upright, self.data, &initial, &self.states, &beside.effects)];
+        if stage > 0 {
+            screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, &self.states, &beside.effects));
+        }
+        let suspects: Vec<Effect> =
+            self.suspects.iter().copied().filter(|e| !found.contains(e) && self.applies(*e)).collect();
+        let starts = if stage == 0 { STARTS } else { STARTS_BESIDE };
+        let mut screened: Vec<(usize, Vec<Candidate>)> = Vec::new();
+        for screen in &screens {
+            let mut of_screen: Vec<Vec<Candidate>> = suspects
+                .iter()
+                .map(|&effect| {
+                    progress(effect.info().id);
+                    let variants = 0..effect.info().variants.len();
+                    let mut found: Vec<Candidate> = variants.flat_map(|v| screen.starts(effect, v, starts)).collect();
+                    found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+                    found.truncate(starts);
+                    found
+                })
+                .filter(|starts| !starts.is_empty())
+                .collect();
+            of_screen.sort_by(|a, b| a[0].chi2.total_cmp(&b[0].chi2));
+            for (rank, mut found) in of_screen.into_iter().enumerate() {
+                match screened.iter_mut().find(|(_, known)| known[0].effect == found[0].effect) {
+                    Some((best, known)) => {
+                        *best = rank.min(*best);
+                        known.append(&mut found);
+                    }
+                    None => screened.push((rank, found)),
+                }
+            }
+        }
+        screened.sort_by_key(|(rank, _)| *rank);
+        let mut screened: Vec<Vec<Candidate>> = screened.into_iter().map(|(_, starts)| starts).collect();
         screened.truncate(LOOKED_AT[stage]);
         // The regression's favourites first; when they reach the floor, the others need not be looked at.
         let mut glances: Vec<(Tested, Candidate)> = Vec::new();
         for batch in screened.chunks(BATCH) {
             let best = glances.iter().map(|g| g.0.fitted.chi2).fold(f64::INFINITY, f64::min);
-            if best < REACHED * self.data.values() as f64 && batch[0][0].chi2 > HOPELESS * best {
+            let promised = batch.iter().flatten().map(|c| c.chi2).fold(f64::INFINITY, f64::min);
+            if best < REACHED * self.data.values() as f64 && promised > HOPELESS * best {
                 break;
             }
             glances.par_extend(batch.par_iter().flat_map_iter(|starts| {
                 progress(starts[0].effect.info().id);
                 starts
                     .iter()
-                    .take(STARTS[stage])
                     .map(|c| (self.glance(beside, c), c.clone()))
                     .min_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2))
             }));
@@ -178,7 +201,7 @@ impl Search<'_> {
             .map(|(rank, (glance, candidate))| {
                 progress(candidate.effect.info().id);
                 if rank < FINALISTS[stage] && (rank < 1 || glance.fitted.chi2 < near) {
-                    self.best_variant(beside, glance, candidate, &screen)
+                    self.best_variant(beside, glance, candidate, &screens[0])
                 } else {
                     glance.clone()
                 }
@@ -328,9 +351,8 @@ impl Search<'_> {
     fn look(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {
         let mut effects: Settings = beside.fitted.model.effects;
         effects.of_mut(candidate.effect).copy_from_slice(candidate.settings.of(candidate.effect));
-        // Nominal parameters to start from: what they were refitted to without the effect leans against it.
-        let base = if beside.effects.is_empty() { self.nominal } else { beside.fitted.model };
-        let start = Fitted { model: Model { effects, ..base }, initial: self.initial(), ..beside.fitted.clone() };
+        let model = Model { parameters: candidate.parameters, effects, ..beside.fitted.model };
+        let start = Fitted { model, initial: self.initial(), ..beside.fitted.clone() };
         self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
     }
 }
