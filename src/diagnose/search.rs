@@ -352,7 +352,9 @@ impl Search<'_> {
         let mut effects: Settings = beside.fitted.model.effects;
         effects.of_mut(candidate.effect).copy_from_slice(candidate.settings.of(candidate.effect));
         let model = Model { parameters: candidate.parameters, effects, ..beside.fitted.model };
-        let start = Fitted { model, initial: self.initial(), ..beside.fitted.clone() };
+        // The states as measured until a model has come near them.
+        let initial = if beside.effects.is_empty() { self.initial() } else { beside.fitted.initial.clone() };
+        let start = Fitted { model, initial, ..beside.fitted.clone() };
         self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
     }
 }
