@@ -6,9 +6,10 @@ use super::fit::{Data, Effort, Fitted, fit};
 use super::model::{BaseParameter, Free, Model};
 use super::response::States;
 use super::screen::{Candidate, Screen};
+use super::states;
 use super::windows::Initial;
 use crate::axis::Structure;
-use crate::effects::{Effect, Place, Role, Settings, Variant};
+use crate::effects::{Effect, Place, Settings, Variant};
 
 /// Linearisations of a first look at a start.
 const GLANCE: usize = 6;
@@ -23,10 +24,8 @@ const CRAWL: f64 = 1e-3;
 const CLOSE: f64 = 1e-5;
 /// Squared residual per value up to which likelihoods are compared, not only ranked.
 const COMPARED: f64 = 3.0;
-/// Starts looked at, each half as far from off as the one before, until the model runs and
-const SMALLER: usize = 5;
-/// leaves no more than this many times what the effects already found leave.
-const FAR: f64 = 1.5;
+/// Starts of an effect, each smaller than the one before, that are tried until one is good.
+const SMALLER: usize = 3;
 /// Starts looked at per effect alone,
 const STARTS: usize = 3;
 /// and beside another, from each of two places.
@@ -142,8 +141,9 @@ impl Search<'_> {
         let upright = Model { parameters: self.nominal.parameters, ..leaning };
         let initial = self.initial();
         let mut screens = vec![Screen::new(&upright, self.data, &initial, &self.states, &beside.effects)];
+        let own_motion = states::of_model(self.data, &leaning, &beside.fitted.initial, &self.states);
         if stage > 0 {
-            screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, &self.states, &beside.effects));
+            screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, &own_motion, &beside.effects));
         }
         let suspects: Vec<Effect> =
             self.suspects.iter().copied().filter(|e| !found.contains(e) && self.applies(*e)).collect();
@@ -324,28 +324,29 @@ impl Search<'_> {
         self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
 
-    /// A first look at a start. Where the model runs away from it (a spring that softens beyond its range), or where it
-    /// is far worse than without the effect (the regression follows the measured motion, not the model's), from a
-    /// smaller one.
+    /// A first look at a start, with what the regression moved beside it; where the model runs away from it (a spring
+    /// that softens beyond its range), or comes out no better than without the effect, from the start alone, then smaller.
     fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
-        let mut start = candidate.clone();
-        let mut best = (f64::INFINITY, start.clone());
+        let alone = beside.effects.is_empty();
+        let good = |t: &Tested| t.fitted.chi2.is_finite() && (alone || t.fitted.chi2 < beside.fitted.chi2);
+        let mut starts = if alone { Vec::new() } else { vec![candidate.moved(&beside.effects)] };
+        let mut smaller = candidate.clone();
         for _ in 0..SMALLER {
-            let left = self.look(beside, &start, 0).fitted.chi2;
-            if left < best.0 {
-                best = (left, start.clone());
+            starts.push(smaller.clone());
+            smaller.shrink();
+        }
+        let mut best: Option<Tested> = None;
+        for start in &starts {
+            let tested = self.look(beside, start, GLANCE);
+            let better = best.as_ref().is_none_or(|b| !b.fitted.chi2.is_finite() || tested.fitted.chi2 < b.fitted.chi2);
+            if better {
+                best = Some(tested);
             }
-            let alone = beside.effects.is_empty();
-            if best.0.is_finite() && (alone || best.0 < FAR * beside.fitted.chi2) {
+            if best.as_ref().is_some_and(&good) {
                 break;
             }
-            for (value, info) in start.settings.of_mut(start.effect).iter_mut().zip(start.effect.info().parameters) {
-                if info.role == Role::Size {
-                    *value = info.off + 0.5 * (*value - info.off);
-                }
-            }
         }
-        self.look(beside, &best.1, GLANCE)
+        best.unwrap_or_else(|| beside.clone())
     }
 
     fn look(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {

@@ -3,11 +3,14 @@
 //! Savitzky, Golay, Analytical Chemistry 36(8), 1964: the least-squares cubic over `2*HALF + 1` samples gives position,
 //! speed and acceleration at its middle.
 
+use super::fit::{Data, predict};
 use super::location::smooth_states;
 use super::model::Model;
 use super::record::Record;
 use super::response::States;
+use super::windows::Initial;
 use crate::axis::Structure;
+use crate::effects::{EFFECTS, Settings};
 
 /// Half width of the fit, samples.
 const HALF: i64 = 6;
@@ -30,6 +33,27 @@ pub fn along(record: &Record, model: &Model) -> States {
             let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
             let rise = smoothed[b][side + 1] - smoothed[a][side + 1];
             states.acceleration[k][side / 2] = rise / ((b - a) as f64 * record.dt);
+        }
+    }
+    states
+}
+
+/// The motion as a fitted model runs through it, free of noise and of what the encoders make of it; samples that no
+/// window compares keep what was `measured`.
+#[must_use]
+pub fn of_model(data: Data<'_>, model: &Model, initial: &[Initial], measured: &States) -> States {
+    let mut bare = *model;
+    for effect in EFFECTS.iter().filter(|e| e.is_sensor()) {
+        bare.effects.of_mut(*effect).copy_from_slice(Settings::default().of(*effect));
+    }
+    let mut states = measured.clone();
+    let run = predict(data, &bare, initial);
+    for (_, k, reading) in &run {
+        states.motion[*k] = *reading;
+    }
+    for pair in run.windows(3).filter(|p| p[0].0 == p[2].0) {
+        for (side, acceleration) in states.acceleration[pair[1].1].iter_mut().enumerate() {
+            *acceleration = (pair[2].2[2 * side + 1] - pair[0].2[2 * side + 1]) / (2.0 * data.record.dt);
         }
     }
     states
