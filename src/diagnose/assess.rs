@@ -70,7 +70,7 @@ pub struct Replay {
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (all, all_held) = split(case);
-    let (record, other) = (&first(&all), first(&all_held));
+    let (record, other) = (&first(&all), &first(&all_held));
     let train = cut(0..record.len());
     let held_windows = cut(0..other.len());
     let data = Data { record, windows: &train };
@@ -82,22 +82,24 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         states: states::along(record, &case.nominal),
     };
     progress("the model as given");
-    let decision = decide(&search, progress);
+    let mut decision = decide(&search, progress);
+    progress("held-out data");
+    let held = Held { record: other, windows: &held_windows, states: states::along(other, &case.nominal) };
+    let fitted = [case.nominal, decision.parameters.fitted.model, decision.chosen.fitted.model];
+    let on_held = held.gap(fitted);
+    decision.confirm(on_held.closure, on_held.closure_of_effect);
     progress("lines of the excitation");
     let unexplained = decision.verdict == Verdict::Unexplained;
     let linear = unexplained.then(|| lines::examine(case, &all, &all_held)).flatten();
     progress("where");
     let located = locate(record, &case.nominal.parameters, case.nominal.structure);
-    progress("held-out data");
-    let held = Held { record: &other, windows: &held_windows, states: states::along(&other, &case.nominal) };
-    let improved = linear.as_ref().map_or(&decision.chosen.fitted.model, lines::Found::improved);
-    let models = [case.nominal, decision.parameters.fitted.model, *improved];
+    let models = linear.as_ref().map_or(fitted, |found| [fitted[0], fitted[1], *found.improved()]);
+    let on_held = if linear.is_some() { held.gap(models) } else { on_held };
     let on_train = {
         let initial = initial(&search.states, &train);
         let e = models.map(|m| gap::errors(data, &m, &initial).0);
         gap::measure(record, &train, [&e[0], &e[1], &e[2]])
     };
-    let on_held = held.gap(models);
     let mut diagnosis = build(case, &decision, &held, on_train, on_held, &located);
     lattice::judge(case, &decision, &mut diagnosis);
     words::fill(&mut diagnosis, &decision);

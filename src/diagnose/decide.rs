@@ -22,6 +22,8 @@ const FURTHER_OF_ALL: f64 = 2e-3;
 const GRAIN: f64 = 0.05;
 /// Single effects that are given a partner, the best first.
 const BEAM: usize = 3;
+/// How many times less than one effect two must leave for a third to be looked for.
+const WORTH_A_THIRD: f64 = 10.0;
 /// Most effects at once.
 const MOST: usize = 3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -76,6 +78,19 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// Takes back or gives the verdict that an effect is the cause by what it closes of the gap on data that no fit has
+    /// seen: `closure` from the model as given, `of_effect` from its parameters fitted. A fit at the floor stands.
+    pub fn confirm(&mut self, closure: f64, of_effect: f64) {
+        if self.chosen.effects.is_empty() || unexplained_part(&self.chosen, self.values) == 0.0 {
+            return;
+        }
+        if closure < CLOSES {
+            self.verdict = Verdict::Unexplained;
+        } else if of_effect >= CLOSES {
+            self.verdict = Verdict::Effect;
+        }
+    }
+
     /// True if the parameters all changed by one factor: a wrong torque constant.
     #[must_use]
     pub fn torque_gain(&self) -> Option<(f64, f64)> {
@@ -178,23 +193,32 @@ fn further(
     };
     let closer = |a: &Tested, b: &Tested| a.fitted.chi2.total_cmp(&b.fitted.chi2);
     let best_partner = |of: &Tested| search.one_more(of, progress).into_iter().next();
+    let first_is_most = first.fitted.chi2 - values < FURTHER_OF_ALL * gap;
     let mut chosen = first;
+    // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
+    let beam = if first_is_most { 1 } else { BEAM };
     if material(&chosen) {
         let mut pair: Option<Tested> = None;
-        for single in singles.iter().take(BEAM) {
+        for single in singles.iter().take(beam) {
             pair = pair.into_iter().chain(best_partner(single)).min_by(closer);
             if pair.as_ref().is_some_and(|p| !material(p)) {
                 break;
             }
         }
-        if let Some(found) = pair.as_ref().filter(|p| material(p)) {
+        if let Some(found) = pair.as_ref().filter(|p| material(p) && !first_is_most) {
             // With the partner in, was the first the right one?
             let (newest, variant) = found.effects[1];
             let turned = best_partner(&search.only(found, newest, variant));
             pair = pair.into_iter().chain(turned).min_by(closer);
         }
         match pair.filter(|p| closes_more(p, &chosen)) {
-            Some(pair) => chosen = pair,
+            Some(pair) => {
+                let closed = chosen.fitted.chi2 / pair.fitted.chi2;
+                chosen = pair;
+                if closed < WORTH_A_THIRD {
+                    return chosen;
+                }
+            }
             None => return chosen,
         }
     }
