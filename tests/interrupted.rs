@@ -134,3 +134,25 @@ fn a_fleet_that_is_killed_again_and_again_ends_with_the_same_summary() {
     duration(&run("parts"), folder);
     assert_eq!(relative(files(&folder.join("parts")), "parts"), expected);
 }
+
+/// As `eixo ... | head -1`: the reader has gone before the first line.
+#[test]
+fn a_reader_that_leaves_stops_no_command_and_loses_no_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for arguments in [&["excite", "--output", "torque.csv"][..], &["effects"], &["man"], &["completions", "bash"]] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let done = Command::new(env!("CARGO_BIN_EXE_eixo"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .stdout(writer)
+            .stderr(Stdio::piped())
+            .output()
+            .expect("eixo");
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(0), "{arguments:?}: {said}");
+        assert_eq!(said, "", "{arguments:?}");
+    }
+    assert!(folder.path().join("torque.csv").is_file());
+}

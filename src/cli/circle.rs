@@ -4,6 +4,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use super::say::say;
 use super::diagnosed;
 use super::drives::{Drives, ideal, machine};
 use crate::circle::roundness::{Roundness, bidirectional};
@@ -89,7 +90,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(file, html::page(&report(&findings)).as_bytes())?;
     }
     let colour = std::io::stdout().is_terminal();
-    print!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }));
+    say!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,9 +1,10 @@
 //! `eixo completions`.
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::CommandFactory;
+
+use super::say::say;
 
 /// Arguments of `eixo completions`.
 #[derive(Debug, clap::Args)]
@@ -20,6 +21,6 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut super::Cli::command(), "eixo", &mut text);
-    std::io::stdout().write_all(&text)?;
+    say!("{}", String::from_utf8(text)?)?;
     Ok(ExitCode::SUCCESS)
 }

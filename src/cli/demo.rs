@@ -16,6 +16,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::say::{say, say_line};
 use crate::axis::{Parameters, dt_criterion};
 use crate::diagnose::{Case, Model, diagnose};
 use crate::effects::EFFECTS;
@@ -94,10 +95,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.finish();
 
     let layout = terminal::Layout { colour: std::io::stdout().is_terminal(), ..terminal::Layout::default() };
-    print!("{}", terminal::blocks(&short(&findings), layout));
-    println!("\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n");
-    print!("{}", terminal::blocks(&diagnosis, layout));
-    println!();
+    say!("{}", terminal::blocks(&short(&findings), layout))?;
+    say_line!("\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n")?;
+    say!("{}", terminal::blocks(&diagnosis, layout))?;
+    say_line!()?;
     for (name, what) in [
         ("axis.fmu", "the axis, for any tool that imports FMI 2.0"),
         ("excitation.csv", "the torque"),
@@ -109,7 +110,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         ("diagnosis.html", "where the gap lies, what causes it, how far it shrinks"),
         ("circle.html", "what the hidden friction does to a circle"),
     ] {
-        println!("  {:<40} {what}", file(name).display());
+        say_line!("  {:<40} {what}", file(name).display())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
+use super::say::{say, say_line};
 use super::many::Many;
 use crate::axis::Structure;
 use crate::diagnose::{CHANNELS, Case, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise};
@@ -159,7 +160,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let findings = diagnosed.findings();
     let outcome = &diagnosed.outcome;
     let colour = std::io::stdout().is_terminal();
-    print!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }));
+    say!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
     if let Some(path) = &args.json {
         let mut text = serde_json::to_string_pretty(&outcome.diagnosis)?;
         text.push('\n');
@@ -175,7 +176,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             ..diagnosed.machine.clone()
         };
         Package::of(&improved).with_context(|| path.display().to_string())?.write(path)?;
-        println!("{}", replayed(path, &outcome.replay)?);
+        say_line!("{}", replayed(path, &outcome.replay)?)?;
     }
     Ok(ExitCode::SUCCESS)
 }

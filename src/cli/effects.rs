@@ -1,9 +1,9 @@
 //! `eixo effects`.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::process::ExitCode;
 
+use super::say::say;
 use crate::effects::{EFFECTS, Effect, EffectInfo, Role};
 
 /// Arguments of `eixo effects`.
@@ -27,8 +27,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None if args.markdown => markdown(),
         None => list(),
     };
-    // A reader that has seen enough (head) is no error.
-    let _ = std::io::stdout().write_all(text.as_bytes());
+    say!("{text}")?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::say::say_line;
 use crate::identify::excitation::{Kind, Multisine};
 use crate::report::format::{Medium, number};
 use crate::trace::{Hold, Motion, Signal, Trace, write_csv};
@@ -111,15 +112,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let resolution = 1.0 / (args.samples as f64 * args.dt);
     let harmonic = |k: Option<&crate::identify::excitation::Line>| k.map_or(0.0, |l| l.harmonic as f64 * resolution);
-    println!("{}: {} samples at dt = {} s, {} period(s) of {:.6} s", args.output.display(), total, args.dt, args.periods,
-        args.samples as f64 * args.dt);
-    println!(
+    say_line!("{}: {} samples at dt = {} s, {} period(s) of {:.6} s", args.output.display(), total, args.dt, args.periods,
+        args.samples as f64 * args.dt)?;
+    say_line!(
         "lines         {} from {:.6} to {:.6} Hz",
         signal.lines.len(),
         harmonic(signal.lines.first()),
         harmonic(signal.lines.last())
-    );
-    println!("rms           {}", number(signal.rms(), 4, Medium::Terminal));
-    println!("crest factor  {:.3}", signal.crest_factor());
+    )?;
+    say_line!("rms           {}", number(signal.rms(), 4, Medium::Terminal))?;
+    say_line!("crest factor  {:.3}", signal.crest_factor())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::say::say_line;
 use super::drives::Drives;
 use crate::fmu::package::{Package, XyTable};
 use crate::trace::Machine;
@@ -56,7 +57,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     package.write(&args.fmu)?;
     let platforms: Vec<&str> = Package::platforms().collect();
-    println!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "));
+    say_line!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -69,6 +70,6 @@ fn table(args: &Args, x: Machine) -> anyhow::Result<ExitCode> {
     let table = XyTable { name, axes, dt: args.drives.dt, connectors: !args.bare };
     table.write(&args.fmu)?;
     let step = args.drives.dt;
-    println!("{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s", args.fmu.display(), table.name);
+    say_line!("{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s", args.fmu.display(), table.name)?;
     Ok(ExitCode::SUCCESS)
 }

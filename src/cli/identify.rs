@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use serde_json::json;
 
+use super::say::say;
 use super::FINDINGS;
 use super::many::Many;
 use crate::axis::{Scheme, Structure};
@@ -159,7 +160,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if machine.controller.is_some() && result.recommended.is_some() {
         said.extend(super::controlled::identified(path, &machine, &improved(&machine, &result)?)?);
     }
-    print!("{}", terminal::blocks(&said, terminal::Layout::default()));
+    say!("{}", terminal::blocks(&said, terminal::Layout::default()))?;
     if let Some(path) = &args.json {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
@@ -369,7 +370,7 @@ fn paper_tables(json: Option<&Path>) -> anyhow::Result<ExitCode> {
         blocks.push(Block::Paragraph(t.verdict.clone()));
     }
     blocks.extend(tables.words.iter().cloned().map(Block::Paragraph));
-    print!("{}", terminal::blocks(&blocks, terminal::Layout { width: 120, colour: false }));
+    say!("{}", terminal::blocks(&blocks, terminal::Layout { width: 120, colour: false }))?;
     if let Some(path) = json {
         write_text(path, &serde_json::to_vec_pretty(&tables)?)?;
     }

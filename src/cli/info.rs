@@ -1,13 +1,13 @@
 //! `eixo info`.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context;
 use serde_json::{Value as Json, json};
 
+use super::say::say;
 use crate::fmu::archive::Archive;
 use crate::fmu::description::{Causality, Description, Interface, SI_BASE, Unit, Value, Variable};
 
@@ -48,10 +48,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     } else {
         as_text(&d, &platforms, &shown)
     };
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(ExitCode::SUCCESS),
-    }
+    say!("{text}")?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Platform folders with their binaries and sizes in bytes; `sources` for source code.

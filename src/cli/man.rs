@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use clap::CommandFactory;
 
+use super::say::say;
+
 /// Arguments of `eixo man`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: eixo man > eixo.1 && man ./eixo.1")]
@@ -15,7 +17,7 @@ pub struct Args {}
 /// # Errors
 /// When standard output cannot be written.
 pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    std::io::stdout().write_all(&page()?)?;
+    say!("{}", String::from_utf8(page()?)?)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::say::{say, say_line};
 use super::{COULD_NOT_RUN, FINDINGS};
 use crate::fleet::{Found, Item, Plan, find, is_many, run};
 use crate::report::terminal;
@@ -78,7 +79,9 @@ impl Many {
             items.retain(|item| self.part.contains(&item.path));
         }
         if self.list {
-            items.iter().for_each(|item| println!("{}", item.path.display()));
+            for item in &items {
+                say_line!("{}", item.path.display())?;
+            }
             return Ok(ExitCode::SUCCESS);
         }
         if let Some(jobs) = self.jobs {
@@ -106,8 +109,8 @@ impl Many {
         let outcome = done?;
         if self.part.is_empty() {
             let colour = std::io::stdout().is_terminal();
-            print!("{}", terminal::blocks(&outcome.short, terminal::Layout { colour, width: 120 }));
-            println!("\n{}", output.join("index.html").display());
+            say!("{}", terminal::blocks(&outcome.short, terminal::Layout { colour, width: 120 }))?;
+            say_line!("\n{}", output.join("index.html").display())?;
         }
         if outcome.reused > 0 {
             eprintln!("{} of {} traces were done by an earlier run", outcome.reused, items.len());

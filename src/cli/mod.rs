@@ -26,6 +26,8 @@ pub struct Cli {
     pub command: Command,
 }
 
+mod say;
+
 mod controlled;
 mod diagnosed;
 mod drives;

@@ -8,6 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::say::say_line;
 use crate::fmu::host::Fmu;
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting, simulate};
@@ -206,13 +207,13 @@ fn finish(mut record: Record, output: &Path, noise: &[Noise], seed: u64) -> anyh
     let columns: Vec<(&str, &[f64])> = table.iter().map(|(name, values)| (name.as_str(), *values)).collect();
     write_columns(output, &columns)?;
     record.notes.iter().for_each(|note| eprintln!("note: {note}"));
-    println!(
+    say_line!(
         "{}: {} rows, {} s to {} s, {} columns",
         output.display(),
         record.time.len(),
         record.time.first().copied().unwrap_or(0.0),
         record.time.last().copied().unwrap_or(0.0),
         columns.len()
-    );
+    )?;
     Ok(ExitCode::SUCCESS)
 }

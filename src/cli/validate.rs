@@ -1,6 +1,6 @@
 //! `eixo validate`.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -8,6 +8,7 @@ use std::time::Duration;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::say::say;
 use crate::fmu::isolation::{self, Bounds};
 use crate::fmu::output;
 use crate::fmu::validation::{Options, validate};
@@ -130,11 +131,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Writes to the file, which appears whole or not at all, or to standard output.
 fn write(args: &Args, text: &str) -> anyhow::Result<()> {
     let Some(path) = &args.output else {
-        return match std::io::stdout().write_all(text.as_bytes()) {
-            // A pager that was closed has seen enough.
-            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-            other => Ok(other?),
-        };
+        return Ok(say!("{text}")?);
     };
     write_text(path, text.as_bytes())?;
     Ok(())
