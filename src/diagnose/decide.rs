@@ -186,6 +186,7 @@ fn further(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Tested {
     let material = |t: &Tested| unexplained_part(t, values) > 0.0;
+    let little_left = |t: &Tested| t.fitted.chi2 - values < FURTHER_OF_ALL * gap;
     let closes_more = |next: &Tested, chosen: &Tested| {
         let gain = chosen.fitted.chi2 - next.fitted.chi2;
         let rest = chosen.fitted.chi2 - values;
@@ -193,7 +194,7 @@ fn further(
     };
     let closer = |a: &Tested, b: &Tested| a.fitted.chi2.total_cmp(&b.fitted.chi2);
     let best_partner = |of: &Tested| search.one_more(of, progress).into_iter().next();
-    let first_is_most = first.fitted.chi2 - values < FURTHER_OF_ALL * gap;
+    let first_is_most = little_left(&first);
     let mut chosen = first;
     // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
     let beam = if first_is_most { 1 } else { BEAM };
@@ -222,7 +223,7 @@ fn further(
             None => return chosen,
         }
     }
-    while chosen.effects.len() < MOST && material(&chosen) {
+    while chosen.effects.len() < MOST && material(&chosen) && !little_left(&chosen) {
         match best_partner(&chosen).filter(|next| closes_more(next, &chosen)) {
             Some(next) => chosen = next,
             None => break,
