@@ -23,7 +23,7 @@ const GRAIN: f64 = 0.05;
 /// Single effects that are given a partner, the best first.
 const BEAM: usize = 3;
 /// How many times less than one effect two must leave for a third to be looked for.
-const WORTH_A_THIRD: f64 = 10.0;
+const WORTH_A_THIRD: f64 = 3.0;
 /// Most effects at once.
 const MOST: usize = 3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.

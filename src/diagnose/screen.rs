@@ -17,8 +17,6 @@ use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
 const PRIOR: f64 = 0.3;
 /// The same of the size of an effect already found: without what is missing it leans far.
 const FOUND: f64 = 1.0;
-/// What stays of a size that would change its sign and may not.
-const LITTLE: f64 = 0.1;
 /// Times its value that a parameter's off must be to be no place to shrink to.
 const OUT_OF_REACH: f64 = 1e3;
 /// Relative errors of a nominal parameter that a regression may find.
@@ -46,7 +44,7 @@ pub struct Candidate {
     pub settings: Settings,
     /// Sum of squares that the regression leaves, in units of the noise.
     pub chi2: f64,
-    /// Relative changes, beside it, of the nominal parameters and of the size of each effect already found.
+    /// Relative changes of the axis' parameters beside it.
     moves: Vec<f64>,
 }
 
@@ -61,23 +59,13 @@ impl Candidate {
         }
     }
 
-    /// The start with all that the regression moved: parameters of the axis, sizes of the effects found.
+    /// The start with the parameters of the axis moved to where the regression has them beside it.
     #[must_use]
-    pub fn moved(&self, found: &[(Effect, usize)]) -> Self {
+    pub fn moved(&self) -> Self {
         let mut moved = self.clone();
         let p = &mut moved.parameters;
-        let base = [&mut p.i1, &mut p.i2, &mut p.b, &mut p.k];
-        let errors = self.moves.len() - found.len();
-        for (value, change) in base.into_iter().zip(&self.moves[..errors]) {
+        for (value, change) in [&mut p.i1, &mut p.i2, &mut p.b, &mut p.k].into_iter().zip(&self.moves) {
             *value *= 1.0 + change;
-        }
-        for ((effect, _), change) in found.iter().zip(&self.moves[errors..]) {
-            let info = &effect.info().parameters[0];
-            let size = &mut moved.settings.of_mut(*effect)[0];
-            if info.off == 0.0 {
-                let changed = *size * (1.0 + change);
-                *size = if (info.min..=info.max).contains(&changed) { changed } else { LITTLE * *size };
-            }
         }
         moved
     }
@@ -98,8 +86,6 @@ pub struct Screen<'a> {
     remainder: Column,
     /// How many of the common columns are errors of nominal parameters.
     errors: usize,
-    /// Which of them are effects already found as a whole.
-    wholes: Vec<usize>,
     scales: Scales,
 }
 
@@ -129,13 +115,11 @@ impl<'a> Screen<'a> {
             .map(|p| responder.torques(&base_torques(*p, model, states)))
             .collect();
         let errors = common.len();
-        let mut wholes = Vec::new();
         for &(effect, variant) in found {
             let mut without = *model;
             without.effects.of_mut(effect).copy_from_slice(Settings::default().of(effect));
             let mut whole = now.clone();
             subtract(&mut whole, &run(&without), 1.0);
-            wholes.push(common.len());
             common.push(whole);
             let mut alone = Settings::default();
             alone.of_mut(effect).copy_from_slice(model.effects.of(effect));
@@ -156,7 +140,7 @@ impl<'a> Screen<'a> {
         let scales = Scales::new(model, record, states);
         let remainder = residual.clone();
         let mut screen =
-            Self { model, record, states, responder, residual, common, gram, right, remainder, errors, wholes, scales };
+            Self { model, record, states, responder, residual, common, gram, right, remainder, errors, scales };
         let (_, x) = screen.solve(&[]);
         for (column, x) in screen.common.iter().zip(&x) {
             subtract(&mut screen.remainder, column, *x);
@@ -292,7 +276,7 @@ impl<'a> Screen<'a> {
         for (value, info) in settings.of_mut(effect).iter_mut().zip(info.parameters) {
             *value = value.clamp(info.min, info.max);
         }
-        let moves = (0..self.errors).chain(self.wholes.iter().copied()).map(|i| x[i]).collect();
+        let moves = x[..self.errors].to_vec();
         let parameters = self.model.parameters;
         settings.is_on(effect).then_some(Candidate { effect, variant, parameters, settings, chi2, moves })
     }

@@ -324,12 +324,12 @@ impl Search<'_> {
         self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
 
-    /// A first look at a start, with what the regression moved beside it; where the model runs away from it (a spring
+    /// A first look at a start, beside others with the axis' parameters as the regression has them; where the model runs away from it (a spring
     /// that softens beyond its range), or comes out no better than without the effect, from the start alone, then smaller.
     fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
         let alone = beside.effects.is_empty();
         let good = |t: &Tested| t.fitted.chi2.is_finite() && (alone || t.fitted.chi2 < beside.fitted.chi2);
-        let mut starts = if alone { Vec::new() } else { vec![candidate.moved(&beside.effects)] };
+        let mut starts = if alone { Vec::new() } else { vec![candidate.moved()] };
         let mut smaller = candidate.clone();
         for _ in 0..SMALLER {
             starts.push(smaller.clone());
@@ -350,9 +350,8 @@ impl Search<'_> {
     }
 
     fn look(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {
-        let mut effects: Settings = beside.fitted.model.effects;
-        effects.of_mut(candidate.effect).copy_from_slice(candidate.settings.of(candidate.effect));
-        let model = Model { parameters: candidate.parameters, effects, ..beside.fitted.model };
+        let Candidate { parameters, settings: effects, .. } = *candidate;
+        let model = Model { parameters, effects, ..beside.fitted.model };
         // The states as measured until a model has come near them.
         let initial = if beside.effects.is_empty() { self.initial() } else { beside.fitted.initial.clone() };
         let start = Fitted { model, initial, ..beside.fitted.clone() };
