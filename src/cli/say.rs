@@ -14,12 +14,12 @@ pub fn write(text: std::fmt::Arguments<'_>) -> Result<()> {
     }
 }
 
-/// As `print!`, with the result of [`write`].
+/// As `print!`, with the result of [`write()`].
 macro_rules! say {
     ($($text:tt)*) => { $crate::cli::say::write(format_args!($($text)*)) };
 }
 
-/// As `println!`, with the result of [`write`].
+/// As `println!`, with the result of [`write()`].
 macro_rules! say_line {
     () => { $crate::cli::say::write(format_args!("\n")) };
     ($($text:tt)+) => { $crate::cli::say::write(format_args!("{}\n", format_args!($($text)+))) };
