@@ -79,7 +79,8 @@ def build(release):
     command = ["cargo", "build", "--quiet", "--locked", "--bin", "eixo"] + (["--release"] if release else [])
     print(f"$ {variables} {' '.join(command)}".replace(f"{ROOT}/", ""), flush=True)
     run(*command, cwd=ROOT, env=environment)
-    return platforms, ROOT / "target" / ("release" if release else "debug") / "eixo"
+    built = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    return platforms, built / ("release" if release else "debug") / "eixo"
 
 
 def driver(compiler, name, *arguments):
