@@ -141,9 +141,10 @@ impl Search<'_> {
         let upright = Model { parameters: self.nominal.parameters, ..leaning };
         let initial = self.initial();
         let mut screens = vec![Screen::new(&upright, self.data, &initial, &self.states, &beside.effects)];
-        let own_motion = states::of_model(self.data, &leaning, &beside.fitted.initial, &self.states);
-        if stage > 0 {
-            screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, &own_motion, &beside.effects));
+        let own_motion =
+            (stage > 0).then(|| states::of_model(self.data, &leaning, &beside.fitted.initial, &self.states));
+        if let Some(motion) = &own_motion {
+            screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, motion, &beside.effects));
         }
         let suspects: Vec<Effect> =
             self.suspects.iter().copied().filter(|e| !found.contains(e) && self.applies(*e)).collect();
