@@ -14,7 +14,7 @@ fn a_thousand_cycles_leak_nothing_and_touch_nothing_they_may_not() {
     let folder = tempfile::tempdir().unwrap();
     let package = Package::default();
     let library = folder.path().join("eixo.so");
-    std::fs::write(&library, package.library().unwrap()).unwrap();
+    std::fs::write(&library, package.binary().unwrap()).unwrap();
     let driver = folder.path().join("leaks");
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/importers/leaks.c");
     match Command::new("cc").arg("-g").arg(&source).arg("-o").arg(&driver).arg("-ldl").output() {

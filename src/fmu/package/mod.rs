@@ -130,7 +130,7 @@ impl Package {
     ///
     /// # Errors
     /// [`PackageError::Library`].
-    pub fn library(&self) -> Result<Vec<u8>, PackageError> {
+    pub fn binary(&self) -> Result<Vec<u8>, PackageError> {
         self.baked(&LIBRARIES[0])
     }
 
