@@ -119,7 +119,7 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
     let values = search.data.values() as f64;
     let given = search.as_given();
     let mut parameters = search.parameters_only(&given);
-    let mut singles = search.one_more(&Tested { effects: Vec::new(), ..parameters.clone() }, progress);
+    let mut singles = search.one_more(&Tested { effects: Vec::new(), ..parameters.clone() }, f64::INFINITY, progress);
     // Weakly determined parameters: the fit of another hypothesis may have found the way.
     if let Some(best) = singles.first() {
         let again = search.parameters_again(best);
@@ -193,7 +193,8 @@ fn further(
         better(next, chosen, values) && gain >= FURTHER * rest && counts(gain, rest, gap)
     };
     let closer = |a: &Tested, b: &Tested| a.fitted.chi2.total_cmp(&b.fitted.chi2);
-    let best_partner = |of: &Tested| search.one_more(of, progress).into_iter().next();
+    let best_partner = |of: &Tested, rival: f64| search.one_more(of, rival, progress).into_iter().next();
+    let left = |pair: &Option<Tested>| pair.as_ref().map_or(f64::INFINITY, |p| p.fitted.chi2);
     let first_is_most = little_left(&first);
     let mut chosen = first;
     // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
@@ -201,18 +202,21 @@ fn further(
     if material(&chosen) {
         let mut pair: Option<Tested> = None;
         for single in singles.iter().take(beam) {
-            pair = pair.into_iter().chain(best_partner(single)).min_by(closer);
+            let partnered = best_partner(single, left(&pair));
+            pair = pair.into_iter().chain(partnered).min_by(closer);
             if pair.as_ref().is_some_and(|p| !material(p)) {
                 break;
             }
         }
         if let Some(found) = pair.as_ref().filter(|p| material(p) && !first_is_most) {
-            // With the partner in, was the first the right one?
-            let (newest, variant) = found.effects[1];
-            let turned = best_partner(&search.only(found, newest, variant));
-            pair = pair.into_iter().chain(turned).min_by(closer);
+            // With the partner in, was the first the right one? And with the first where it is then, the partner?
+            let found = found.clone();
+            for &(kept, variant) in found.effects.iter().rev() {
+                let turned = best_partner(&search.only(&found, kept, variant), left(&pair));
+                pair = pair.into_iter().chain(turned).min_by(closer);
+            }
         }
-        match pair.filter(|p| closes_more(p, &chosen)) {
+        match pair.map(|p| search.on_the_right_sides(p)).filter(|p| closes_more(p, &chosen)) {
             Some(pair) => {
                 let closed = chosen.fitted.chi2 / pair.fitted.chi2;
                 chosen = pair;
@@ -224,7 +228,7 @@ fn further(
         }
     }
     while chosen.effects.len() < MOST && material(&chosen) && !little_left(&chosen) {
-        match best_partner(&chosen).filter(|next| closes_more(next, &chosen)) {
+        match best_partner(&chosen, f64::INFINITY).filter(|next| closes_more(next, &chosen)) {
             Some(next) => chosen = next,
             None => break,
         }

@@ -17,6 +17,10 @@ const PRIOR: f64 = 0.5;
 const SETTLED: f64 = 1e-3;
 /// Longest step of a parameter's logarithm: far off, the model's linearisation says nothing.
 const STRIDE: f64 = 1.0;
+/// Share of the cost by which two steps running must lower it to go on, in fits that explore,
+const CRAWL: f64 = 1e-3;
+/// and in fits whose likelihoods are compared.
+const CLOSE: f64 = 1e-5;
 /// Weight of the prior that ties I2, B and K together (their common factor is weakly determined; PAPER, 4.3).
 const SCALE_PRIOR: f64 = 0.3;
 
@@ -264,8 +268,12 @@ impl Problem for Shooting<'_> {
         // The derivative directions are a compile-time number: the next size up.
         match self.coordinates.len() + self.locals.len() {
             0..=8 => Some(self.linearise_with::<8>(p)),
-            9..=14 => Some(self.linearise_with::<14>(p)),
-            15..=24 => Some(self.linearise_with::<24>(p)),
+            9..=10 => Some(self.linearise_with::<10>(p)),
+            11..=12 => Some(self.linearise_with::<12>(p)),
+            13..=14 => Some(self.linearise_with::<14>(p)),
+            15..=16 => Some(self.linearise_with::<16>(p)),
+            17..=20 => Some(self.linearise_with::<20>(p)),
+            21..=24 => Some(self.linearise_with::<24>(p)),
             _ => None,
         }
     }
@@ -280,6 +288,28 @@ pub struct Effort {
     pub misfit: f64,
     /// Share of the cost below which steps are no longer worth taking.
     pub tolerance: f64,
+    /// Given up when after so many steps the sum of squares, in units of the noise, is above this.
+    pub hopeless: (usize, f64),
+}
+
+impl Effort {
+    /// To where likelihoods can be compared.
+    #[must_use]
+    pub const fn to_the_end(iterations: usize, misfit: f64) -> Self {
+        Self { iterations, misfit, tolerance: CLOSE, hopeless: (0, f64::INFINITY) }
+    }
+
+    /// To where it crawls: a fit slower than that does not reach the floor in the linearisations it has.
+    #[must_use]
+    pub const fn exploring(iterations: usize, misfit: f64) -> Self {
+        Self { tolerance: CRAWL, ..Self::to_the_end(iterations, misfit) }
+    }
+
+    /// The same, given up when after so many steps the sum of squares is above a bar.
+    #[must_use]
+    pub const fn unless(self, steps: usize, bar: f64) -> Self {
+        Self { hopeless: (steps, bar), ..self }
+    }
 }
 
 /// Fits the free numbers of `start`, and the windows' initial states from `initial`; where an effect that loops stands
@@ -338,6 +368,7 @@ pub fn fit(
     let options = Options {
         iterations: effort.iterations,
         cost: effort.tolerance,
+        hopeless: (effort.hopeless.0, 0.5 * effort.hopeless.1),
         step: 1e-9,
         gradient: 1e-9,
         stride: coordinates.iter().map(|c| if c.log { STRIDE } else { f64::INFINITY }).collect(),

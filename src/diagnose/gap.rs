@@ -12,8 +12,6 @@ use super::windows::{Initial, Window};
 
 /// Resamplings of the block bootstrap.
 const RESAMPLINGS: usize = 400;
-/// Share of the cost below which initial states are no longer moved.
-const CLOSE: f64 = 1e-5;
 /// Its seed: the interval is the same from run to run.
 const SEED: u64 = 20_060_718;
 
@@ -48,7 +46,7 @@ type Errors = Vector4<f64>;
 /// Squared errors of a model over windows whose initial states are fitted, window by window, and the initial states.
 #[must_use]
 pub fn errors(data: Data<'_>, model: &Model, initial: &[Initial]) -> (Vec<Errors>, Vec<Initial>) {
-    let fitted = fit(data, model, model, &[], initial, Effort { iterations: 12, misfit: 1.0, tolerance: CLOSE });
+    let fitted = fit(data, model, model, &[], initial, Effort::to_the_end(12, 1.0));
     let mut windows = vec![Errors::zeros(); data.windows.len()];
     for (w, k, r) in super::fit::predict(data, &fitted.model, &fitted.initial) {
         for (c, channel) in data.record.channels.iter().enumerate() {

@@ -17,15 +17,13 @@ const GLANCE: usize = 6;
 const FULL: usize = 40;
 /// Linearisations of the fit that every other is measured against.
 const LONG: usize = 120;
-/// Share of the cost by which two steps running must lower it to go on: a fit that crawls slower does not reach the
-/// floor in the linearisations it has.
-const CRAWL: f64 = 1e-3;
-/// The same for fits whose likelihoods are compared.
-const CLOSE: f64 = 1e-5;
 /// Squared residual per value up to which likelihoods are compared, not only ranked.
 const COMPARED: f64 = 3.0;
 /// Starts of an effect, each smaller than the one before, that are tried until one is good.
 const SMALLER: usize = 3;
+/// Only a start beside another whose regression leaves less than this share of what is left without it: it must close
+/// half of that to count.
+const PROMISING: f64 = 0.7;
 /// Starts looked at per effect alone,
 const STARTS: usize = 3;
 /// and beside another, from each of two places.
@@ -42,6 +40,16 @@ const BATCH: usize = 4;
 const REACHED: f64 = 1.3;
 /// or having nearly reached it.
 const REACHED_NEARLY: f64 = 1.02;
+/// An effect beside another whose regression leaves this many times the best is not looked at.
+const FAR: [f64; 2] = [f64::INFINITY, 30.0];
+/// A first look is given up where the model runs away to this many times what is left without the effect.
+const RUN_AWAY: f64 = 30.0;
+/// Steps after which that is seen.
+const BEARINGS: usize = 2;
+/// Another form of an effect that after so many steps
+const WAY: usize = 8;
+/// leaves this many times the first is given up.
+const NO_RIVAL: f64 = 1.5;
 /// An effect whose regression leaves this many times a fit at the floor is not looked at.
 const HOPELESS: f64 = 3.0;
 /// Effects that are fitted at all: the best by the regression, alone and beside another.
@@ -97,7 +105,7 @@ impl Search<'_> {
     /// The nominal model, only the windows' initial states fitted.
     #[must_use]
     pub fn as_given(&self) -> Tested {
-        let effort = Effort { iterations: FULL, misfit: 1.0, tolerance: CLOSE };
+        let effort = Effort::to_the_end(FULL, 1.0);
         self.test(&self.nominal, &[], &self.initial(), Vec::new(), effort)
     }
 
@@ -105,9 +113,9 @@ impl Search<'_> {
     #[must_use]
     pub fn parameters_only(&self, given: &Tested) -> Tested {
         let free = self.base();
-        let first = Effort { iterations: FULL / 2, misfit: self.misfit(given.fitted.chi2), tolerance: CLOSE };
+        let first = Effort::to_the_end(FULL / 2, self.misfit(given.fitted.chi2));
         let look = self.test(&self.nominal, &free, &given.fitted.initial, Vec::new(), first);
-        let long = Effort { iterations: LONG, misfit: self.misfit(look.fitted.chi2), tolerance: CLOSE };
+        let long = Effort::to_the_end(LONG, self.misfit(look.fitted.chi2));
         self.test(&look.fitted.model, &free, &look.fitted.initial, Vec::new(), long)
     }
 
@@ -131,11 +139,11 @@ impl Search<'_> {
     }
 
     /// Every effect of the library beside those of `beside`, best first: one [`Tested`] per effect, its best variant
-    /// by [`simplest`].
+    /// by [`simplest`]. Beside another, none that promises to stay far above `rival`, the sum of squares that as many
+    /// effects are known to leave.
     #[must_use]
-    pub fn one_more(&self, beside: &Tested, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
+    pub fn one_more(&self, beside: &Tested, rival: f64, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
         let stage = usize::from(!beside.effects.is_empty());
-        let found: Vec<Effect> = beside.effects.iter().map(|(e, _)| *e).collect();
         // What is missing makes the parameters lean: once from where they are known to be, once from where they lean.
         let leaning = beside.fitted.model;
         let upright = Model { parameters: self.nominal.parameters, ..leaning };
@@ -146,11 +154,60 @@ impl Search<'_> {
         if let Some(motion) = &own_motion {
             screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, motion, &beside.effects));
         }
-        let suspects: Vec<Effect> =
-            self.suspects.iter().copied().filter(|e| !found.contains(e) && self.applies(*e)).collect();
+        let screened = self.screened(beside, &screens, progress);
+        let glances = self.glances(beside, rival, &screened, progress);
+        let finalist = |rank: usize, chi2: f64| {
+            let best = glances[0].0.fitted.chi2.min(rival);
+            let near = best * if self.at_floor(best) { NEAR_THE_FLOOR } else { NEAR };
+            rank < FINALISTS[stage] && ((rank == 0 && stage == 0) || chi2 < near)
+        };
+        let firsts: Vec<Tested> = glances
+            .par_iter()
+            .enumerate()
+            .map(|(rank, (glance, candidate))| {
+                progress(candidate.effect.info().id);
+                if finalist(rank, glance.fitted.chi2) {
+                    let effects = with(beside, candidate.effect, candidate.variant);
+                    let first = self.refit(&glance.fitted, effects, self.exploring(&glance.fitted));
+                    if first.fitted.chi2.is_finite() { first } else { glance.clone() }
+                } else {
+                    glance.clone()
+                }
+            })
+            .collect();
+        let best = firsts.iter().map(|t| t.fitted.chi2).fold(rival, f64::min);
+        let mut tested: Vec<Tested> = firsts
+            .into_par_iter()
+            .zip(&glances)
+            .enumerate()
+            .map(|(rank, (first, (glance, candidate)))| {
+                // Beside another, the other forms of the best alone.
+                let worth = stage == 0 || first.fitted.chi2 <= best;
+                if worth && finalist(rank, glance.fitted.chi2) {
+                    self.best_variant(beside, first, candidate, &screens[0])
+                } else {
+                    first
+                }
+            })
+            .collect();
+        tested.retain(|t| t.fitted.chi2.is_finite() && self.swings(t));
+        tested.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+        tested
+    }
+
+    /// The starts of the effects that are looked at, those that any of the regressions ranks high first.
+    fn screened(
+        &self,
+        beside: &Tested,
+        screens: &[Screen<'_>],
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Vec<Vec<Candidate>> {
+        let stage = usize::from(!beside.effects.is_empty());
         let starts = if stage == 0 { STARTS } else { STARTS_BESIDE };
+        let missing = |e: &Effect| beside.effects.iter().all(|(found, _)| found != e);
+        let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| missing(e) && self.applies(*e)).collect();
         let mut screened: Vec<(usize, Vec<Candidate>)> = Vec::new();
-        for screen in &screens {
+        for screen in screens {
             let mut of_screen: Vec<Vec<Candidate>> = suspects
                 .iter()
                 .map(|&effect| {
@@ -175,48 +232,62 @@ impl Search<'_> {
             }
         }
         screened.sort_by_key(|(rank, _)| *rank);
-        let mut screened: Vec<Vec<Candidate>> = screened.into_iter().map(|(_, starts)| starts).collect();
         screened.truncate(LOOKED_AT[stage]);
-        // The regression's favourites first; when they reach the floor, the others need not be looked at.
+        screened.into_iter().map(|(_, starts)| starts).collect()
+    }
+
+    /// A first look at each effect from its best start, best first. The regression's favourites are looked at first: when
+    /// they reach the floor, or come far below what the others promise, these need not be looked at.
+    fn glances(
+        &self,
+        beside: &Tested,
+        rival: f64,
+        screened: &[Vec<Candidate>],
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Vec<(Tested, Candidate)> {
+        let stage = usize::from(!beside.effects.is_empty());
         let mut glances: Vec<(Tested, Candidate)> = Vec::new();
         for batch in screened.chunks(BATCH) {
-            let best = glances.iter().map(|g| g.0.fitted.chi2).fold(f64::INFINITY, f64::min);
+            let best = glances.iter().map(|g| g.0.fitted.chi2).fold(rival, f64::min);
             let promised = batch.iter().flatten().map(|c| c.chi2).fold(f64::INFINITY, f64::min);
-            if best < REACHED * self.data.values() as f64 && promised > HOPELESS * best {
+            let bar = best * if self.at_floor(best) { HOPELESS } else { FAR[stage] };
+            if promised > bar {
                 break;
             }
             glances.par_extend(batch.par_iter().flat_map_iter(|starts| {
                 progress(starts[0].effect.info().id);
-                starts
-                    .iter()
-                    .map(|c| (self.glance(beside, c), c.clone()))
-                    .min_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2))
+                self.best_glance(beside, starts)
             }));
         }
         glances.sort_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2));
-        let best = glances.first().map_or(0.0, |g| g.0.fitted.chi2);
-        let near = best * if best < REACHED * self.data.values() as f64 { NEAR_THE_FLOOR } else { NEAR };
-        let mut tested: Vec<Tested> = glances
-            .par_iter()
-            .enumerate()
-            .map(|(rank, (glance, candidate))| {
-                progress(candidate.effect.info().id);
-                if rank < FINALISTS[stage] && (rank < 1 || glance.fitted.chi2 < near) {
-                    self.best_variant(beside, glance, candidate, &screens[0])
-                } else {
-                    glance.clone()
-                }
-            })
-            .collect();
-        tested.retain(|t| t.fitted.chi2.is_finite() && self.swings(t));
-        tested.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
-        tested
+        glances
     }
 
-    /// Takes an effect to its minimum in the form it was looked at, then tries its other forms from there.
-    fn best_variant(&self, beside: &Tested, glance: &Tested, candidate: &Candidate, screen: &Screen<'_>) -> Tested {
+    /// The best of an effect's starts; one whose regression leaves far more than another's first look is not looked at.
+    fn best_glance(&self, beside: &Tested, starts: &[Candidate]) -> Option<(Tested, Candidate)> {
+        let mut starts: Vec<&Candidate> = starts.iter().collect();
+        starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        let mut best: Option<(Tested, Candidate)> = None;
+        for start in starts {
+            let so_far = best.as_ref().map_or(f64::INFINITY, |(t, _)| t.fitted.chi2);
+            if start.chi2 > HOPELESS * so_far {
+                break;
+            }
+            let glance = self.glance(beside, start);
+            if best.is_none() || glance.fitted.chi2 < so_far {
+                best = Some((glance, start.clone()));
+            }
+        }
+        best
+    }
+
+    fn at_floor(&self, chi2: f64) -> bool {
+        chi2 < REACHED * self.data.values() as f64
+    }
+
+    /// The best of an effect's forms, tried from the minimum of the `first`, in which it was looked at.
+    fn best_variant(&self, beside: &Tested, first: Tested, candidate: &Candidate, screen: &Screen<'_>) -> Tested {
         let effect = candidate.effect;
-        let first = self.refit(beside, &glance.fitted, effect, candidate.variant, FULL);
         let values = self.data.values() as f64;
         let mut forms = vec![first];
         for (variant, form) in effect.info().variants.iter().enumerate() {
@@ -237,14 +308,15 @@ impl Search<'_> {
                     let mut model = forms[0].fitted.model;
                     model.effects.of_mut(effect).copy_from_slice(settings.of(effect));
                     let start = Fitted { model, ..forms[0].fitted.clone() };
-                    self.refit(beside, &start, effect, variant, FULL)
+                    let effort = self.exploring(&start).unless(WAY, NO_RIVAL * start.chi2);
+                    self.refit(&start, with(beside, effect, variant), effort)
                 })
                 .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
             forms.extend(best);
         }
         forms.retain(|t| t.fitted.chi2.is_finite());
         forms.sort_by_key(|t| t.freedom);
-        if forms.is_empty() { glance.clone() } else { simplest(&forms, values).clone() }
+        simplest(&forms, values).clone()
     }
 
     /// Whether the effect can act on this axis and be fitted: a rigid axis has no coupling; rounding has no derivative
@@ -276,7 +348,7 @@ impl Search<'_> {
     #[must_use]
     pub fn parameters_again(&self, from: &Tested) -> Tested {
         let start = Model { effects: self.nominal.effects, ..from.fitted.model };
-        let effort = Effort { iterations: LONG, misfit: self.misfit(from.fitted.chi2), tolerance: CLOSE };
+        let effort = Effort::to_the_end(LONG, self.misfit(from.fitted.chi2));
         self.test(&start, &self.base(), &from.fitted.initial, Vec::new(), effort)
     }
 
@@ -298,8 +370,36 @@ impl Search<'_> {
                 start.effects.of_mut(*effect).copy_from_slice(self.nominal.effects.of(*effect));
             }
         }
-        let effort = Effort { iterations: FULL, misfit: self.misfit(combination.fitted.chi2), tolerance: CLOSE };
-        self.test(&start, &self.free(keep), &combination.fitted.initial, keep.to_vec(), effort)
+        let from = Fitted { model: start, ..combination.fitted.clone() };
+        self.refit(&from, keep.to_vec(), self.exploring(&from))
+    }
+
+    /// The combination with its effects, one after the other, on the other side of the coupling, where that leaves less:
+    /// two effects settle beside each other before either has found its side.
+    #[must_use]
+    pub fn on_the_right_sides(&self, combination: Tested) -> Tested {
+        let mut best = combination;
+        for i in 0..best.effects.len() {
+            let (effect, variant) = best.effects[i];
+            let known = best.ids();
+            let twins =
+                self.suspects.iter().copied().filter(|t| effect.is_twin_of(*t) && !known.contains(&t.info().id));
+            let swapped = twins
+                .map(|twin| {
+                    let mut effects = best.effects.clone();
+                    effects[i] = (twin, variant);
+                    let mut start = best.fitted.model;
+                    start.effects.of_mut(twin).copy_from_slice(best.fitted.model.effects.of(effect));
+                    start.effects.of_mut(effect).copy_from_slice(self.nominal.effects.of(effect));
+                    let from = Fitted { model: start, ..best.fitted.clone() };
+                    self.refit(&from, effects, self.exploring(&from).unless(BEARINGS, RUN_AWAY * from.chi2))
+                })
+                .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+            if let Some(swapped) = swapped.filter(|s| s.fitted.chi2 < best.fitted.chi2) {
+                best = swapped;
+            }
+        }
+        best
     }
 
     fn free(&self, effects: &[(Effect, usize)]) -> Vec<Free> {
@@ -310,18 +410,21 @@ impl Search<'_> {
         free
     }
 
-    fn refit(&self, beside: &Tested, from: &Fitted, effect: Effect, variant: usize, iterations: usize) -> Tested {
-        let effects: Vec<(Effect, usize)> = beside.effects.iter().copied().chain([(effect, variant)]).collect();
-        let effort = Effort { iterations, misfit: self.misfit(from.chi2), tolerance: CRAWL };
+    /// Fits a combination from where another fit stands; near the floor, to where its likelihood can be compared.
+    fn refit(&self, from: &Fitted, effects: Vec<(Effect, usize)>, effort: Effort) -> Tested {
         let tested = self.test(&from.model, &self.free(&effects), &from.initial, effects, effort);
         let compared = tested.fitted.chi2 < COMPARED * self.data.values() as f64;
-        if iterations > GLANCE && compared { self.closely(&tested) } else { tested }
+        if compared { self.closely(&tested) } else { tested }
+    }
+
+    fn exploring(&self, from: &Fitted) -> Effort {
+        Effort::exploring(FULL, self.misfit(from.chi2))
     }
 
     /// A fit taken on from where it stands, to where likelihoods can be compared.
     #[must_use]
     pub fn closely(&self, from: &Tested) -> Tested {
-        let effort = Effort { iterations: FULL, misfit: self.misfit(from.fitted.chi2), tolerance: CLOSE };
+        let effort = Effort::to_the_end(FULL, self.misfit(from.fitted.chi2));
         self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
 
@@ -331,14 +434,16 @@ impl Search<'_> {
         let alone = beside.effects.is_empty();
         let good = |t: &Tested| t.fitted.chi2.is_finite() && (alone || t.fitted.chi2 < beside.fitted.chi2);
         let mut starts = if alone { Vec::new() } else { vec![candidate.moved()] };
-        let mut smaller = candidate.clone();
-        for _ in 0..SMALLER {
-            starts.push(smaller.clone());
-            smaller.shrink();
+        if alone || candidate.chi2 < PROMISING * beside.fitted.chi2 {
+            let mut smaller = candidate.clone();
+            for _ in 0..SMALLER {
+                starts.push(smaller.clone());
+                smaller.shrink();
+            }
         }
         let mut best: Option<Tested> = None;
         for start in &starts {
-            let tested = self.look(beside, start, GLANCE);
+            let tested = self.look(beside, start);
             let better = best.as_ref().is_none_or(|b| !b.fitted.chi2.is_finite() || tested.fitted.chi2 < b.fitted.chi2);
             if better {
                 best = Some(tested);
@@ -350,14 +455,21 @@ impl Search<'_> {
         best.unwrap_or_else(|| beside.clone())
     }
 
-    fn look(&self, beside: &Tested, candidate: &Candidate, iterations: usize) -> Tested {
-        let Candidate { parameters, settings: effects, .. } = *candidate;
+    fn look(&self, beside: &Tested, candidate: &Candidate) -> Tested {
+        let Candidate { effect, variant, parameters, settings: effects, .. } = *candidate;
         let model = Model { parameters, effects, ..beside.fitted.model };
         // The states as measured until a model has come near them.
         let initial = if beside.effects.is_empty() { self.initial() } else { beside.fitted.initial.clone() };
         let start = Fitted { model, initial, ..beside.fitted.clone() };
-        self.refit(beside, &start, candidate.effect, candidate.variant, iterations)
+        let effort = Effort::exploring(GLANCE, self.misfit(start.chi2)).unless(BEARINGS, RUN_AWAY * beside.fitted.chi2);
+        let effects = with(beside, effect, variant);
+        self.test(&start.model, &self.free(&effects), &start.initial, effects, effort)
     }
+}
+
+/// The effects of a hypothesis and one more.
+fn with(beside: &Tested, effect: Effect, variant: usize) -> Vec<(Effect, usize)> {
+    beside.effects.iter().copied().chain([(effect, variant)]).collect()
 }
 
 /// The settings with the parameters that a form does not free put back.

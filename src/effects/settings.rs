@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::info::{Place, Role};
+use super::info::{Place, Role, Variant};
 use super::input::{Ramp, TorqueHistory};
 use super::sensor::{Reading, SensorHistory};
 use super::shapes::{Base, Moment, Motion, Reaction};
@@ -62,6 +62,17 @@ impl Effect {
     /// If there is none.
     pub fn from_id(id: &str) -> Result<Self, UnknownEffect> {
         EFFECTS.iter().copied().find(|e| e.info().id == id).ok_or_else(|| UnknownEffect { name: id.to_owned() })
+    }
+
+    /// Whether the other is the same effect on the other side of the coupling: same family, same parameters and variants.
+    #[must_use]
+    pub fn is_twin_of(self, other: Self) -> bool {
+        let (own, its) = (self.info(), other.info());
+        let alike = |a: &[Variant], b: &[Variant]| a.iter().map(|v| v.name).eq(b.iter().map(|v| v.name));
+        own.family == its.family
+            && own.place != its.place
+            && own.parameters.iter().map(|p| p.name).eq(its.parameters.iter().map(|p| p.name))
+            && alike(own.variants, its.variants)
     }
 
     /// Index of a parameter of that name.

@@ -94,6 +94,8 @@ pub struct Options {
     pub step: f64,
     /// Stop when no parameter's gradient is larger than this times `|r|*|J_j|`: the cosine of their angle.
     pub gradient: f64,
+    /// Give up when the cost is above this after so many steps.
+    pub hopeless: (usize, f64),
     /// First damping, relative to the scaled curvature.
     pub damping: f64,
     /// Longest step of each parameter, n; empty: none.
@@ -111,6 +113,7 @@ impl Default for Options {
             cost: 1e-12,
             step: 1e-10,
             gradient: 1e-10,
+            hopeless: (0, f64::INFINITY),
             damping: 1e-3,
             stride: Vec::new(),
             lower: Vec::new(),
@@ -133,6 +136,8 @@ pub enum Termination {
     Exact,
     /// The limit of iterations was reached: the result is the best point so far.
     Iterations,
+    /// Given up: [`Options::hopeless`].
+    Hopeless,
     /// No damping makes the cost fall though the gradient is not zero: the derivatives and the cost disagree.
     NoProgress,
     /// The problem could not be evaluated at the start.
@@ -305,6 +310,9 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 normal = next;
                 iterations += 1;
                 problem.progress(iterations, normal.cost, &p);
+                if iterations == options.hopeless.0 && normal.cost > options.hopeless.1 {
+                    break Termination::Hopeless;
+                }
                 // A step that the damping holds short promises little wherever it stands.
                 let little = brought.max(promised) <= options.cost * before && damping <= HELD_SHORT;
                 calm = if little { calm + 1 } else { 0 };
