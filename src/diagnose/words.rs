@@ -20,6 +20,10 @@ pub fn fill(d: &mut Diagnosis, decision: &Decision) {
             let names: Vec<String> = d.causes.iter().map(|c| describe(&c.id, &c.place)).collect();
             format!("{}: {} of the gap on held-out data closes with it.", names.join(", and "), percent(d.gap.closure))
         }
+        Verdict::Unexplained if only_rounding(d, decision) => {
+            "Unexplained: what is left is the rounding of the readings, which is not among the effects that may be named."
+                .to_owned()
+        }
         Verdict::Unexplained => {
             let nearest = d.ranking.first().map_or_else(String::new, |r| {
                 format!(" The nearest, {}, closes {}.", r.id, percent(r.closure_holdout))
@@ -34,6 +38,11 @@ pub fn fill(d: &mut Diagnosis, decision: &Decision) {
         }
     }
     d.next_experiment = next(d, decision);
+}
+
+/// Whether the record is at its floor, and the floor no noise.
+fn only_rounding(d: &Diagnosis, decision: &Decision) -> bool {
+    d.verdict == Verdict::Unexplained && decision.verdict != Verdict::Unexplained
 }
 
 fn describe(id: &str, place: &str) -> String {
@@ -53,6 +62,7 @@ fn next(d: &Diagnosis, decision: &Decision) -> String {
     let text = match d.verdict {
         Verdict::NoGap => "None needed: drive the axis harder or over more of its travel to look for smaller effects.",
         Verdict::Parameters => "Put the fitted parameters into axis.toml and diagnose a second record.",
+        Verdict::Unexplained if only_rounding(d, decision) => "Log the positions with a finer step.",
         Verdict::Unexplained => {
             "Repeat the record at half and at twice the amplitude with an odd multisine (eixo excite --kind odd): even \
              lines that light up tell asymmetry and offsets, odd ones friction and play; a fixed frequency that stays \

@@ -150,7 +150,7 @@ fn verdict(f: &Findings) -> Verdict {
                 "none" | "" => "at no single place".to_owned(),
                 place => format!("at the {place}"),
             };
-            let nearest = d.ranking.first().map_or_else(String::new, |r| {
+            let nearest = d.ranking.first().filter(|r| r.id != "no_gap").map_or_else(String::new, |r| {
                 format!("The nearest, {}, closes {} of it. ", lower(&title(&r.id)), percent(r.closure_holdout))
             });
             (
