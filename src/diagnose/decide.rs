@@ -7,7 +7,7 @@ use crate::effects::Effect;
 
 /// Difference of BIC that an effect must bring over a simpler hypothesis: odds of 400 to 1, which also pays for the
 /// number of effects and starts that were looked at.
-const DECISIVE: f64 = 12.0;
+pub const DECISIVE: f64 = 12.0;
 /// Difference of BIC below which two hypotheses count as confusable.
 const CONFUSABLE: f64 = 10.0;
 /// Squared residual per value up to which a fit counts as at the floor: the floor itself is an estimate.

@@ -373,3 +373,29 @@ impl ActiveEffects {
         self.sensors.as_slice()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twins_are_the_same_effect_on_the_two_sides_of_the_coupling() {
+        let twins: Vec<[&str; 2]> = EFFECTS
+            .iter()
+            .flat_map(|a| EFFECTS.iter().map(move |b| (a, b)))
+            .filter(|(a, b)| a.is_twin_of(**b) && a.info().place < b.info().place)
+            .map(|(a, b)| [a.info().id, b.info().id])
+            .collect();
+        // The pairs of DESIGN's table that differ in their place alone.
+        let mut expected = [
+            ["coulomb_motor", "coulomb_table"],
+            ["viscous_motor", "viscous_table"],
+            ["presliding_motor", "presliding_table"],
+            ["load_motor", "load_table"],
+        ];
+        let mut found = twins.clone();
+        found.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+    }
+}

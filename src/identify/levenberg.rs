@@ -380,6 +380,18 @@ mod tests {
     }
 
     #[test]
+    fn a_fit_that_stays_above_its_bar_is_given_up_and_one_below_it_goes_on() {
+        let start = DVector::from_vec(vec![-1.2, 1.0]);
+        let after_two =
+            |bar: f64| minimise(&rosenbrock(), &start, &Options { hopeless: (2, bar), ..Options::default() });
+        // Rosenbrock's cost at the start is 12.1; the valley is reached in a step, its end in some fifteen.
+        let given_up = after_two(1e-3);
+        assert_eq!((given_up.termination, given_up.iterations), (Termination::Hopeless, 2));
+        assert!(given_up.cost < 12.1 && !given_up.termination.is_converged());
+        assert!(after_two(12.1).termination.is_converged());
+    }
+
+    #[test]
     fn a_bound_holds_and_the_minimum_on_it_is_found() {
         let options = Options { upper: vec![0.5, f64::INFINITY], ..Options::default() };
         let report = minimise(&rosenbrock(), &DVector::from_vec(vec![-1.2, 1.0]), &options);

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::data::{Lines, is_linear};
 use super::fit::{Hypothesis, cost_of_noise, fit, standard_errors, together};
 use crate::axis::{Parameters, Structure};
+use crate::diagnose::decide::DECISIVE;
 use crate::diagnose::model::{BaseParameter, Free, Model};
 use crate::effects::Effect;
 
@@ -13,8 +14,6 @@ const GLANCE: usize = 12;
 const FULL: usize = 80;
 /// Starts that are taken to the end.
 const FINALISTS: usize = 2;
-/// Difference of BIC that a cause must bring: as in the decision in time.
-const DECISIVE: f64 = 12.0;
 /// Share of the gap within which two causes close alike: what a model leaves on a real machine is no noise of a known
 /// law, and a tenth of the gap one way or the other is no evidence.
 const ALIKE: f64 = 0.1;
