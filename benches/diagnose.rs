@@ -6,6 +6,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+#[path = "../tests/program/memory.rs"]
+mod memory;
+
 /// A hidden effect of the paper's axis by a parameter that switches it on.
 const HIDDEN: [(&str, &str); 4] = [
     ("coulomb_motor", "coulomb_motor.level=0.004"),
@@ -26,11 +29,11 @@ fn main() {
     for (name, set) in HIDDEN {
         record(at, 4, set);
         let (took, peak) = diagnose(at);
-        println!("{name:<16} 8192 samples: {:6.2} s, peak {:4} MB", took.as_secs_f64(), peak / 1024);
+        println!("{name:<16} 8192 samples: {:6.2} s, peak {:4} MB", took.as_secs_f64(), peak >> 20);
     }
     record(at, 489, HIDDEN[0].1);
     let (took, peak) = diagnose(at);
-    println!("{:<16} 1 001 472 samples: {:6.2} s, peak {:4} MB", HIDDEN[0].0, took.as_secs_f64(), peak / 1024);
+    println!("{:<16} 1 001 472 samples: {:6.2} s, peak {:4} MB", HIDDEN[0].0, took.as_secs_f64(), peak >> 20);
 }
 
 fn record(at: &Path, periods: usize, set: &str) {
@@ -46,23 +49,11 @@ fn eixo(at: &Path, args: &[&str]) {
     assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Wall time, and the largest memory in kB that the kernel tells while the program runs.
+/// Wall time, and the largest memory, bytes.
 fn diagnose(at: &Path) -> (Duration, u64) {
     let begin = Instant::now();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_eixo"))
-        .current_dir(at)
-        .args(["diagnose", "y.csv", "--axis", "axis.toml", "--json", "diagnosis.json"])
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .expect("eixo runs");
-    let status = format!("/proc/{}/status", child.id());
-    let mut peak = 0;
-    while child.try_wait().expect("a child of ours").is_none() {
-        let told = std::fs::read_to_string(&status).unwrap_or_default();
-        let line = told.lines().find(|l| l.starts_with("VmHWM:")).and_then(|l| l.split_whitespace().nth(1));
-        peak = peak.max(line.and_then(|kb| kb.parse().ok()).unwrap_or(0));
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let mut program = Command::new(env!("CARGO_BIN_EXE_eixo"));
+    program.current_dir(at).args(["diagnose", "y.csv", "--axis", "axis.toml", "--json", "diagnosis.json"]);
+    let (_, peak) = memory::peak(&mut program);
     (begin.elapsed(), peak)
 }

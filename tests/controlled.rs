@@ -3,24 +3,17 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use serde_json::Value;
+
+#[path = "program/run.rs"]
+mod run;
+
+use run::{eixo, fine};
 
 const AXIS: &str = "structure = \"rigid\"\n[parameters]\nI1 = 2.4e-4\nrho = 3.18e-4\n[controller]\nreference = \"reference\"\n\
                     kp = 20\nkv = 0.02\nki = 0.1\nvelocity_forward = 1\nlimit = 0.2\n";
 const FRICTION: &str = "[effects.coulomb_motor]\nlevel = 0.004\n";
-
-fn eixo(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_eixo")).args(args).output().unwrap()
-}
-
-#[track_caller]
-fn fine(args: &[&str]) -> String {
-    let done = eixo(args);
-    assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
-    String::from_utf8_lossy(&done.stdout).into_owned()
-}
 
 fn file(folder: &Path, name: &str, text: &str) -> String {
     let path = folder.join(name);

@@ -1,11 +1,11 @@
 //! `eixo demo` and `eixo circle` as a user runs them.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn eixo(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_eixo")).args(arguments).current_dir(folder).output().expect("eixo runs")
-}
+#[path = "program/run.rs"]
+mod run;
+
+use run::eixo_in;
 
 fn text(folder: &Path, file: &str) -> String {
     std::fs::read_to_string(folder.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
@@ -14,7 +14,7 @@ fn text(folder: &Path, file: &str) -> String {
 #[test]
 fn the_demonstration_ends_in_reports_with_the_papers_figures_and_the_hidden_cause() {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = eixo(&["demo", "-o", "out"], folder.path());
+    let output = eixo_in(folder.path(), &["demo", "-o", "out"]);
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
     assert!(said.contains("Every method finds the parameters of the FMU again from its trace."), "{said}");
@@ -49,7 +49,7 @@ fn the_demonstration_ends_in_reports_with_the_papers_figures_and_the_hidden_caus
 fn a_folder_that_cannot_be_made_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("file"), "").expect("a file");
-    let output = eixo(&["demo", "-o", "file/out"], folder.path());
+    let output = eixo_in(folder.path(), &["demo", "-o", "file/out"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("file/out"));
 }
@@ -60,13 +60,13 @@ fn the_circular_test_names_what_acts_on_the_axes_and_refuses_nonsense() {
     let axis = "name = \"X\"\n[parameters]\nI1 = 2.37e-4\nI2 = 6.07e-6\nB = 5.4e-4\nK = 1.76e-2\nrho = 3.18e-4\n\
                 [effects.coulomb_motor]\nlevel = 0.004\n";
     std::fs::write(folder.path().join("x.toml"), axis).expect("a file");
-    let output = eixo(&["circle", "x.toml", "--report", "c.html", "-o", "c.csv"], folder.path());
+    let output = eixo_in(folder.path(), &["circle", "x.toml", "--report", "c.html", "-o", "c.csv"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(said.contains("coulomb_motor on X and Y") && said.contains("peak at +X"), "{said}");
     assert!(text(folder.path(), "c.html").contains("Axes with their effects: radial deviation, magnified"));
     assert!(text(folder.path(), "c.csv").starts_with("x [m],y [m]\n"));
-    let output = eixo(&["circle", "--feed", "0"], folder.path());
+    let output = eixo_in(folder.path(), &["circle", "--feed", "0"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("feed"));
 }

@@ -2,16 +2,14 @@
 //! is a row that says why, and a drift that was put in comes out.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 #[path = "fleet/machines.rs"]
 mod machines;
+#[path = "program/run.rs"]
+mod run;
 
 use machines::machines;
-
-fn eixo(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_eixo")).args(arguments).current_dir(folder).output().expect("eixo")
-}
+use run::eixo_in;
 
 fn read(path: impl AsRef<Path>) -> Vec<u8> {
     std::fs::read(path.as_ref()).unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
@@ -36,7 +34,7 @@ fn outputs(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 fn a_fleet_is_diagnosed_the_same_in_one_run_in_parts_and_after_an_interruption() {
     let root = tempfile::tempdir().unwrap();
     machines(root.path());
-    let whole = eixo(&["diagnose", "machines", "--output", "one", "--jobs", "1"], root.path());
+    let whole = eixo_in(root.path(), &["diagnose", "machines", "--output", "one", "--jobs", "1"]);
     let (out, err) = (String::from_utf8_lossy(&whole.stdout), String::from_utf8_lossy(&whole.stderr));
     // Findings: two of the eight could not be used.
     assert_eq!(whole.status.code(), Some(1), "{out}{err}");
@@ -78,14 +76,14 @@ fn a_fleet_is_diagnosed_the_same_in_one_run_in_parts_and_after_an_interruption()
     assert!(index.contains("&lt;img src=x onerror=alert(1)&gt;") && !index.contains("<img"), "a column's name is text");
 
     // In parts, in another order, with two at a time; then put together.
-    let listed = eixo(&["diagnose", "machines", "--output", "two", "--list"], root.path());
+    let listed = eixo_in(root.path(), &["diagnose", "machines", "--output", "two", "--list"]);
     let mut listed: Vec<String> = String::from_utf8(listed.stdout).unwrap().lines().map(str::to_owned).collect();
     assert_eq!(listed.len(), 8);
     listed.reverse();
     for pair in listed[..6].chunks(2) {
         let mut arguments = vec!["diagnose", "machines", "--output", "two", "--jobs", "2"];
         arguments.extend(pair.iter().flat_map(|trace| ["--part", trace]));
-        eixo(&arguments, root.path());
+        eixo_in(root.path(), &arguments);
         assert!(!root.path().join("two/summary.csv").exists());
     }
     // As after an interruption: a result without its report, and one cut off half way, are made again.
@@ -94,7 +92,7 @@ fn a_fleet_is_diagnosed_the_same_in_one_run_in_parts_and_after_an_interruption()
     std::fs::write(root.path().join("two").join(&result.0), &result.1[..result.1.len() / 2]).unwrap();
     let page = folder.iter().find(|(p, _)| p.starts_with("reports")).unwrap();
     std::fs::remove_file(root.path().join("two").join(&page.0)).unwrap();
-    let rest = eixo(&["diagnose", "machines", "--output", "two"], root.path());
+    let rest = eixo_in(root.path(), &["diagnose", "machines", "--output", "two"]);
     assert_eq!(rest.status.code(), Some(1));
     let err = String::from_utf8_lossy(&rest.stderr);
     assert!(err.contains(" of 8 traces were done by an earlier run"), "{err}");
@@ -107,13 +105,13 @@ fn a_fleet_is_diagnosed_the_same_in_one_run_in_parts_and_after_an_interruption()
 
     // Nothing is done twice; another option does it again.
     let again = ["diagnose", "machines", "--output", "two", "--summary", "machines/again.parquet"];
-    let again = eixo(&again, root.path());
+    let again = eixo_in(root.path(), &again);
     assert!(String::from_utf8_lossy(&again.stderr).contains("8 of 8 traces were done by an earlier run"));
     let table = eixo::trace::Table::read(&root.path().join("machines/again.parquet")).unwrap();
     assert_eq!(table.rows(), 8);
     assert_eq!(table.headers[table.position("K").unwrap()].unit.as_deref(), Some("N.m/rad"));
     let once_more = ["diagnose", "machines", "--output", "two", "--summary", "machines/again.parquet"];
-    let said = eixo(&once_more, root.path());
+    let said = eixo_in(root.path(), &once_more);
     assert!(String::from_utf8_lossy(&said.stderr).contains("8 of 8 traces"), "the summary is no trace");
 }
 
@@ -125,7 +123,7 @@ fn a_fleet_is_identified_with_one_axis_file_a_folder_a_machine() {
     let pattern = format!("{}/*/*-1?.csv", folder.display());
     let first = folder.join("press/2026-03-09.csv");
     let arguments = ["identify", &pattern, &first.display().to_string(), "--axis", &axis.display().to_string()];
-    let run = eixo(&[&arguments[..], &["--method", "oe", "--output", "found"]].concat(), root.path());
+    let run = eixo_in(root.path(), &[&arguments[..], &["--method", "oe", "--output", "found"]].concat());
     assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
     let summary = String::from_utf8(read(root.path().join("found/summary.csv"))).unwrap();
     let machines: Vec<&str> = summary.lines().skip(1).filter_map(|l| l.split(',').next()).collect();
@@ -138,7 +136,7 @@ fn what_cannot_be_run_says_what_is_missing() {
     let root = tempfile::tempdir().unwrap();
     let folder = machines(root.path());
     let says = |arguments: &[&str], what: &str| {
-        let run = eixo(arguments, &folder);
+        let run = eixo_in(&folder, arguments);
         let err = String::from_utf8_lossy(&run.stderr).into_owned();
         assert_eq!(run.status.code(), Some(2), "{err}");
         assert!(err.contains(what), "{err}");

@@ -3,15 +3,16 @@
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use eixo::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use eixo::effects::Settings;
 use eixo::trace::{Mapping, Motion, Signal, Trace, load, write_csv};
 
-fn eixo(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_eixo")).args(arguments).output().expect("the program starts")
-}
+#[path = "program/run.rs"]
+mod run;
+
+use run::eixo;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

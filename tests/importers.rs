@@ -5,6 +5,11 @@
 use std::path::Path;
 use std::process::Command;
 
+#[path = "program/run.rs"]
+mod run;
+
+use run::fine;
+
 #[test]
 fn other_importers_give_the_harnesss_trace() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -15,18 +20,14 @@ fn other_importers_give_the_harnesss_trace() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).into_os_string().into_string().unwrap();
-    let eixo = |args: &[&str]| {
-        let done = Command::new(env!("CARGO_BIN_EXE_eixo")).args(args).output().unwrap();
-        assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
-    };
     let (fmu, input) = (path("axis.fmu"), path("u.csv"));
-    eixo(&["export", &fmu]);
+    fine(&["export", &fmu]);
     // Half a millisecond: a whole number of libcosim's nanoseconds.
-    eixo(&["excite", "-o", &input, "--samples", "2000", "--dt", "0.0005"]);
+    fine(&["excite", "-o", &input, "--samples", "2000", "--dt", "0.0005"]);
     for settings in [&[][..], &["coulomb_motor.level=0.008", "backlash.half_gap=0.01", "delay.time=0.0012"]] {
         let trace = path("trace.csv");
         let sets: Vec<&str> = settings.iter().flat_map(|s| ["--set", s]).collect();
-        eixo(&[&["simulate", &fmu, "-i", &input, "-o", &trace, "--step-end"][..], &sets].concat());
+        fine(&[&["simulate", &fmu, "-i", &input, "-o", &trace, "--step-end"][..], &sets].concat());
         let done = Command::new(&python)
             .arg(root.join("scripts/importers.py"))
             .args([&fmu, &trace])

@@ -4,6 +4,9 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
+#[path = "program/memory.rs"]
+mod memory;
+
 /// A record of so many rows: a table of 1000 rows of a motion in closed form, time after time.
 fn long(path: &Path, rows: usize) {
     let mut file = std::io::BufWriter::new(std::fs::File::create(path).expect("the file"));
@@ -30,30 +33,13 @@ fn long(path: &Path, rows: usize) {
     }
 }
 
-/// Largest resident memory of `eixo identify --stream`, bytes: the last that the kernel says before the process ends.
+/// Largest resident memory of `eixo identify --stream`, bytes.
 fn peak(path: &Path) -> u64 {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_eixo"))
-        .args(["identify", "--stream", "--method", "ls,rls"])
-        .arg(path)
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .expect("eixo");
-    let status = format!("/proc/{}/status", child.id());
-    let mut peak = 0;
-    loop {
-        let text = std::fs::read_to_string(&status).unwrap_or_default();
-        let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-        if let Some(kib) = line.and_then(|l| l.trim().strip_suffix("kB")).and_then(|n| n.trim().parse::<u64>().ok()) {
-            peak = peak.max(kib << 10);
-        }
-        if let Some(ended) = child.try_wait().expect("the process") {
-            // Fine, or findings: a record made up in closed form is no axis.
-            assert!(matches!(ended.code(), Some(0 | 1)), "{ended}");
-            return peak;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    let mut program = Command::new(env!("CARGO_BIN_EXE_eixo"));
+    let (ended, peak) = memory::peak(program.args(["identify", "--stream", "--method", "ls,rls"]).arg(path));
+    // Fine, or findings: a record made up in closed form is no axis.
+    assert!(matches!(ended.code(), Some(0 | 1)), "{ended}");
+    peak
 }
 
 #[test]

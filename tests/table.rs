@@ -3,20 +3,14 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
+
+#[path = "program/run.rs"]
+mod run;
+
+use run::{eixo, fine};
 
 const AXIS: &str = "[parameters]\nI1 = 2.37e-4\nI2 = 6.07e-6\nB = 5.4e-4\nK = 1.76e-2\nrho = 3.18e-4\n";
-
-fn eixo(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_eixo")).args(args).output().unwrap()
-}
-
-#[track_caller]
-fn fine(args: &[&str]) -> String {
-    let done = eixo(args);
-    assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
-    String::from_utf8_lossy(&done.stdout).into_owned()
-}
 
 #[test]
 fn other_tools_draw_the_circle_of_eixo_circle_with_the_exported_table() {
