@@ -13,6 +13,7 @@ mod lines;
 pub mod location;
 mod model;
 mod noise;
+mod one_more;
 mod record;
 mod response;
 mod screen;
