@@ -14,6 +14,9 @@ const CONFUSABLE: f64 = 10.0;
 const AT_FLOOR: f64 = 1.1;
 /// Share of the gap that a single effect must close to be named while a remainder stays.
 const CLOSES: f64 = 0.95;
+/// Squared residual per value above the floor, of an effect that closes the gap, in which no further effect is looked for:
+/// its error would be below the noise.
+const BELOW_NOISE: f64 = 0.5;
 /// Share of the remainder that a further effect must close.
 const FURTHER: f64 = 0.5;
 /// Share of the whole gap that a further effect must close.
@@ -119,12 +122,24 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
     let values = search.data.values() as f64;
     let given = search.as_given();
     let mut parameters = search.parameters_only(&given);
-    let mut singles = search.one_more(&Tested { effects: Vec::new(), ..parameters.clone() }, f64::INFINITY, progress);
+    let alone = |parameters: &Tested, rival: f64| {
+        let none = Tested { effects: Vec::new(), ..parameters.clone() };
+        search.one_more(&none, rival, progress)
+    };
+    let mut singles = alone(&parameters, f64::INFINITY);
     // Weakly determined parameters: the fit of another hypothesis may have found the way.
+    let best = |singles: &[Tested]| singles.first().map_or(0.0, |t| t.fitted.chi2);
     if let Some(best) = singles.first() {
         let again = search.parameters_again(best);
         if again.fitted.chi2 < parameters.fitted.chi2 {
             parameters = again;
+        }
+    }
+    // No effect leaves more than none does: they were looked for from the wrong place.
+    if best(&singles) > parameters.fitted.chi2 {
+        let again = alone(&parameters, parameters.fitted.chi2);
+        if best(&again) < best(&singles) {
+            singles = again;
         }
     }
     let mut chosen = nominal_structure(&given, &parameters, values);
@@ -137,6 +152,8 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
         shares = vec![1.0];
         if unexplained_part(&chosen, values) > 0.0 {
             let gap = parameters.fitted.chi2 - values;
+            chosen = search.among_kin(chosen);
+            adopt(&mut singles, &chosen);
             chosen = further(search, &singles, chosen, gap, values, progress);
             (chosen, shares) = pruned(search, search.closely(&chosen), &mut singles, gap, values);
         }
@@ -162,6 +179,12 @@ fn better(rich: &Tested, plain: &Tested, values: f64) -> bool {
 fn unexplained_part(t: &Tested, values: f64) -> f64 {
     let per = t.fitted.chi2 / values;
     if per > AT_FLOOR { per - 1.0 } else { 0.0 }
+}
+
+/// Whether a hypothesis leaves nothing to look for.
+fn suffices(t: &Tested, gap: f64, values: f64) -> bool {
+    let left = unexplained_part(t, values);
+    left == 0.0 || (left < BELOW_NOISE && left * values < (1.0 - CLOSES) * gap)
 }
 
 /// The simplest of the hypotheses that the record cannot tell from the best by more than chance.
@@ -199,7 +222,7 @@ fn further(
     let mut chosen = first;
     // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
     let beam = if first_is_most { 1 } else { BEAM };
-    if material(&chosen) {
+    if !suffices(&chosen, gap, values) {
         let mut pair: Option<Tested> = None;
         for single in singles.iter().take(beam) {
             let partnered = best_partner(single, left(&pair));
@@ -208,7 +231,7 @@ fn further(
                 break;
             }
         }
-        if let Some(found) = pair.as_ref().filter(|p| material(p) && !first_is_most) {
+        if let Some(found) = pair.as_ref().filter(|p| material(p)) {
             // With the partner in, was the first the right one? And with the first where it is then, the partner?
             let found = found.clone();
             for &(kept, variant) in found.effects.iter().rev() {
@@ -216,7 +239,7 @@ fn further(
                 pair = pair.into_iter().chain(turned).min_by(closer);
             }
         }
-        match pair.map(|p| search.on_the_right_sides(p)).filter(|p| closes_more(p, &chosen)) {
+        match pair.map(|p| search.among_kin(p)).filter(|p| closes_more(p, &chosen)) {
             Some(pair) => {
                 let closed = chosen.fitted.chi2 / pair.fitted.chi2;
                 chosen = pair;
@@ -227,7 +250,7 @@ fn further(
             None => return chosen,
         }
     }
-    while chosen.effects.len() < MOST && material(&chosen) && !little_left(&chosen) {
+    while chosen.effects.len() < MOST && !suffices(&chosen, gap, values) && !little_left(&chosen) {
         match best_partner(&chosen, f64::INFINITY).filter(|next| closes_more(next, &chosen)) {
             Some(next) => chosen = next,
             None => break,
@@ -271,17 +294,23 @@ fn pruned(
         let back: Vec<f64> = without.iter().map(|t| (t.fitted.chi2 - chosen.fitted.chi2).max(0.0)).collect();
         let idle = (0..back.len()).min_by(|a, b| back[*a].total_cmp(&back[*b])).unwrap_or(0);
         let rest = without[idle].fitted.chi2 - values;
-        if better(&chosen, &without[idle], values) && counts(back[idle], rest, gap) {
+        let needed = !suffices(&without[idle], gap, values) && counts(back[idle], rest, gap);
+        if needed && better(&chosen, &without[idle], values) {
             let sum: f64 = back.iter().sum();
             return (chosen, back.iter().map(|b| b / sum).collect());
         }
         chosen = without[idle].clone();
-        if let [(effect, _)] = chosen.effects[..] {
-            singles.retain(|t| t.effects[0].0 != effect);
-            singles.push(chosen.clone());
-            singles.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+        if chosen.effects.len() == 1 {
+            adopt(singles, &chosen);
         }
     }
+}
+
+/// Puts a single effect's better fit in the place of the one known.
+fn adopt(singles: &mut Vec<Tested>, better: &Tested) {
+    singles.retain(|t| t.effects[0].0 != better.effects[0].0);
+    singles.push(better.clone());
+    singles.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
 }
 
 fn verdict(given: &Tested, parameters: &Tested, single: Option<&Tested>, chosen: &Tested, values: f64) -> Verdict {

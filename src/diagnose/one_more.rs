@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::fit::{Effort, Fitted};
 use super::model::Model;
 use super::screen::{Candidate, Screen};
-use super::search::{BEARINGS, RUN_AWAY, Search, Tested};
+use super::search::{NO_RIVAL, Search, Tested, WAY, simplest_of};
 use super::states;
 use crate::axis::Structure;
 use crate::effects::{Effect, Place, Settings, Variant};
@@ -35,10 +35,10 @@ const REACHED: f64 = 1.3;
 const REACHED_NEARLY: f64 = 1.02;
 /// An effect beside another whose regression leaves this many times the best is not looked at.
 const FAR: [f64; 2] = [f64::INFINITY, 30.0];
-/// Another form of an effect that after so many steps
-const WAY: usize = 8;
-/// leaves this many times the first is given up.
-const NO_RIVAL: f64 = 1.5;
+/// A first look beside another is given up where the model runs away to this many times what is left without the effect.
+const RUN_AWAY: f64 = 30.0;
+/// Steps after which that is seen.
+const BEARINGS: usize = 2;
 /// An effect whose regression leaves this many times a fit at the floor is not looked at.
 const HOPELESS: f64 = 3.0;
 /// Effects that are fitted at all: the best by the regression, alone and beside another.
@@ -52,8 +52,8 @@ const NEAR_THE_FLOOR: f64 = 3.0;
 
 impl Search<'_> {
     /// Every effect of the library beside those of `beside`, best first: one [`Tested`] per effect, its best variant
-    /// by [`simplest`]. Beside another, none that promises to stay far above `rival`, the sum of squares that as many
-    /// effects are known to leave.
+    /// by [`simplest_of`]. Beside another, none that promises to stay far above `rival`, the sum of squares that as many
+    /// effects are known to leave; alone, with a rival, from the leaning parameters too.
     #[must_use]
     pub fn one_more(&self, beside: &Tested, rival: f64, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
         let stage = usize::from(!beside.effects.is_empty());
@@ -62,8 +62,8 @@ impl Search<'_> {
         let upright = Model { parameters: self.nominal.parameters, ..leaning };
         let initial = self.initial();
         let mut screens = vec![Screen::new(&upright, self.data, &initial, &self.states, &beside.effects)];
-        let own_motion =
-            (stage > 0).then(|| states::of_model(self.data, &leaning, &beside.fitted.initial, &self.states));
+        let own_motion = (stage > 0 || rival.is_finite())
+            .then(|| states::of_model(self.data, &leaning, &beside.fitted.initial, &self.states));
         if let Some(motion) = &own_motion {
             screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, motion, &beside.effects));
         }
@@ -176,14 +176,15 @@ impl Search<'_> {
         glances
     }
 
-    /// The best of an effect's starts; one whose regression leaves far more than another's first look is not looked at.
+    /// The best of an effect's starts; beside another effect, one whose regression leaves far more than another start's first
+    /// look is not looked at.
     fn best_glance(&self, beside: &Tested, starts: &[Candidate]) -> Option<(Tested, Candidate)> {
         let mut starts: Vec<&Candidate> = starts.iter().collect();
         starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
         let mut best: Option<(Tested, Candidate)> = None;
         for start in starts {
             let so_far = best.as_ref().map_or(f64::INFINITY, |(t, _)| t.fitted.chi2);
-            if start.chi2 > HOPELESS * so_far {
+            if !beside.effects.is_empty() && start.chi2 > HOPELESS * so_far {
                 break;
             }
             let glance = self.glance(beside, start);
@@ -227,9 +228,8 @@ impl Search<'_> {
                 .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
             forms.extend(best);
         }
-        forms.retain(|t| t.fitted.chi2.is_finite());
-        forms.sort_by_key(|t| t.freedom);
-        simplest(&forms, values).clone()
+        let first = forms[0].clone();
+        simplest_of(forms, values).unwrap_or(first)
     }
 
     /// Whether the effect can act on this axis and be fitted: a rigid axis has no coupling; rounding has no derivative
@@ -288,9 +288,12 @@ impl Search<'_> {
         let Candidate { effect, variant, parameters, settings: effects, .. } = *candidate;
         let model = Model { parameters, effects, ..beside.fitted.model };
         // The states as measured until a model has come near them.
-        let initial = if beside.effects.is_empty() { self.initial() } else { beside.fitted.initial.clone() };
+        let upright = beside.effects.is_empty() && parameters == self.nominal.parameters;
+        let initial = if upright { self.initial() } else { beside.fitted.initial.clone() };
         let start = Fitted { model, initial, ..beside.fitted.clone() };
-        let effort = Effort::exploring(GLANCE, self.misfit(start.chi2)).unless(BEARINGS, RUN_AWAY * beside.fitted.chi2);
+        let effort = Effort::exploring(GLANCE, self.misfit(start.chi2));
+        let effort =
+            if beside.effects.is_empty() { effort } else { effort.unless(BEARINGS, RUN_AWAY * beside.fitted.chi2) };
         let effects = beside.with(effect, variant);
         self.test(&start.model, &self.free(&effects), &start.initial, effects, effort)
     }
@@ -305,24 +308,4 @@ fn restricted(settings: &Settings, effect: Effect, form: &Variant, off: &Setting
         }
     }
     s
-}
-
-/// Share of the excess over the simplest form's that a richer form must take away to be preferred.
-const MATERIAL: f64 = 0.02;
-
-/// Of forms that close the gap alike, the one with the fewest free parameters.
-#[must_use]
-pub fn simplest(forms: &[Tested], values: f64) -> &Tested {
-    let best = forms.iter().map(|t| t.fitted.chi2).fold(f64::INFINITY, f64::min);
-    let mut chosen = &forms[0];
-    for form in forms {
-        let gain = chosen.fitted.chi2 - form.fitted.chi2;
-        let excess = (chosen.fitted.chi2 - values).max(best * 1e-3);
-        let extra = form.freedom.saturating_sub(chosen.freedom) as f64;
-        // More freedom must pay its price, and close a material share of what was left.
-        if gain > extra * values.ln() * (best / values).max(1.0) && gain > MATERIAL * excess {
-            chosen = form;
-        }
-    }
-    chosen
 }

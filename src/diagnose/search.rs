@@ -12,10 +12,10 @@ const FULL: usize = 40;
 const LONG: usize = 120;
 /// Squared residual per value up to which likelihoods are compared, not only ranked.
 const COMPARED: f64 = 3.0;
-/// A first look is given up where the model runs away to this many times what is left without the effect.
-pub const RUN_AWAY: f64 = 30.0;
-/// Steps after which that is seen.
-pub const BEARINGS: usize = 2;
+/// A rival start or form that after so many steps
+pub const WAY: usize = 8;
+/// leaves this many times the first is given up.
+pub const NO_RIVAL: f64 = 1.5;
 
 /// A hypothesis that was fitted.
 #[derive(Debug, Clone)]
@@ -136,32 +136,41 @@ impl Search<'_> {
         self.refit(&from, keep.to_vec(), self.exploring(&from))
     }
 
-    /// The combination with its effects, one after the other, on the other side of the coupling, where that leaves less:
-    /// two effects settle beside each other before either has found its side.
+    /// The combination with each of its effects in turn replaced by its kin, in every form, from where it stands, where that
+    /// leaves less: an effect may have found its size under a wrong law, or on the wrong side of the coupling.
     #[must_use]
-    pub fn on_the_right_sides(&self, combination: Tested) -> Tested {
+    pub fn among_kin(&self, combination: Tested) -> Tested {
         let mut best = combination;
         for i in 0..best.effects.len() {
-            let (effect, variant) = best.effects[i];
+            let (effect, _) = best.effects[i];
             let known = best.ids();
-            let twins =
-                self.suspects.iter().copied().filter(|t| effect.is_twin_of(*t) && !known.contains(&t.info().id));
-            let swapped = twins
-                .map(|twin| {
-                    let mut effects = best.effects.clone();
-                    effects[i] = (twin, variant);
-                    let mut start = best.fitted.model;
-                    start.effects.of_mut(twin).copy_from_slice(best.fitted.model.effects.of(effect));
-                    start.effects.of_mut(effect).copy_from_slice(self.nominal.effects.of(effect));
-                    let from = Fitted { model: start, ..best.fitted.clone() };
-                    self.refit(&from, effects, self.exploring(&from).unless(BEARINGS, RUN_AWAY * from.chi2))
-                })
-                .min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
-            if let Some(swapped) = swapped.filter(|s| s.fitted.chi2 < best.fitted.chi2) {
-                best = swapped;
+            let kin = self.suspects.iter().copied().filter(|k| effect.is_kin_of(*k) && !known.contains(&k.info().id));
+            let replaced = kin.filter_map(|kin| {
+                let forms = 0..kin.info().variants.len();
+                simplest_of(forms.map(|form| self.replaced(&best, i, kin, form)).collect(), self.data.values() as f64)
+            });
+            let replaced = replaced.min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+            if let Some(replaced) = replaced.filter(|r| r.fitted.chi2 < best.fitted.chi2) {
+                best = replaced;
             }
         }
         best
+    }
+
+    /// A combination with one of its effects replaced by a form of its kin, from where it stands.
+    fn replaced(&self, combination: &Tested, at: usize, kin: Effect, form: usize) -> Tested {
+        let (effect, _) = combination.effects[at];
+        let mut model = combination.fitted.model;
+        model.effects.of_mut(effect).copy_from_slice(self.nominal.effects.of(effect));
+        for (from, to) in effect.shared(kin) {
+            if kin.info().variants[form].free.contains(&to) {
+                model.effects.of_mut(kin)[to] = combination.fitted.model.effects.of(effect)[from];
+            }
+        }
+        let mut effects = combination.effects.clone();
+        effects[at] = (kin, form);
+        let from = Fitted { model, ..combination.fitted.clone() };
+        self.refit(&from, effects, self.exploring(&from).unless(WAY, NO_RIVAL * from.chi2))
     }
 
     /// What is free when these effects are on.
@@ -194,4 +203,26 @@ impl Search<'_> {
         let effort = Effort::to_the_end(FULL, self.misfit(from.fitted.chi2));
         self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
+}
+
+/// Share of the excess over the simplest form's that a richer form must take away to be preferred.
+const MATERIAL: f64 = 0.02;
+
+/// Of forms that close the gap alike, the one with the fewest free parameters; None if none could be fitted.
+#[must_use]
+pub fn simplest_of(mut forms: Vec<Tested>, values: f64) -> Option<Tested> {
+    forms.retain(|t| t.fitted.chi2.is_finite());
+    forms.sort_by_key(|t| t.freedom);
+    let best = forms.iter().map(|t| t.fitted.chi2).fold(f64::INFINITY, f64::min);
+    let mut chosen = forms.first()?;
+    for form in &forms {
+        let gain = chosen.fitted.chi2 - form.fitted.chi2;
+        let excess = (chosen.fitted.chi2 - values).max(best * 1e-3);
+        let extra = form.freedom.saturating_sub(chosen.freedom) as f64;
+        // More freedom must pay its price, and close a material share of what was left.
+        if gain > extra * values.ln() * (best / values).max(1.0) && gain > MATERIAL * excess {
+            chosen = form;
+        }
+    }
+    Some(chosen.clone())
 }

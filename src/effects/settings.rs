@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::info::{Place, Role, Variant};
+use super::info::{Place, Role};
 use super::input::{Ramp, TorqueHistory};
 use super::sensor::{Reading, SensorHistory};
 use super::shapes::{Base, Moment, Motion, Reaction};
@@ -64,15 +64,22 @@ impl Effect {
         EFFECTS.iter().copied().find(|e| e.info().id == id).ok_or_else(|| UnknownEffect { name: id.to_owned() })
     }
 
-    /// Whether the other is the same effect on the other side of the coupling: same family, same parameters and variants.
+    /// Whether the other is of the same family and has a size of the same name and unit: the same effect on the other side
+    /// of the coupling, or another law of the same thing.
     #[must_use]
-    pub fn is_twin_of(self, other: Self) -> bool {
-        let (own, its) = (self.info(), other.info());
-        let alike = |a: &[Variant], b: &[Variant]| a.iter().map(|v| v.name).eq(b.iter().map(|v| v.name));
-        own.family == its.family
-            && own.place != its.place
-            && own.parameters.iter().map(|p| p.name).eq(its.parameters.iter().map(|p| p.name))
-            && alike(own.variants, its.variants)
+    pub fn is_kin_of(self, other: Self) -> bool {
+        let size = |(i, _): &(usize, usize)| self.info().parameters[*i].role == Role::Size;
+        self != other && self.info().family == other.info().family && self.shared(other).any(|pair| size(&pair))
+    }
+
+    /// Parameters that two effects share by name and unit: their indices in each.
+    pub fn shared(self, other: Self) -> impl Iterator<Item = (usize, usize)> {
+        let its = other.info().parameters;
+        self.info()
+            .parameters
+            .iter()
+            .enumerate()
+            .filter_map(move |(i, p)| its.iter().position(|q| q.name == p.name && q.unit == p.unit).map(|j| (i, j)))
     }
 
     /// Index of a parameter of that name.
@@ -379,21 +386,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn twins_are_the_same_effect_on_the_two_sides_of_the_coupling() {
-        let twins: Vec<[&str; 2]> = EFFECTS
+    fn kin_are_the_laws_of_one_thing_on_both_sides_of_the_coupling() {
+        let mut found: Vec<[&str; 2]> = EFFECTS
             .iter()
             .flat_map(|a| EFFECTS.iter().map(move |b| (a, b)))
-            .filter(|(a, b)| a.is_twin_of(**b) && a.info().place < b.info().place)
+            .filter(|(a, b)| a.is_kin_of(**b) && a.info().id < b.info().id)
             .map(|(a, b)| [a.info().id, b.info().id])
             .collect();
-        // The pairs of DESIGN's table that differ in their place alone.
-        let mut expected = [
-            ["coulomb_motor", "coulomb_table"],
-            ["viscous_motor", "viscous_table"],
-            ["presliding_motor", "presliding_table"],
-            ["load_motor", "load_table"],
-        ];
-        let mut found = twins.clone();
+        // Of DESIGN's table: dry friction by its level, viscous friction and loads in their two places; a drag's coefficient
+        // has another unit than a viscous one.
+        let dry = ["coulomb_motor", "coulomb_table", "presliding_motor", "presliding_table"];
+        let mut expected = vec![["viscous_motor", "viscous_table"], ["load_motor", "load_table"]];
+        expected.extend((0..4).flat_map(|i| (i + 1..4).map(move |j| [dry[i], dry[j]])));
         found.sort_unstable();
         expected.sort_unstable();
         assert_eq!(found, expected);
