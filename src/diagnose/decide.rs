@@ -215,8 +215,14 @@ fn further(
         let rest = chosen.fitted.chi2 - values;
         better(next, chosen, values) && gain >= FURTHER * rest && counts(gain, rest, gap)
     };
-    let closer = |a: &Tested, b: &Tested| a.fitted.chi2.total_cmp(&b.fitted.chi2);
-    let best_partner = |of: &Tested, rival: f64| search.one_more(of, rival, progress).into_iter().next();
+    let closer = |a: &Tested, b: &Tested| {
+        let floor = (a.fitted.chi2.min(b.fitted.chi2) / values).max(1.0);
+        bic(a, values, floor).total_cmp(&bic(b, values, floor))
+    };
+    let best_partner = |of: &Tested, rival: f64| {
+        let pairs = search.one_more(of, rival, progress);
+        pairs.first().map(|best| alike(&pairs, best, values).clone())
+    };
     let left = |pair: &Option<Tested>| pair.as_ref().map_or(f64::INFINITY, |p| p.fitted.chi2);
     let first_is_most = little_left(&first);
     let mut chosen = first;
