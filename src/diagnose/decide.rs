@@ -128,17 +128,17 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
     };
     let mut singles = alone(&parameters, f64::INFINITY);
     // Weakly determined parameters: the fit of another hypothesis may have found the way.
-    let best = |singles: &[Tested]| singles.first().map_or(0.0, |t| t.fitted.chi2);
     if let Some(best) = singles.first() {
         let again = search.parameters_again(best);
         if again.fitted.chi2 < parameters.fitted.chi2 {
             parameters = again;
         }
     }
+    let least = |singles: &[Tested]| singles.first().map_or(0.0, |t| t.fitted.chi2);
     // No effect leaves more than none does: they were looked for from the wrong place.
-    if best(&singles) > parameters.fitted.chi2 {
+    if least(&singles) > parameters.fitted.chi2 {
         let again = alone(&parameters, parameters.fitted.chi2);
-        if best(&again) < best(&singles) {
+        if least(&again) < least(&singles) {
             singles = again;
         }
     }

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use super::fit::{Effort, Fitted};
 use super::model::Model;
 use super::screen::{Candidate, Screen};
-use super::search::{NO_RIVAL, Search, Tested, WAY, simplest_of};
+use super::search::{NO_RIVAL, Search, Tested, WAY, inherited, simplest_of};
 use super::states;
 use crate::axis::Structure;
-use crate::effects::{Effect, Place, Settings, Variant};
+use crate::effects::{Effect, Place};
 
 /// Linearisations of a first look at a start.
 const GLANCE: usize = 6;
@@ -213,7 +213,8 @@ impl Search<'_> {
             if richer && forms[0].fitted.chi2 < REACHED_NEARLY * values {
                 continue;
             }
-            let mut starts = vec![restricted(&forms[0].fitted.model.effects, effect, form, &self.nominal.effects)];
+            let mut starts =
+                vec![inherited(&forms[0].fitted.model.effects, effect, effect, form, &self.nominal.effects)];
             starts.extend(screen.starts(effect, variant, 1).iter().map(|c| c.settings));
             let best = starts
                 .iter()
@@ -297,15 +298,4 @@ impl Search<'_> {
         let effects = beside.with(effect, variant);
         self.test(&start.model, &self.free(&effects), &start.initial, effects, effort)
     }
-}
-
-/// The settings with the parameters that a form does not free put back.
-fn restricted(settings: &Settings, effect: Effect, form: &Variant, off: &Settings) -> Settings {
-    let mut s = *settings;
-    for i in 0..effect.info().parameters.len() {
-        if !form.free.contains(&i) {
-            s.of_mut(effect)[i] = off.of(effect)[i];
-        }
-    }
-    s
 }

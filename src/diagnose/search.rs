@@ -4,7 +4,7 @@ use super::fit::{Data, Effort, Fitted, fit};
 use super::model::{BaseParameter, Free, Model};
 use super::response::States;
 use super::windows::Initial;
-use crate::effects::Effect;
+use crate::effects::{Effect, Settings, Variant};
 
 /// Linearisations of a fit that counts.
 const FULL: usize = 40;
@@ -161,12 +161,7 @@ impl Search<'_> {
     fn replaced(&self, combination: &Tested, at: usize, kin: Effect, form: usize) -> Tested {
         let (effect, _) = combination.effects[at];
         let mut model = combination.fitted.model;
-        model.effects.of_mut(effect).copy_from_slice(self.nominal.effects.of(effect));
-        for (from, to) in effect.shared(kin) {
-            if kin.info().variants[form].free.contains(&to) {
-                model.effects.of_mut(kin)[to] = combination.fitted.model.effects.of(effect)[from];
-            }
-        }
+        model.effects = inherited(&model.effects, effect, kin, &kin.info().variants[form], &self.nominal.effects);
         let mut effects = combination.effects.clone();
         effects[at] = (kin, form);
         let from = Fitted { model, ..combination.fitted.clone() };
@@ -203,6 +198,20 @@ impl Search<'_> {
         let effort = Effort::to_the_end(FULL, self.misfit(from.fitted.chi2));
         self.test(&from.fitted.model, &self.free(&from.effects), &from.fitted.initial, from.effects.clone(), effort)
     }
+}
+
+/// The settings with an effect replaced by a form of its kin, or of itself, that takes over what the two share and the form
+/// frees; the rest as in `off`.
+#[must_use]
+pub fn inherited(settings: &Settings, from: Effect, to: Effect, form: &Variant, off: &Settings) -> Settings {
+    let mut s = *settings;
+    for effect in [from, to] {
+        s.of_mut(effect).copy_from_slice(off.of(effect));
+    }
+    for (i, j) in from.shared(to).filter(|(_, j)| form.free.contains(j)) {
+        s.of_mut(to)[j] = settings.of(from)[i];
+    }
+    s
 }
 
 /// Share of the excess over the simplest form's that a richer form must take away to be preferred.
