@@ -14,12 +14,14 @@ pub mod location;
 mod model;
 mod noise;
 mod one_more;
+mod parts;
 mod record;
 mod response;
 mod screen;
 mod search;
 mod states;
 mod tones;
+mod trials;
 mod windows;
 mod words;
 

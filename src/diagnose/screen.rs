@@ -6,11 +6,13 @@ use rayon::prelude::*;
 use super::features;
 use super::fit::{Data, predict};
 use super::model::{BaseParameter, Model};
+use super::parts::linear_parts;
 use super::record::Record;
 use super::response::{Column, Responder, States, dot, subtract};
-use super::tones::{self, Lines};
+use super::tones;
+use super::trials::{Scales, Trial};
 use super::windows::Initial;
-use crate::axis::{Parameters, Structure};
+use crate::axis::Parameters;
 use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
 
 /// Prior standard deviation of a relative error of a nominal parameter.
@@ -26,10 +28,6 @@ const ERRORS: [f64; 2] = [-0.6, 1.5];
 const WIDTHS: [usize; 3] = [1, 3, 6];
 /// Part of a step within which two lines are one.
 const SAME: f64 = 0.1;
-/// Phase that the highest order tried turns by in a sample, at the rms speed, rad.
-const FINEST: f64 = 2.0;
-/// Highest frequency tried, as a share of the sampling rate.
-const HIGHEST: f64 = 0.45;
 
 /// An effect at a start that the regression found, and what the regression leaves.
 #[derive(Debug, Clone)]
@@ -318,56 +316,6 @@ impl<'a> Screen<'a> {
     }
 }
 
-/// A column of an effect that is linear in its sizes.
-struct Part {
-    /// The parameter that it stands for.
-    parameter: usize,
-    /// The effect with this part alone, as large as one.
-    unit: Settings,
-    /// How large it is in the settings: the effect is the sum of its parts, each times this.
-    value: f64,
-}
-
-/// The columns whose sum, each times its size, is the effect of any size; none if the effect is linear in nothing.
-fn linear_parts(effect: Effect, form: &Variant, settings: &Settings) -> Vec<Part> {
-    let info = effect.info();
-    let start = |i: usize| info.parameters[i].start;
-    let now = settings.of(effect);
-    let beyond = |i: usize| now[i] - info.parameters[i].off;
-    let mut blank = *settings;
-    for &i in form.free {
-        if matches!(start(i), Start::Linear | Start::Share | Start::Phase) {
-            blank.of_mut(effect)[i] = info.parameters[i].off;
-        }
-    }
-    let phase = form.free.iter().copied().find(|&i| start(i) == Start::Phase);
-    let share = form.free.iter().copied().find(|&i| start(i) == Start::Share);
-    let mut parts = Vec::new();
-    for &i in form.free {
-        let mut unit = blank;
-        unit.of_mut(effect)[i] += 1.0;
-        match start(i) {
-            Start::Linear if info.parameters[i].name == "amplitude" && phase.is_some() => {
-                let phase = phase.unwrap_or(i);
-                let (s, c) = now[phase].sin_cos();
-                parts.push(Part { parameter: i, unit, value: beyond(i) * c });
-                unit.of_mut(effect)[phase] = std::f64::consts::FRAC_PI_2;
-                parts.push(Part { parameter: phase, unit, value: beyond(i) * s });
-            }
-            Start::Linear => {
-                let shared = share.filter(|_| i == form.free[0]).map_or(0.0, |j| now[j]);
-                parts.push(Part { parameter: i, unit, value: beyond(i) * (1.0 - shared) });
-            }
-            Start::Share => {
-                unit.of_mut(effect)[form.free[0]] += 1.0;
-                parts.push(Part { parameter: i, unit, value: beyond(form.free[0]) * now[i] });
-            }
-            _ => {}
-        }
-    }
-    parts
-}
-
 /// Least squares from its normal equations with some unknowns held at given values; `None` if it has no solution.
 fn solve_with_held(gram: &DMatrix<f64>, right: &DVector<f64>, held: &[(usize, f64)]) -> Option<DVector<f64>> {
     let mut x = DVector::zeros(right.len());
@@ -411,157 +359,4 @@ fn base_torques(p: BaseParameter, model: &Model, states: &States) -> super::resp
         })
         .collect();
     features::ramps(&at)
-}
-
-/// Shapes of an effect to be tried, with the fractions they came from.
-#[derive(Clone)]
-struct Trial {
-    settings: Settings,
-    fractions: Vec<(usize, Scale, f64)>,
-}
-
-impl Trial {
-    /// Takes the regression's factor into a size that it was found at.
-    fn rescale(&self, effect: Effect, settings: &mut Settings, c: f64, scales: &Scales) {
-        for &(i, scale, _) in &self.fractions {
-            if matches!(scale, Scale::Sample | Scale::Inertia) {
-                settings.of_mut(effect)[i] *= c.clamp(0.2, 5.0);
-            }
-        }
-        // Shapes that hang on the size follow it.
-        for &(i, scale, fraction) in &self.fractions {
-            if matches!(scale, Scale::Mode | Scale::One) && effect == Effect::FlexibleMode {
-                settings.of_mut(effect)[i] = scales.value(effect, scale, fraction, settings);
-            }
-        }
-    }
-}
-
-/// Scales of the record.
-struct Scales {
-    speed: [f64; 2],
-    twist: f64,
-    torque: f64,
-    rotation: [f64; 2],
-    dt: f64,
-    mode: f64,
-    inertia: f64,
-    orders: [Lines; 2],
-    frequencies: Lines,
-    /// Lowest and highest angle of the table.
-    travel: [f64; 2],
-}
-
-impl Scales {
-    fn new(model: &Model, record: &Record, states: &States) -> Self {
-        let rms = |f: &dyn Fn(&[f64; 4]) -> f64| {
-            (states.motion.iter().map(|s| f(s).powi(2)).sum::<f64>() / states.motion.len() as f64).sqrt()
-        };
-        let p = &model.parameters;
-        let speed = [rms(&|s| s[1]), rms(&|s| s[3])];
-        let rotation = |i: usize| {
-            let n = states.motion.len() as f64;
-            let mean = states.motion.iter().map(|s| s[i]).sum::<f64>() / n;
-            rms(&|s| s[i] - mean).max(1e-12)
-        };
-        let span = |i: usize| {
-            let (low, high) = states.motion.iter().fold((f64::MAX, f64::MIN), |(l, h), s| (l.min(s[i]), h.max(s[i])));
-            high - low
-        };
-        let orders = |i: usize, speed: f64| {
-            let step = 0.25 * std::f64::consts::TAU / span(i).max(1e-12);
-            Lines::up_to(FINEST / (record.dt * speed.max(1e-12)), step)
-        };
-        let length = record.len() as f64 * record.dt;
-        let travel = states.motion.iter().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s[2]), high.max(s[2])]);
-        let mode = match model.structure {
-            Structure::TwoInertia => p.modal().wn,
-            Structure::Rigid => std::f64::consts::TAU * 0.05 / record.dt,
-        };
-        Self {
-            orders: [orders(0, speed[0]), orders(2, speed[1])],
-            speed,
-            twist: rms(&|s| s[0] - s[2]),
-            torque: record.torque.iter().fold(0.0, |m, t| t.abs().max(m)),
-            rotation: [rotation(0), rotation(2)],
-            dt: record.dt,
-            mode,
-            inertia: p.i1 + p.i2,
-            frequencies: Lines::up_to(HIGHEST / record.dt, 0.5 / length),
-            travel,
-        }
-    }
-
-    /// Orders or frequencies that an effect is tried at.
-    fn lines(&self, effect: Effect, scale: Scale) -> Option<Lines> {
-        match scale {
-            Scale::Order => Some(self.orders[usize::from(effect.info().place != Place::Motor)]),
-            Scale::Frequency => Some(self.frequencies),
-            _ => None,
-        }
-    }
-
-    /// The parameter of a trial that lies on a grid of lines, its line, and the grid's step.
-    fn line(&self, effect: Effect, trial: &Trial) -> Option<(usize, f64, f64)> {
-        trial.fractions.iter().find_map(|&(i, scale, line)| self.lines(effect, scale).map(|all| (i, line, all.step)))
-    }
-
-    /// Whether two trials are the same line but for a step of the grid.
-    fn neighbours(&self, effect: Effect, a: &Trial, b: &Trial) -> bool {
-        match (self.line(effect, a), self.line(effect, b)) {
-            (Some((_, a, step)), Some((_, b, _))) => (a - b).abs() < 1.5 * step,
-            _ => false,
-        }
-    }
-
-    fn value(&self, effect: Effect, scale: Scale, fraction: f64, settings: &Settings) -> f64 {
-        let side = usize::from(effect.info().place == Place::Table);
-        match scale {
-            Scale::One if effect == Effect::FlexibleMode => {
-                // A damping ratio.
-                let p = settings.of(effect);
-                2.0 * fraction * (p[0] * p[1]).sqrt()
-            }
-            Scale::One | Scale::Order | Scale::Frequency => fraction,
-            Scale::Speed => fraction * self.speed[side],
-            Scale::Twist => fraction * self.twist,
-            Scale::Torque => fraction * self.torque,
-            Scale::Rotation => fraction * self.rotation[side],
-            Scale::Sample => fraction * self.dt,
-            Scale::Mode => {
-                let w = fraction * self.mode;
-                settings.of(effect)[0] * w * w
-            }
-            Scale::Inertia => fraction * self.inertia,
-            // From the upper end of the travel downwards, or from the lower end upwards.
-            Scale::Travel if fraction > 0.0 => self.travel[1] - fraction * (self.travel[1] - self.travel[0]),
-            Scale::Travel => self.travel[0] - fraction * (self.travel[1] - self.travel[0]),
-        }
-    }
-
-    /// Every combination of the starts of the variant's free parameters; `tones`: the orders or frequencies to try.
-    fn trials(&self, effect: Effect, form: &Variant, tones: &[f64]) -> Vec<Trial> {
-        let info = effect.info();
-        let mut trials = vec![Trial { settings: Settings::default(), fractions: Vec::new() }];
-        // Sizes first: shapes may hang on them.
-        let mut order: Vec<usize> = form.free.to_vec();
-        order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
-        for i in order {
-            let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
-            let fractions = self.lines(effect, scale).map_or(fractions, |_| tones);
-            trials = trials
-                .iter()
-                .flat_map(|t| {
-                    fractions.iter().map(|&fraction| {
-                        let mut settings = t.settings;
-                        settings.of_mut(effect)[i] = self.value(effect, scale, fraction, &settings);
-                        let mut all = t.fractions.clone();
-                        all.push((i, scale, fraction));
-                        Trial { settings, fractions: all }
-                    })
-                })
-                .collect();
-        }
-        trials
-    }
 }
