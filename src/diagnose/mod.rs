@@ -13,6 +13,7 @@ mod lines;
 pub mod location;
 mod model;
 mod noise;
+mod nonuniform;
 mod one_more;
 mod parts;
 mod record;

@@ -8,14 +8,14 @@
 
 use rayon::prelude::*;
 
+use super::nonuniform;
+
 /// Lines at which the length of a column is computed.
 const KNOTS: usize = 24;
 /// Lines named.
 const NAMED: usize = 8;
 /// Steps of the golden section that takes a line off its grid.
 const SHARPENINGS: usize = 10;
-/// Lines that one task turns through: each begins anew, so that rounding does not add up.
-const TASK: usize = 256;
 
 /// Evenly spaced orders or frequencies: `step, 2*step, ..., count*step`.
 #[derive(Debug, Clone, Copy)]
@@ -79,26 +79,7 @@ impl Lines {
 
     /// `|sum_k adjoint_k*exp(i*line*angle_k)|^2` at every line.
     fn power(&self, angle: &[f64], adjoint: &[f64]) -> Vec<f64> {
-        let turn: Vec<(f64, f64)> = angle.iter().map(|a| (self.step * a).sin_cos()).collect();
-        let starts: Vec<usize> = (1..=self.count).step_by(TASK).collect();
-        starts
-            .par_iter()
-            .flat_map_iter(|&first| {
-                let line = first as f64 * self.step;
-                let mut z: Vec<(f64, f64)> = angle.iter().map(|a| (line * a).sin_cos()).collect();
-                let mut power = Vec::with_capacity(TASK);
-                for _ in first..(first + TASK).min(self.count + 1) {
-                    let (mut s, mut c) = (0.0, 0.0);
-                    for ((z, w), a) in z.iter_mut().zip(&turn).zip(adjoint) {
-                        s += a * z.0;
-                        c += a * z.1;
-                        *z = (z.0 * w.1 + z.1 * w.0, z.1 * w.1 - z.0 * w.0);
-                    }
-                    power.push(s * s + c * c);
-                }
-                power
-            })
-            .collect()
+        nonuniform::power(self.count, angle.iter().map(|a| self.step * a), adjoint)
     }
 
     /// Squared lengths at some lines, by their numbers.
@@ -180,20 +161,6 @@ mod tests {
             let found = curvature(&series, half);
             assert!(found[half..40 - half].iter().all(|c| (c - 1.4).abs() < 1e-10), "{half}: {found:?}");
             assert!(found[..half].iter().all(|c| *c == 0.0));
-        }
-    }
-
-    /// The turning of the phases against the sine taken anew at each line.
-    #[test]
-    fn power_is_the_transform_at_every_line() {
-        let angle: Vec<f64> = (0..200).map(|k| (k as f64 * 0.11).sin() * 9.0).collect();
-        let adjoint: Vec<f64> = (0..200).map(|k| (k as f64 * 0.7).cos()).collect();
-        let lines = Lines { step: 0.05, count: 700 };
-        for (i, p) in lines.power(&angle, &adjoint).iter().enumerate() {
-            let line = (i + 1) as f64 * lines.step;
-            let s: f64 = angle.iter().zip(&adjoint).map(|(x, a)| a * (line * x).sin()).sum();
-            let c: f64 = angle.iter().zip(&adjoint).map(|(x, a)| a * (line * x).cos()).sum();
-            assert!((p - (s * s + c * c)).abs() < 1e-8 * (1.0 + p), "{line}: {p}");
         }
     }
 }
