@@ -154,7 +154,7 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
             let gap = parameters.fitted.chi2 - values;
             chosen = search.among_kin(chosen);
             adopt(&mut singles, &chosen);
-            chosen = further(search, &singles, chosen, gap, values, progress);
+            chosen = further(search, &parameters, &singles, chosen, gap, values, progress);
             (chosen, shares) = pruned(search, search.closely(&chosen), &mut singles, gap, values);
         }
     }
@@ -199,9 +199,11 @@ fn alike<'a>(singles: &'a [Tested], best: &'a Tested, values: f64) -> &'a Tested
 
 /// Adds effects while a material remainder is closed by one more.
 ///
-/// The best single effect may be the one that imitates two others at once: the best few are each given a partner.
+/// Two at once are looked for as two: the best single effect may be the one that imitates both. Where the regression over
+/// pairs does not lead to the floor, the best few singles are each given a partner.
 fn further(
     search: &Search<'_>,
+    parameters: &Tested,
     singles: &[Tested],
     first: Tested,
     gap: f64,
@@ -229,13 +231,13 @@ fn further(
     // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
     let beam = if first_is_most { 1 } else { BEAM };
     if !suffices(&chosen, gap, values) {
-        let mut pair: Option<Tested> = None;
+        let mut pair: Option<Tested> = search.two(parameters, progress).into_iter().min_by(closer);
         for single in singles.iter().take(beam) {
-            let partnered = best_partner(single, left(&pair));
-            pair = pair.into_iter().chain(partnered).min_by(closer);
             if pair.as_ref().is_some_and(|p| !material(p)) {
                 break;
             }
+            let partnered = best_partner(single, left(&pair));
+            pair = pair.into_iter().chain(partnered).min_by(closer);
         }
         if let Some(found) = pair.as_ref().filter(|p| material(p)) {
             // With the partner in, was the first the right one? And with the first where it is then, the partner?

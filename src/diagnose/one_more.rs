@@ -7,8 +7,9 @@ use super::model::Model;
 use super::screen::{Candidate, Screen};
 use super::search::{NO_RIVAL, Search, Tested, WAY, inherited, simplest_of};
 use super::states;
+use super::trials::tone;
 use crate::axis::Structure;
-use crate::effects::{Effect, Place};
+use crate::effects::{Effect, Place, Scale};
 
 /// Linearisations of a first look at a start.
 const GLANCE: usize = 6;
@@ -70,9 +71,8 @@ impl Search<'_> {
         let screened = self.screened(beside, &screens, progress);
         let glances = self.glances(beside, rival, &screened, progress);
         let finalist = |rank: usize, chi2: f64| {
-            let best = glances[0].0.fitted.chi2.min(rival);
-            let near = best * if self.at_floor(best) { NEAR_THE_FLOOR } else { NEAR };
-            rank < FINALISTS[stage] && ((rank == 0 && stage == 0) || chi2 < near)
+            let best = glances.first().map_or(rival, |(best, _)| best.fitted.chi2.min(rival));
+            rank < FINALISTS[stage] && ((rank == 0 && stage == 0) || chi2 < self.near(best))
         };
         let firsts: Vec<Tested> = glances
             .par_iter()
@@ -103,7 +103,7 @@ impl Search<'_> {
                 }
             })
             .collect();
-        tested.retain(|t| t.fitted.chi2.is_finite() && self.swings(t));
+        tested.retain(|t| t.fitted.chi2.is_finite() && self.is_genuine(t));
         tested.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
         tested
     }
@@ -117,8 +117,8 @@ impl Search<'_> {
     ) -> Vec<Vec<Candidate>> {
         let stage = usize::from(!beside.effects.is_empty());
         let starts = if stage == 0 { STARTS } else { STARTS_BESIDE };
-        let missing = |e: &Effect| beside.effects.iter().all(|(found, _)| found != e);
-        let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| missing(e) && self.applies(*e)).collect();
+        let mut suspects = self.applicable();
+        suspects.retain(|e| beside.effects.iter().all(|(found, _)| found != e));
         let mut screened: Vec<(usize, Vec<Candidate>)> = Vec::new();
         for screen in screens {
             let mut of_screen: Vec<Vec<Candidate>> = suspects
@@ -163,8 +163,7 @@ impl Search<'_> {
         for batch in screened.chunks(BATCH) {
             let best = glances.iter().map(|g| g.0.fitted.chi2).fold(rival, f64::min);
             let promised = batch.iter().flatten().map(|c| c.chi2).fold(f64::INFINITY, f64::min);
-            let bar = best * if self.at_floor(best) { HOPELESS } else { FAR[stage] };
-            if promised > bar {
+            if promised > self.bar(best, stage) {
                 break;
             }
             glances.par_extend(batch.par_iter().flat_map_iter(|starts| {
@@ -172,6 +171,7 @@ impl Search<'_> {
                 self.best_glance(beside, starts)
             }));
         }
+        glances.retain(|(t, _)| t.fitted.chi2.is_finite());
         glances.sort_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2));
         glances
     }
@@ -193,6 +193,16 @@ impl Search<'_> {
             }
         }
         best
+    }
+
+    /// What a regression may leave to be looked at when the best fit leaves `best`, alone or beside another effect.
+    pub(super) fn bar(&self, best: f64, stage: usize) -> f64 {
+        best * if self.at_floor(best) { HOPELESS } else { FAR[stage] }
+    }
+
+    /// What a first look may leave to be taken to its end when the best one leaves `best`.
+    pub(super) fn near(&self, best: f64) -> f64 {
+        best * if self.at_floor(best) { NEAR_THE_FLOOR } else { NEAR }
     }
 
     fn at_floor(&self, chi2: f64) -> bool {
@@ -233,6 +243,11 @@ impl Search<'_> {
         simplest_of(forms, values).unwrap_or(first)
     }
 
+    /// The suspects that can act on this axis and be fitted.
+    pub(super) fn applicable(&self) -> Vec<Effect> {
+        self.suspects.iter().copied().filter(|e| self.applies(*e)).collect()
+    }
+
     /// Whether the effect can act on this axis and be fitted: a rigid axis has no coupling; rounding has no derivative
     /// and is judged by its lattice; a torque constant is a common factor of the nominal parameters.
     fn applies(&self, effect: Effect) -> bool {
@@ -243,6 +258,23 @@ impl Search<'_> {
             || (info.place == Place::Sensor);
         let unfit = matches!(effect, Effect::EncoderQuantisation | Effect::TorqueGain);
         !unfit && (!rigid || !beyond_a_rigid_axis)
+    }
+
+    /// Whether its effects are what they are called.
+    pub(super) fn is_genuine(&self, t: &Tested) -> bool {
+        self.swings(t) && self.turns(t)
+    }
+
+    /// Whether every sine comes round within the record: a slower one is a constant or a drift.
+    fn turns(&self, t: &Tested) -> bool {
+        t.effects.iter().all(|&(effect, form)| {
+            let Some((i, scale)) = tone(effect, &effect.info().variants[form]) else { return true };
+            let span = match scale {
+                Scale::Frequency => std::f64::consts::TAU * self.data.record.len() as f64 * self.data.record.dt,
+                _ => self.states.travel(usize::from(effect.info().place != Place::Motor)),
+            };
+            t.fitted.model.effects.of(effect)[i] * span >= std::f64::consts::TAU
+        })
     }
 
     /// Whether a flexible mode, if there is one, is one: slower than the record, it is a wall with spring and damper; free
@@ -260,7 +292,7 @@ impl Search<'_> {
 
     /// A first look at a start, beside others with the axis' parameters as the regression has them; where the model runs away from it (a spring
     /// that softens beyond its range), or comes out no better than without the effect, from the start alone, then smaller.
-    fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
+    pub(super) fn glance(&self, beside: &Tested, candidate: &Candidate) -> Tested {
         let alone = beside.effects.is_empty();
         let good = |t: &Tested| t.fitted.chi2.is_finite() && (alone || t.fitted.chi2 < beside.fitted.chi2);
         let mut starts = if alone { Vec::new() } else { vec![candidate.moved()] };

@@ -26,6 +26,14 @@ impl States {
         let [theta1, omega1, theta2, omega2] = self.motion[sample];
         [theta1, omega1, theta2, omega2, 0.0, 0.0]
     }
+
+    /// Angle between the ends of the travel of motor (0) or table (1), rad.
+    #[must_use]
+    pub fn travel(&self, side: usize) -> f64 {
+        let angles = self.motion.iter().map(|s| s[2 * side]);
+        let (low, high) = angles.fold((f64::MAX, f64::MIN), |(l, h), a| (l.min(a), h.max(a)));
+        high - low
+    }
 }
 
 /// Extra torque on motor and table over each sample.

@@ -1,5 +1,7 @@
 //! Screening: every effect, at every start its parameters name, by linear regression along the measured motion.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -10,7 +12,7 @@ use super::parts::linear_parts;
 use super::record::Record;
 use super::response::{Column, Responder, States, dot, subtract};
 use super::tones;
-use super::trials::{Scales, Trial};
+use super::trials::{Scales, Trial, tone};
 use super::windows::Initial;
 use crate::axis::Parameters;
 use crate::effects::{Effect, Place, Role, Scale, Settings, Start, Variant};
@@ -26,6 +28,10 @@ const ERRORS: [f64; 2] = [-0.6, 1.5];
 /// Half widths of the parabolas by which a residual torque is seen in a residual position, samples: noise asks for wide
 /// ones, a high order for narrow ones.
 const WIDTHS: [usize; 3] = [1, 3, 6];
+/// Lines of a sine that a periodogram names, alone,
+const NAMED: usize = 8;
+/// and with another effect among what every hypothesis has.
+const NAMED_BESIDE: usize = 3;
 /// Part of a step within which two lines are one.
 const SAME: f64 = 0.1;
 
@@ -44,6 +50,7 @@ pub struct Candidate {
     pub chi2: f64,
     /// Relative changes of the axis' parameters beside it.
     moves: Vec<f64>,
+    pub(super) trial: Trial,
 }
 
 impl Candidate {
@@ -70,21 +77,58 @@ impl Candidate {
 }
 
 /// The regression along one record.
+#[derive(Clone)]
 pub struct Screen<'a> {
-    model: &'a Model,
+    pub(super) model: &'a Model,
     record: &'a Record,
     states: &'a States,
-    responder: Responder<'a>,
+    responder: Arc<Responder<'a>>,
     residual: Column,
+    /// Its sum of squares.
+    total: f64,
     /// Columns that every hypothesis has: errors of the nominal parameters, and effects already found.
-    common: Vec<Column>,
+    pub(super) common: Vec<Column>,
     gram: DMatrix<f64>,
     right: DVector<f64>,
     /// The residual less what the common columns explain.
     remainder: Column,
     /// How many of the common columns are errors of nominal parameters.
     errors: usize,
-    scales: Scales,
+    pub(super) scales: Arc<Scales>,
+    /// Lines of a sine that each of its periodograms names.
+    named: usize,
+}
+
+/// Columns, and their products with the columns that every hypothesis has, with each other, and with the residual.
+#[derive(Debug, Clone)]
+pub(super) struct Block {
+    common: DMatrix<f64>,
+    own: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl Block {
+    /// Two blocks side by side; `cross`: the products of the first one's columns with the second one's.
+    pub fn beside(&self, other: &Self, cross: &DMatrix<f64>) -> Self {
+        let (n, a, b) = (self.common.nrows(), self.right.len(), other.right.len());
+        let mut common = DMatrix::zeros(n, a + b);
+        common.columns_mut(0, a).copy_from(&self.common);
+        common.columns_mut(a, b).copy_from(&other.common);
+        let mut own = DMatrix::zeros(a + b, a + b);
+        own.view_mut((0, 0), (a, a)).copy_from(&self.own);
+        own.view_mut((a, a), (b, b)).copy_from(&other.own);
+        own.view_mut((0, a), (a, b)).copy_from(cross);
+        own.view_mut((a, 0), (b, a)).copy_from(&cross.transpose());
+        let mut right = DVector::zeros(a + b);
+        right.rows_mut(0, a).copy_from(&self.right);
+        right.rows_mut(a, b).copy_from(&other.right);
+        Self { common, own, right }
+    }
+}
+
+/// Products of the columns of one list with those of another.
+pub(super) fn products(a: &[Column], b: &[Column]) -> DMatrix<f64> {
+    DMatrix::from_fn(a.len(), b.len(), |i, j| dot(&a[i], &b[j]))
 }
 
 impl<'a> Screen<'a> {
@@ -102,7 +146,7 @@ impl<'a> Screen<'a> {
         found: &[(Effect, usize)],
     ) -> Self {
         let Data { record, windows } = data;
-        let responder = Responder::new(model, record, windows);
+        let responder = Arc::new(Responder::new(model, record, windows));
         let run = |m: &Model| responder.compared(predict(data, m, initial).into_iter().map(|(_, _, reading)| reading));
         let now = run(model);
         let mut residual =
@@ -136,24 +180,30 @@ impl<'a> Screen<'a> {
             gram[(i, i)] += if i < errors { PRIOR } else { FOUND }.powi(-2);
         }
         let scales = Scales::new(model, record, states);
-        let remainder = residual.clone();
-        let mut screen =
-            Self { model, record, states, responder, residual, common, gram, right, remainder, errors, scales };
-        let (_, x) = screen.solve(&[]);
-        for (column, x) in screen.common.iter().zip(&x) {
-            subtract(&mut screen.remainder, column, *x);
-        }
+        let (remainder, total) = (Column::new(), dot(&residual, &residual));
+        let mut screen = Self {
+            model,
+            record,
+            states,
+            responder,
+            residual,
+            total,
+            common,
+            gram,
+            right,
+            remainder,
+            errors,
+            scales: Arc::new(scales),
+            named: NAMED,
+        };
+        screen.remain();
         screen
     }
 
     /// Orders or frequencies at which an effect's sine would take most of the remainder away; empty if it has none.
     fn tones(&self, effect: Effect, form: &Variant) -> Vec<f64> {
         let info = effect.info();
-        let index = |wanted: fn(Start) -> bool| form.free.iter().copied().find(|&i| wanted(info.parameters[i].start));
-        let Some(at) = index(|s| matches!(s, Start::Grid(Scale::Order | Scale::Frequency, _))) else {
-            return Vec::new();
-        };
-        let Start::Grid(scale, _) = info.parameters[at].start else { return Vec::new() };
+        let Some((at, scale)) = tone(effect, form) else { return Vec::new() };
         let Some(lines) = self.scales.lines(effect, scale) else { return Vec::new() };
         let side = usize::from(info.place != Place::Motor);
         let angle: Vec<f64> = (0..self.record.len())
@@ -176,20 +226,25 @@ impl<'a> Screen<'a> {
         };
         if effect.is_sensor() {
             let adjoint = self.responder.adjoint_of_reading(&self.remainder, 2);
-            return lines.strongest(&angle, &adjoint, &length2);
+            return lines.strongest(&angle, &adjoint, &length2, self.named);
         }
         let adjoint: Vec<f64> = self.responder.adjoint(&self.remainder).iter().map(|t| t[side]).collect();
-        let mut found = lines.strongest(&angle, &adjoint, &length2);
+        let mut found = lines.strongest(&angle, &adjoint, &length2, self.named);
         let channel = if self.record.channels[2 * side].is_some() { 2 * side } else { 2 - 2 * side };
         for half in WIDTHS {
             let curved = self.responder.along(&self.remainder, channel, |part| tones::curvature(part, half));
-            for line in lines.loudest(&angle, &curved) {
+            for line in lines.loudest(&angle, &curved, self.named) {
                 if found.iter().all(|f| (f - line).abs() > SAME * lines.step) {
                     found.push(line);
                 }
             }
         }
         found
+    }
+
+    /// Number of compared values.
+    pub(super) fn values(&self) -> usize {
+        self.residual.len()
     }
 
     /// The best starts of an effect's variant, best first, at most `most`.
@@ -230,77 +285,138 @@ impl<'a> Screen<'a> {
     }
 
     fn regress(&self, effect: Effect, variant: usize, form: &Variant, trial: &Trial) -> Option<Candidate> {
-        let info = effect.info();
+        let block = self.block(&self.columns(effect, form, trial));
+        let (chi2, x) = self.solve(&block);
+        let settings = self.resized(self.model.effects, effect, form, trial, &x[self.common.len()..]);
+        self.candidate(effect, variant, trial, settings, chi2, &x)
+    }
+
+    /// A candidate, if it is on; `x`: the sizes of all columns.
+    pub(super) fn candidate(
+        &self,
+        effect: Effect,
+        variant: usize,
+        trial: &Trial,
+        settings: Settings,
+        chi2: f64,
+        x: &[f64],
+    ) -> Option<Candidate> {
+        let moves = x[..self.errors].to_vec();
+        let parameters = self.model.parameters;
+        let trial = trial.clone();
+        settings.is_on(effect).then_some(Candidate { effect, variant, parameters, settings, chi2, moves, trial })
+    }
+
+    /// Columns of an effect at a trial: one for each of its linear parts, or of the whole.
+    pub(super) fn columns(&self, effect: Effect, form: &Variant, trial: &Trial) -> Vec<Column> {
         let column = |settings: &Settings| {
             features::column(effect, settings, self.model, self.record, self.states, &self.responder)
         };
         let parts = linear_parts(effect, form, &trial.settings);
         let mut columns: Vec<Column> = parts.iter().map(|p| column(&p.unit)).collect();
-        let nonlinear = columns.is_empty();
-        if nonlinear {
+        if columns.is_empty() {
             columns.push(column(&trial.settings));
             if effect == Effect::FlexibleMode {
                 columns.extend(features::free_decay(&trial.settings, self.record, &self.responder));
             }
         }
-        let (chi2, x) = self.solve(&columns);
-        let sizes = &x[self.common.len()..];
-        let mut settings = self.model.effects;
+        columns
+    }
+
+    /// The settings with an effect at a trial, its columns as large as the regression has them.
+    pub(super) fn resized(
+        &self,
+        mut settings: Settings,
+        effect: Effect,
+        form: &Variant,
+        trial: &Trial,
+        sizes: &[f64],
+    ) -> Settings {
+        let info = effect.info();
+        let parts = linear_parts(effect, form, &trial.settings);
         settings.of_mut(effect).copy_from_slice(trial.settings.of(effect));
-        if nonlinear {
+        if parts.is_empty() {
             // A factor far off says that the regression cannot tell this size; the grid's own stands.
             let c = Some(sizes[0]).filter(|c| (0.05..=20.0).contains(c)).unwrap_or(1.0);
             trial.rescale(effect, &mut settings, c, &self.scales);
-        } else {
-            let p = settings.of_mut(effect);
-            for (n, part) in parts.iter().enumerate() {
-                let i = part.parameter;
-                match info.parameters[i].start {
-                    Start::Phase => {
-                        let amplitude = parts[n - 1].parameter;
-                        let (s, c) = (sizes[n], sizes[n - 1]);
-                        p[amplitude] = s.hypot(c);
-                        p[i] = s.atan2(c);
-                    }
-                    Start::Share => {
-                        // The size's torque is in both columns.
-                        p[form.free[0]] += sizes[n];
-                        p[i] = if p[form.free[0]] == 0.0 { 0.0 } else { sizes[n] / p[form.free[0]] };
-                    }
-                    _ => p[i] = info.parameters[i].off + sizes[n],
+        }
+        let p = settings.of_mut(effect);
+        for (n, part) in parts.iter().enumerate() {
+            let i = part.parameter;
+            match info.parameters[i].start {
+                Start::Phase => {
+                    let amplitude = parts[n - 1].parameter;
+                    let (s, c) = (sizes[n], sizes[n - 1]);
+                    p[amplitude] = s.hypot(c);
+                    p[i] = s.atan2(c);
                 }
+                Start::Share => {
+                    // The size's torque is in both columns.
+                    p[form.free[0]] += sizes[n];
+                    p[i] = if p[form.free[0]] == 0.0 { 0.0 } else { sizes[n] / p[form.free[0]] };
+                }
+                _ => p[i] = info.parameters[i].off + sizes[n],
             }
         }
-        for (value, info) in settings.of_mut(effect).iter_mut().zip(info.parameters) {
+        for (value, info) in p.iter_mut().zip(info.parameters) {
             *value = value.clamp(info.min, info.max);
         }
-        let moves = x[..self.errors].to_vec();
-        let parameters = self.model.parameters;
-        settings.is_on(effect).then_some(Candidate { effect, variant, parameters, settings, chi2, moves })
+        settings
+    }
+
+    /// The same regression with an effect at a start among what every hypothesis has.
+    pub(super) fn given(&self, columns: &[Column]) -> Self {
+        let block = self.block(columns);
+        let mut screen = Self { named: NAMED_BESIDE, ..self.clone() };
+        let (n, m) = (self.common.len(), columns.len());
+        screen.common.extend_from_slice(columns);
+        screen.gram = self.whole(&block);
+        screen.right = DVector::from_fn(n + m, |i, _| if i < n { self.right[i] } else { block.right[i - n] });
+        screen.remain();
+        screen
+    }
+
+    /// Takes what the common columns explain out of the residual.
+    fn remain(&mut self) {
+        let (_, x) = self.solve(&self.block(&[]));
+        self.remainder.clone_from(&self.residual);
+        for (column, x) in self.common.iter().zip(&x) {
+            subtract(&mut self.remainder, column, *x);
+        }
+    }
+
+    pub(super) fn block(&self, columns: &[Column]) -> Block {
+        Block {
+            common: products(&self.common, columns),
+            own: products(columns, columns),
+            right: DVector::from_fn(columns.len(), |i, _| dot(&columns[i], &self.residual)),
+        }
+    }
+
+    /// Products of the common columns and a block's with each other.
+    fn whole(&self, block: &Block) -> DMatrix<f64> {
+        let (n, m) = (self.common.len(), block.right.len());
+        let mut gram = DMatrix::zeros(n + m, n + m);
+        gram.view_mut((0, 0), (n, n)).copy_from(&self.gram);
+        gram.view_mut((0, n), (n, m)).copy_from(&block.common);
+        gram.view_mut((n, 0), (m, n)).copy_from(&block.common.transpose());
+        gram.view_mut((n, n), (m, m)).copy_from(&block.own);
+        gram
     }
 
     /// Regression on the common columns and these: what is left, and the sizes of all.
     ///
     /// Errors of the nominal parameters stay between [`ERRORS`]: along a measured motion I2, B and K of nothing at all
     /// leave no error of the table, whatever acts on it.
-    fn solve(&self, columns: &[Column]) -> (f64, Vec<f64>) {
-        let (n, m) = (self.common.len(), columns.len());
-        let mut gram = DMatrix::zeros(n + m, n + m);
-        gram.view_mut((0, 0), (n, n)).copy_from(&self.gram);
+    pub(super) fn solve(&self, block: &Block) -> (f64, Vec<f64>) {
+        let (n, m) = (self.common.len(), block.right.len());
+        let gram = self.whole(block);
         let mut right = DVector::zeros(n + m);
         right.rows_mut(0, n).copy_from(&self.right);
-        for (j, column) in columns.iter().enumerate() {
-            for (i, other) in self.common.iter().chain(columns).enumerate() {
-                let product = dot(column, other);
-                gram[(i, n + j)] = product;
-                gram[(n + j, i)] = product;
-            }
-            right[n + j] = dot(column, &self.residual);
-        }
-        let total = dot(&self.residual, &self.residual);
+        right.rows_mut(n, m).copy_from(&block.right);
         let mut held: Vec<(usize, f64)> = Vec::new();
         loop {
-            let Some(x) = solve_with_held(&gram, &right, &held) else { return (total, vec![0.0; n + m]) };
+            let Some(x) = solve_with_held(&gram, &right, &held) else { return (self.total, vec![0.0; n + m]) };
             let outside = (0..self.errors)
                 .map(|i| (i, x[i].clamp(ERRORS[0], ERRORS[1])))
                 .filter(|(i, bound)| (x[*i] - bound).abs() > 0.0)
@@ -308,7 +424,7 @@ impl<'a> Screen<'a> {
             match outside {
                 Some(bound) => held.push(bound),
                 None => {
-                    let chi2 = total - 2.0 * right.dot(&x) + (&gram * &x).dot(&x);
+                    let chi2 = self.total - 2.0 * right.dot(&x) + (&gram * &x).dot(&x);
                     return (chi2, x.as_slice().to_vec());
                 }
             }

@@ -157,7 +157,21 @@ impl Search<'_> {
         best
     }
 
-    /// A combination with one of its effects replaced by a form of its kin, from where it stands.
+    /// The combination with each of its effects in turn in the form that suits it best, from where it stands.
+    #[must_use]
+    pub fn in_best_forms(&self, combination: Tested) -> Tested {
+        let mut best = combination;
+        for i in 0..best.effects.len() {
+            let (effect, form) = best.effects[i];
+            let others = (0..effect.info().variants.len()).filter(|other| *other != form);
+            let mut forms: Vec<Tested> = others.map(|other| self.replaced(&best, i, effect, other)).collect();
+            forms.push(best.clone());
+            best = simplest_of(forms, self.data.values() as f64).unwrap_or(best);
+        }
+        best
+    }
+
+    /// A combination with one of its effects replaced by a form of its kin, or of itself, from where it stands.
     fn replaced(&self, combination: &Tested, at: usize, kin: Effect, form: usize) -> Tested {
         let (effect, _) = combination.effects[at];
         let mut model = combination.fitted.model;

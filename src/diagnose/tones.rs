@@ -12,8 +12,6 @@ use super::nonuniform;
 
 /// Lines at which the length of a column is computed.
 const KNOTS: usize = 24;
-/// Lines named.
-const NAMED: usize = 8;
 /// Steps of the golden section that takes a line off its grid.
 const SHARPENINGS: usize = 10;
 
@@ -36,31 +34,38 @@ impl Lines {
         Self { step, count: ((most / step).floor().max(1.0) as usize).min(MOST) }
     }
 
-    /// The lines at which a sine would take most of the residual away, best first: local maxima of the periodogram.
+    /// The lines at which a sine would take most of the residual away, best first, at most `most`: local maxima of the
+    /// periodogram.
     ///
     /// `angle`: what one unit of order (rad) or frequency (rad.s) is multiplied by at each sample; `adjoint`: the
     /// residual brought back to the place where the sine acts, of the same length; `length2(line)`: squared length of
     /// the column of a sine of unit amplitude at a line.
     #[must_use]
-    pub fn strongest(&self, angle: &[f64], adjoint: &[f64], length2: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<f64> {
+    pub fn strongest(
+        &self,
+        angle: &[f64],
+        adjoint: &[f64],
+        length2: &(dyn Fn(f64) -> f64 + Sync),
+        most: usize,
+    ) -> Vec<f64> {
         let knots = self.knots(length2);
         let power = self.power(angle, adjoint);
         let score: Vec<f64> = power.iter().zip(1..).map(|(p, n)| p / interpolated(&knots, f64::from(n))).collect();
-        self.sharpened(self.peaks(&score), angle, adjoint)
+        self.sharpened(self.peaks(&score, most), angle, adjoint)
     }
 
-    /// The lines at which a series itself holds most of a sine along `angle`, best first.
+    /// The lines at which a series itself holds most of a sine along `angle`, best first, at most `most`.
     #[must_use]
-    pub fn loudest(&self, angle: &[f64], series: &[f64]) -> Vec<f64> {
-        self.sharpened(self.peaks(&self.power(angle, series)), angle, series)
+    pub fn loudest(&self, angle: &[f64], series: &[f64], most: usize) -> Vec<f64> {
+        self.sharpened(self.peaks(&self.power(angle, series), most), angle, series)
     }
 
-    fn peaks(&self, score: &[f64]) -> Vec<f64> {
+    fn peaks(&self, score: &[f64], most: usize) -> Vec<f64> {
         let at = |i: usize| score.get(i).copied().unwrap_or(0.0);
         let mut peaks: Vec<usize> =
             (0..score.len()).filter(|&i| at(i) > at(i.wrapping_sub(1)) && at(i) >= at(i + 1)).collect();
         peaks.sort_by(|a, b| score[*b].total_cmp(&score[*a]));
-        peaks.iter().take(NAMED).map(|&i| (i + 1) as f64 * self.step).collect()
+        peaks.iter().take(most).map(|&i| (i + 1) as f64 * self.step).collect()
     }
 
     /// Peaks off the grid, where their power is greatest: half a step is a quarter turn over the record.
@@ -150,7 +155,7 @@ mod tests {
         let noise = |k: usize| ((k * k) as f64 * 0.37).sin();
         let residual: Vec<f64> = angle.iter().enumerate().map(|(k, a)| (order * a + 0.4).cos() + noise(k)).collect();
         let lines = Lines::up_to(60.0, 0.02);
-        let named = lines.loudest(&angle, &residual);
+        let named = lines.loudest(&angle, &residual, 8);
         assert!((named[0] - order).abs() <= 0.5 * lines.step, "{named:?}");
     }
 

@@ -12,6 +12,21 @@ const FINEST: f64 = 2.0;
 /// Highest frequency tried, as a share of the sampling rate.
 const HIGHEST: f64 = 0.45;
 
+/// The order or frequency among a form's parameters, and its scale; `None` if it is no sine.
+#[must_use]
+pub fn tone(effect: Effect, form: &Variant) -> Option<(usize, Scale)> {
+    form.free.iter().find_map(|&i| match effect.info().parameters[i].start {
+        Start::Grid(scale @ (Scale::Order | Scale::Frequency), _) => Some((i, scale)),
+        _ => None,
+    })
+}
+
+/// Whether an effect is a sine of an order or a frequency to be found.
+#[must_use]
+pub fn is_sine(effect: Effect) -> bool {
+    effect.info().variants.iter().any(|form| tone(effect, form).is_some())
+}
+
 /// Shapes of an effect to be tried, with the fractions they came from.
 #[derive(Debug, Clone)]
 pub struct Trial {
@@ -65,12 +80,8 @@ impl Scales {
             let mean = states.motion.iter().map(|s| s[i]).sum::<f64>() / n;
             rms(&|s| s[i] - mean).max(1e-12)
         };
-        let span = |i: usize| {
-            let (low, high) = states.motion.iter().fold((f64::MAX, f64::MIN), |(l, h), s| (l.min(s[i]), h.max(s[i])));
-            high - low
-        };
-        let orders = |i: usize, speed: f64| {
-            let step = 0.25 * std::f64::consts::TAU / span(i).max(1e-12);
+        let orders = |side: usize, speed: f64| {
+            let step = 0.25 * std::f64::consts::TAU / states.travel(side).max(1e-12);
             Lines::up_to(FINEST / (record.dt * speed.max(1e-12)), step)
         };
         let length = record.len() as f64 * record.dt;
@@ -80,7 +91,7 @@ impl Scales {
             Structure::Rigid => std::f64::consts::TAU * 0.05 / record.dt,
         };
         Self {
-            orders: [orders(0, speed[0]), orders(2, speed[1])],
+            orders: [orders(0, speed[0]), orders(1, speed[1])],
             speed,
             twist: rms(&|s| s[0] - s[2]),
             torque: record.torque.iter().fold(0.0, |m, t| t.abs().max(m)),

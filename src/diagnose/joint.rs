@@ -1,0 +1,151 @@
+//! Two effects at once, by regression: every effect at its best start beside every other at every shape that is tried.
+//!
+//! One effect fitted alone leans towards what another does, and may end where no partner brings it back from. Along the
+//! measured motion both are sized at once, whichever is larger. What a trial has in common with all others is computed
+//! once; a pair then costs the solution of one small system.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::response::Column;
+use super::screen::{Block, Candidate, Screen, products};
+use super::trials::{Trial, is_sine};
+use crate::effects::{Effect, Variant};
+
+/// First effects, the best alone, beside which the line of a sine is looked for.
+const TONED: usize = 8;
+/// Lines of a sine that are first effects.
+const LINES: usize = 3;
+
+/// Two effects, sized together.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    /// The one that was there first.
+    pub first: (Effect, usize),
+    /// The other, with both in its settings.
+    pub second: Candidate,
+}
+
+/// An effect at a trial.
+struct Probe {
+    effect: Effect,
+    variant: usize,
+    trial: Trial,
+    block: Block,
+}
+
+impl Probe {
+    fn form(&self) -> &'static Variant {
+        &self.effect.info().variants[self.variant]
+    }
+}
+
+/// What a pair leaves: the sum of squares, which first, which second.
+type Left = (f64, usize, usize);
+
+impl Screen<'_> {
+    /// Pairs of different effects, at most `most`, those first that leave least for the freedom they take.
+    #[must_use]
+    pub fn pairs(&self, suspects: &[Effect], most: usize) -> Vec<Pair> {
+        let firsts = self.firsts(suspects);
+        let columns: Vec<Vec<Column>> = firsts.par_iter().map(|f| self.columns(f.effect, f.form(), &f.trial)).collect();
+        let seconds = self.seconds(suspects, &firsts, &columns);
+        // Products with the columns of every first, side by side.
+        let crosses: Vec<(Probe, Vec<DMatrix<f64>>)> = seconds
+            .into_par_iter()
+            .map(|(effect, variant, trial)| {
+                let own = self.columns(effect, &effect.info().variants[variant], &trial);
+                let crosses = columns.iter().map(|first| products(first, &own)).collect();
+                (Probe { effect, variant, trial, block: self.block(&own) }, crosses)
+            })
+            .collect();
+        let together = |i: usize, j: usize| firsts[i].block.beside(&crosses[j].0.block, &crosses[j].1[i]);
+        let left: Vec<Left> = crosses
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(j, (second, _))| {
+                let others = (0..firsts.len()).filter(|&i| firsts[i].effect != second.effect);
+                others.map(|i| (self.solve(&together(i, j)).0, i, j)).collect::<Vec<Left>>()
+            })
+            .collect();
+        let values = self.values() as f64;
+        let floor = left.iter().map(|l| l.0 / values).fold(f64::INFINITY, f64::min).max(1.0);
+        let price = |&(chi2, i, j): &Left| {
+            let freedom = firsts[i].form().free.len() + crosses[j].0.form().free.len();
+            chi2 / floor + freedom as f64 * values.ln()
+        };
+        let mut best: BTreeMap<(Effect, Effect), Left> = BTreeMap::new();
+        for l in left.into_iter().filter(|l| l.0.is_finite()) {
+            let (a, b) = (firsts[l.1].effect, crosses[l.2].0.effect);
+            let known = best.entry((a.min(b), a.max(b))).or_insert(l);
+            if price(&l) < price(known) {
+                *known = l;
+            }
+        }
+        let mut ranked: Vec<Left> = best.into_values().collect();
+        ranked.sort_by(|a, b| price(a).total_cmp(&price(b)));
+        ranked
+            .into_iter()
+            .filter_map(|(_, i, j)| {
+                let (first, second) = (&firsts[i], &crosses[j].0);
+                let (chi2, x) = self.solve(&together(i, j));
+                let (of_first, of_second) = x[self.common.len()..].split_at(columns[i].len());
+                let settings = self.resized(self.model.effects, first.effect, first.form(), &first.trial, of_first);
+                let settings = self.resized(settings, second.effect, second.form(), &second.trial, of_second);
+                let on = settings.is_on(first.effect);
+                let second = self.candidate(second.effect, second.variant, &second.trial, settings, chi2, &x);
+                second.filter(|_| on).map(|second| Pair { first: (first.effect, first.variant), second })
+            })
+            .take(most)
+            .collect()
+    }
+
+    /// Every effect at its best start, a sine at several lines, best first.
+    fn firsts(&self, suspects: &[Effect]) -> Vec<Probe> {
+        let mut found: Vec<Candidate> = suspects
+            .par_iter()
+            .flat_map_iter(|&effect| {
+                let most = if is_sine(effect) { LINES } else { 1 };
+                let mut starts: Vec<Candidate> =
+                    (0..effect.info().variants.len()).flat_map(|v| self.starts(effect, v, most)).collect();
+                starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+                starts.truncate(most);
+                starts
+            })
+            .collect();
+        found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        found
+            .into_iter()
+            .map(|Candidate { effect, variant, trial, .. }| {
+                let block = self.block(&self.columns(effect, &effect.info().variants[variant], &trial));
+                Probe { effect, variant, trial, block }
+            })
+            .collect()
+    }
+
+    /// Every effect in every shape that is tried; sines at the lines of their own and at those beside the best of the others.
+    fn seconds(&self, suspects: &[Effect], firsts: &[Probe], columns: &[Vec<Column>]) -> Vec<(Effect, usize, Trial)> {
+        let (sines, others): (Vec<Effect>, Vec<Effect>) = suspects.iter().partition(|e| is_sine(**e));
+        let mut seconds: Vec<(Effect, usize, Trial)> = Vec::new();
+        for effect in others {
+            for (variant, form) in effect.info().variants.iter().enumerate() {
+                seconds.extend(self.scales.trials(effect, form, &[]).into_iter().map(|trial| (effect, variant, trial)));
+            }
+        }
+        seconds.extend(firsts.iter().filter(|f| is_sine(f.effect)).map(|f| (f.effect, f.variant, f.trial.clone())));
+        let beside: Vec<(Effect, usize, Trial)> = columns[..TONED.min(columns.len())]
+            .par_iter()
+            .flat_map_iter(|first| {
+                let screen = self.given(first);
+                let starts = sines.iter().flat_map(|&sine| {
+                    (0..sine.info().variants.len()).flat_map(|v| screen.starts(sine, v, 1)).collect::<Vec<_>>()
+                });
+                starts.map(|c| (c.effect, c.variant, c.trial)).collect::<Vec<_>>()
+            })
+            .collect();
+        seconds.extend(beside);
+        seconds
+    }
+}
