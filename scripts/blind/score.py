@@ -90,6 +90,12 @@ def confusable(answer: dict | None, told: str, wanted: set):
     return False, False
 
 
+def rivals(answer: dict | None, causes: list) -> set:
+    """Effects that the answer names as confusable with one of its causes."""
+    pairs = [set(p[:2]) for p in (answer or {}).get("confusable") or []]
+    return set().union(*(p for p in pairs if p & set(causes)))
+
+
 def judge(seal: dict, answer: dict | None, seconds: float | None) -> dict:
     """One row of the result: the truth, the answer, and whether they agree."""
     true_family, true_place = truth(seal)
@@ -121,6 +127,7 @@ def judge(seal: dict, answer: dict | None, seconds: float | None) -> dict:
         "closure_of_oracle": None if best is None else (found or 0.0) / best, "seconds": seconds,
         "pair_named": len(ids) == 2 and {family_of(i) for i in ids} <= {family_of(c) for c in causes},
         "pair_ids_named": len(ids) == 2 and set(ids) <= set(causes),
+        "pair_ids_confusable": len(ids) == 2 and set(ids) <= set(causes) | rivals(answer, causes),
         "pair_hits": sum(family_of(i) in {family_of(c) for c in causes} for i in ids) if len(ids) == 2 else None,
         # A step below the noise is there in some cases, beside the hidden effect: naming it too is not wrong.
         "extra": len([c for c in causes if family_of(c) not in {family_of(i) for i in ids}
@@ -180,6 +187,7 @@ def summary(rows: list[dict], without: list[dict]) -> dict:
     out["closure_of_oracle"] = {"all_singles": quantiles(r["closure_of_oracle"] for r in singles),
                                 "family_right": quantiles(r["closure_of_oracle"] for r in singles if r["family_right"])}
     out["pairs"] = {"families": proportion(pairs, "pair_named"), "ids": proportion(pairs, "pair_ids_named"),
+                    "ids_confusable": proportion(pairs, "pair_ids_confusable"),
                     "causes_found": sum(r["pair_hits"] or 0 for r in pairs), "causes": 2 * len(pairs),
                     "false_causes": sum(r["extra"] for r in pairs)}
     out["extra_causes_in_singles"] = sum(r["extra"] > 0 and r["family_right"] for r in singles)
@@ -238,6 +246,7 @@ def markdown(s: dict, rows: list[dict], title: str) -> str:
     p = s["pairs"]
     lines += [f"| two effects, both families named | {percent(p['families'])} | 90 % |",
               f"| two effects, both effects named | {percent(p['ids'])} | |",
+              f"| two effects, each named or named as confusable with one that is | {percent(p['ids_confusable'])} | |",
               f"| two effects: causes found, false ones | {p['causes_found']}/{p['causes']}, {p['false_causes']} | |",
               f"| single effects with a further, false cause | {s['extra_causes_in_singles']} | |"]
     if s["seconds"]:

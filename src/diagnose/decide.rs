@@ -59,6 +59,15 @@ pub struct Weighed {
     pub probability: f64,
 }
 
+impl Confusable {
+    /// Whether the two are the same but for where they act.
+    #[must_use]
+    pub fn is_of_place(&self) -> bool {
+        let (named, other) = (self.named.info(), self.other.info());
+        named.family == other.family && named.place != other.place
+    }
+}
+
 /// The decision.
 #[derive(Debug, Clone)]
 pub struct Decision {
@@ -76,8 +85,19 @@ pub struct Decision {
     pub shares: Vec<f64>,
     /// Number of values that the fits compared.
     pub values: f64,
-    /// Hypotheses that the record cannot tell from the chosen one.
-    pub confusable: Vec<(Tested, f64)>,
+    /// Effects that the record cannot tell from chosen ones.
+    pub confusable: Vec<Confusable>,
+}
+
+/// An effect named, and another that explains the record as well in its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Confusable {
+    /// The one named.
+    pub named: Effect,
+    /// The other.
+    pub other: Effect,
+    /// BIC with the other in its place, less the BIC as named.
+    pub delta_bic: f64,
 }
 
 impl Decision {
@@ -160,7 +180,7 @@ pub fn decide(search: &Search<'_>, progress: &(dyn Fn(&str) + Sync)) -> Decision
     }
     let verdict = verdict(&given, &parameters, singles.first(), &chosen, values);
     let ranking = rank(&given, &parameters, &singles, &chosen, values);
-    let confusable = confusable(&chosen, &singles, values);
+    let confusable = confusable(search, &chosen, &singles, values);
     Decision { verdict, given, parameters, chosen, ranking, shares, values, confusable }
 }
 
@@ -359,16 +379,21 @@ fn rank(given: &Tested, parameters: &Tested, singles: &[Tested], chosen: &Tested
     ranking
 }
 
-fn confusable(chosen: &Tested, singles: &[Tested], values: f64) -> Vec<(Tested, f64)> {
-    if chosen.effects.len() != 1 {
-        return Vec::new();
-    }
+/// Effects that explain the record as well in the place of one named: of a single effect all that were fitted, of
+/// each of several its kin.
+fn confusable(search: &Search<'_>, chosen: &Tested, singles: &[Tested], values: f64) -> Vec<Confusable> {
     let floor = (chosen.fitted.chi2 / values).max(1.0);
-    singles
-        .iter()
-        .filter(|t| t.effects[0].0 != chosen.effects[0].0)
-        .map(|t| (t, bic(t, values, floor) - bic(chosen, values, floor)))
-        .filter(|(_, d)| *d < CONFUSABLE)
-        .map(|(t, d)| (t.clone(), d))
+    let rivals = |at: usize| match chosen.effects.len() {
+        1 => singles.iter().filter(|t| t.effects[0].0 != chosen.effects[0].0).cloned().collect(),
+        _ => search.kin(chosen, at),
+    };
+    (0..chosen.effects.len())
+        .flat_map(|at| rivals(at).into_iter().map(move |t| (at, t)))
+        .map(|(at, t)| Confusable {
+            named: chosen.effects[at].0,
+            other: t.effects[at].0,
+            delta_bic: bic(&t, values, floor) - bic(chosen, values, floor),
+        })
+        .filter(|c| c.delta_bic < CONFUSABLE)
         .collect()
 }

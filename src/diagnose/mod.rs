@@ -30,7 +30,7 @@ mod words;
 
 pub use assess::{Case, Outcome, Replay, diagnose};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
-pub use decide::{Decision, Verdict};
+pub use decide::{Confusable, Decision, Verdict};
 pub use diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
 pub use evidence::{Evidence, Overlay};
 pub use fit::{Data, predict};

@@ -142,19 +142,25 @@ impl Search<'_> {
     pub fn among_kin(&self, combination: Tested) -> Tested {
         let mut best = combination;
         for i in 0..best.effects.len() {
-            let (effect, _) = best.effects[i];
-            let known = best.ids();
-            let kin = self.suspects.iter().copied().filter(|k| effect.is_kin_of(*k) && !known.contains(&k.info().id));
-            let replaced = kin.filter_map(|kin| {
-                let forms = 0..kin.info().variants.len();
-                simplest_of(forms.map(|form| self.replaced(&best, i, kin, form)).collect(), self.data.values() as f64)
-            });
-            let replaced = replaced.min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+            let replaced = self.kin(&best, i).into_iter().min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
             if let Some(replaced) = replaced.filter(|r| r.fitted.chi2 < best.fitted.chi2) {
                 best = replaced;
             }
         }
         best
+    }
+
+    /// The combination with one of its effects replaced by each of its kin in its best form, from where it stands.
+    #[must_use]
+    pub fn kin(&self, combination: &Tested, at: usize) -> Vec<Tested> {
+        let (effect, _) = combination.effects[at];
+        let known = combination.ids();
+        let kin = self.suspects.iter().copied().filter(|k| effect.is_kin_of(*k) && !known.contains(&k.info().id));
+        kin.filter_map(|kin| {
+            let forms = (0..kin.info().variants.len()).map(|form| self.replaced(combination, at, kin, form));
+            simplest_of(forms.collect(), self.data.values() as f64)
+        })
+        .collect()
     }
 
     /// The combination with each of its effects in turn in the form that suits it best, from where it stands.

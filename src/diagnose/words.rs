@@ -1,6 +1,6 @@
 //! The diagnosis in words: verdict, confusable pairs, the next experiment.
 
-use super::decide::{Decision, Verdict};
+use super::decide::{Confusable, Decision, Verdict};
 use super::diagnosis::Diagnosis;
 use crate::effects::{Effect, Family};
 
@@ -31,11 +31,9 @@ pub fn fill(d: &mut Diagnosis, decision: &Decision) {
             format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}")
         }
     };
-    if let Some((effect, _)) = decision.chosen.effects.first() {
-        for (other, delta) in &decision.confusable {
-            let why = format!("their fits differ by {delta:.1} in BIC on this record");
-            d.confusable.push([effect.info().id.to_owned(), other.ids().join("+"), why]);
-        }
+    for c in &decision.confusable {
+        let why = format!("their fits differ by {:.1} in BIC on this record", c.delta_bic);
+        d.confusable.push([c.named.info().id.to_owned(), c.other.info().id.to_owned(), why]);
     }
     d.next_experiment = next(d, decision);
 }
@@ -56,7 +54,7 @@ fn next(d: &Diagnosis, decision: &Decision) -> String {
         .iter()
         .take(1)
         .map(|(e, _)| e.info().family)
-        .chain(decision.confusable.iter().filter_map(|(t, _)| t.effects.first().map(|(e, _)| e.info().family)))
+        .chain(decision.confusable.iter().flat_map(|c| [c.named, c.other]).map(|e| e.info().family))
         .collect();
     let has = |f: Family| families.contains(&f);
     let text = match d.verdict {
@@ -70,6 +68,10 @@ fn next(d: &Diagnosis, decision: &Decision) -> String {
         }
         Verdict::Effect if d.confusable.is_empty() => {
             "None needed to name the cause. Confirm it with a record at another amplitude, and re-run with it in axis.toml."
+        }
+        Verdict::Effect if decision.confusable.iter().any(Confusable::is_of_place) => {
+            "Log the encoders on both sides of the coupling: which side a force acts on shows in what the two \
+             readings do to each other."
         }
         Verdict::Effect if has(Family::Backlash) || has(Family::NonlinearStiffness) || has(Family::Hysteresis) => {
             "Drive the coupling harder near its resonance, at two amplitudes: play shrinks in relative terms, a cubic \
