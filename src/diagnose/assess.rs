@@ -24,6 +24,10 @@ const HELD_OUT: f64 = 1.0 / 3.0;
 /// Samples of a record that are worked on at most: what a longer one adds to the naming of a cause is time.
 const LONGEST: usize = 16_384;
 
+/// Closure in time, from the parameters fitted, that a cause named at the excitation's lines must have: it need not close
+/// anything there, but if it more than doubles the squared error it is no cause.
+const WORSE: f64 = -1.0;
+
 /// What is diagnosed.
 pub struct Case<'a> {
     /// The machine's name.
@@ -90,11 +94,17 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     decision.confirm(on_held.closure, on_held.closure_of_effect);
     progress("lines of the excitation");
     let unexplained = decision.verdict == Verdict::Unexplained;
-    let linear = unexplained.then(|| lines::examine(case, &all, &all_held)).flatten();
+    let linear = unexplained.then(|| lines::examine(case, &all, &all_held)).flatten().and_then(|found| {
+        let models = [fitted[0], fitted[1], *found.improved()];
+        let on_held = held.gap(models);
+        (on_held.closure_of_effect > WORSE).then_some((found, models, on_held))
+    });
     progress("where");
     let located = locate(record, &case.nominal.parameters, case.nominal.structure);
-    let models = linear.as_ref().map_or(fitted, |found| [fitted[0], fitted[1], *found.improved()]);
-    let on_held = if linear.is_some() { held.gap(models) } else { on_held };
+    let (linear, models, on_held) = match linear {
+        Some((found, models, on_held)) => (Some(found), models, on_held),
+        None => (None, fitted, on_held),
+    };
     let on_train = {
         let initial = initial(&search.states, &train);
         let e = models.map(|m| gap::errors(data, &m, &initial).0);

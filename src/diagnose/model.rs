@@ -96,6 +96,9 @@ pub enum Free {
     Loop(usize),
 }
 
+/// Smallest share of its start that a size may shrink to.
+const NOTHING: f64 = 1e-9;
+
 /// How a free number is moved: `value = exp(x)*unit` or `value = x*unit`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coordinate {
@@ -130,6 +133,10 @@ impl Coordinate {
                 } else {
                     [info.min / unit, info.max / unit]
                 };
+                // An effect of no size is off, whatever its shapes do: what its fit has found would not be there again.
+                #[allow(clippy::float_cmp, reason = "off and bounds are exact values of the table")]
+                let off_at_an_end = info.role == Role::Size && info.min == info.off;
+                let bounds = if off_at_an_end { [bounds[0] + NOTHING, bounds[1]] } else { bounds };
                 Self { free, log, unit, bounds }
             }
             Free::Loop(_) => Self { free, log: false, unit: 1.0, bounds: [-1.0, 1.0] },
