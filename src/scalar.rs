@@ -28,6 +28,9 @@ pub trait Scalar:
     + SubAssign
     + MulAssign<f64>
 {
+    /// Whether it carries derivatives.
+    const HAS_DERIVATIVES: bool;
+
     /// The value.
     fn re(self) -> f64;
     /// Applies a function with the given value and derivative at `self.re()` (the chain rule).
@@ -73,6 +76,8 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    const HAS_DERIVATIVES: bool = false;
+
     fn re(self) -> f64 {
         self
     }
@@ -116,6 +121,8 @@ impl<const N: usize> From<f64> for Dual<N> {
 }
 
 impl<const N: usize> Scalar for Dual<N> {
+    const HAS_DERIVATIVES: bool = true;
+
     fn re(self) -> f64 {
         self.re
     }

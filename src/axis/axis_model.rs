@@ -17,6 +17,8 @@ pub struct Axis<S = f64> {
     pub(super) step: Propagator<S>,
     pub(super) compliance: Compliance,
     pub(super) base: Base<S>,
+    /// Whether an effect that is on has internal states.
+    pub(super) remembers: bool,
 }
 
 impl<S: Scalar> Axis<S> {
@@ -51,7 +53,8 @@ impl<S: Scalar> Axis<S> {
             // A rigid axis has no coupling for an effect to act on.
             Structure::Rigid => Base { k: S::default(), b: S::default() },
         };
-        Self { parameters, structure, scheme, effects, on, step, compliance: step.compliance(), base }
+        let remembers = on.forces().iter().any(|e| e.info().memory > 0);
+        Self { parameters, structure, scheme, effects, on, step, compliance: step.compliance(), base, remembers }
     }
 
     /// The parameters.

@@ -91,6 +91,20 @@ impl<S: Scalar> Propagator<S> {
         ]
     }
 
+    /// The end of a step with `torque` less on motor and table at its end.
+    #[inline]
+    pub(super) fn less(&self, end: &Linear<S>, torque: [S; 2]) -> Linear<S> {
+        let a = (torque[0] + torque[1]) * self.inverse_total;
+        let u = torque[0] * self.inverse_1 - torque[1] * self.inverse_2;
+        let (d, v) = (self.twist.y1 * u, self.twist.v1 * u);
+        [
+            end[0] - (self.centre.y1 * a + self.share * d),
+            end[1] - (self.centre.v1 * a + self.share * v),
+            end[2] - d,
+            end[3] - v,
+        ]
+    }
+
     /// How the velocity of inertia `i` at the end answers to a torque on inertia `j` constant over the step.
     pub(super) fn velocity_per_constant_torque(&self) -> [[S; 2]; 2] {
         self.gain(|c| c.v0 + c.v1)

@@ -54,6 +54,10 @@ impl<S: Scalar> Axis<S> {
 
     fn advance_with_effects(&self, s: &State<S>, ramp: Ramp<S>, time: f64) -> State<S> {
         let full = self.step.h();
+        if self.on.dry().is_empty() && !self.has_backlash() {
+            // Nothing that sticks or opens: no event can end the step early.
+            return self.solve(s, ramp, &self.step, &self.compliance, time + full.re());
+        }
         let mut done = S::default();
         let mut now = *s;
         self.leave_rest(&mut now, ramp, &self.step, &self.compliance, time);
@@ -320,33 +324,44 @@ impl<S: Scalar> Axis<S> {
         let mut force = s.force;
         let smooth =
             !self.on.forces().is_empty() || self.on.dry().len() > usize::from(sticks[0]) + usize::from(sticks[1]);
+        let unresisted = step.apply(&s.linear, tau0, [ramp.end, S::default()]);
+        let end_at = |force: [S; 2]| {
+            let free = step.less(&unresisted, force);
+            hold.apply(step, &s.linear, tau0, [ramp.end - force[0], -force[1]], free)
+        };
+        if !smooth {
+            let (linear, friction) = end_at(force);
+            return State { linear, friction, force, ..*s };
+        }
         let mut previous = f64::INFINITY;
         let mut settled = false;
+        let mut iteration = 0;
         loop {
-            for iteration in 0..NEWTON {
-                let tau1 = [ramp.end - force[0], -force[1]];
-                let free = step.apply(&s.linear, tau0, tau1);
-                let (linear, friction) = hold.apply(step, &s.linear, tau0, tau1, free);
-                let mut memory = s.memory;
-                if !smooth {
-                    return State { linear, friction, force, memory, ..*s };
-                }
-                let motion = self.motions(&linear);
-                let (found, tangent) = self.end_forces(s, &start, &motion, step.h(), end, &mut memory);
-                let residual = [force[0] - found[0], force[1] - found[1]];
-                let size = residual[0].re().abs().max(residual[1].re().abs());
-                let scale = found[0].re().abs().max(found[1].re().abs()) + ramp.end.re().abs();
-                if settled || iteration + 1 == NEWTON {
-                    return State { linear, friction, force: found, memory, ..*s };
-                }
-                // One more pass once the value stands still carries the derivatives through.
-                settled = size <= NEWTON_TOLERANCE * scale;
-                let jacobian = hold.jacobian(&tangent);
-                let step2 = solve2(&jacobian, residual);
-                // A residual that grows means a kink was crossed: half the step.
-                let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
-                previous = size;
-                force = [force[0] - step2[0] * damp, force[1] - step2[1] * damp];
+            let (linear, friction) = end_at(force);
+            let mut memory = s.memory;
+            let motion = self.motions(&linear);
+            let (found, tangent) = self.end_forces(s, &start, &motion, step.h(), end, &mut memory);
+            let residual = [force[0] - found[0], force[1] - found[1]];
+            let size = residual[0].re().abs().max(residual[1].re().abs());
+            let scale = found[0].re().abs().max(found[1].re().abs()) + ramp.end.re().abs();
+            iteration += 1;
+            let stands = size <= NEWTON_TOLERANCE * scale;
+            // Once the value stands still, one more pass carries derivatives through.
+            if settled || (stands && !S::HAS_DERIVATIVES) || iteration == NEWTON {
+                return State { linear, friction, force: found, memory, ..*s };
+            }
+            settled = stands;
+            let step2 = solve2(&hold.jacobian(&tangent), residual);
+            // A residual that grows means a kink was crossed: half the step.
+            let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
+            previous = size;
+            force = [force[0] - step2[0] * damp, force[1] - step2[1] * damp];
+            // Newton squares the share that is missing, and is there at once where the motion has no say; an internal
+            // state or a derivative would miss its last step.
+            let near = size <= NEWTON_TOLERANCE.sqrt() * scale || tangent == [[[0.0; 2]; 2]; 2];
+            if near && !S::HAS_DERIVATIVES && !self.remembers {
+                let (linear, friction) = end_at(force);
+                return State { linear, friction, force, ..*s };
             }
         }
     }
