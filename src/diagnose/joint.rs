@@ -149,3 +149,70 @@ impl Screen<'_> {
         seconds
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fit::Data;
+    use super::super::model::Model;
+    use super::super::record::Record;
+    use super::super::states;
+    use super::super::windows::cut;
+    use super::*;
+    use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
+    use crate::effects::Settings;
+
+    /// Viscous friction and a load, both on the motor of a stiff ball screw: each alone is best imitated on the table.
+    #[test]
+    fn the_pair_that_made_the_record_leaves_least() {
+        let parameters = Parameters { i1: 1.8e-3, i2: 1.9e-3, b: 0.06, k: 166.0, rho: 1.6e-3 };
+        let mut effects = Settings::default();
+        effects.of_mut(Effect::ViscousMotor)[0] = 3e-3;
+        effects.of_mut(Effect::LoadMotor)[0] = 0.017;
+        let (n, dt) = (2048, 6e-4);
+        let sine = |k: usize, line: f64| (std::f64::consts::TAU * line * k as f64 / n as f64 + line * line * 0.3).sin();
+        let torque: Vec<f64> = (0..n).map(|k| (1..60).map(|l| 0.03 * sine(k, f64::from(l))).sum()).collect();
+        let options = SimulateOptions { start: 0.0, dt, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 1 };
+        let trace = simulate(&parameters, Structure::TwoInertia, &effects, [0.0; 4], &torque, &options);
+        let noise = 2e-5;
+        // No pattern and no randomness: the sine of a square.
+        let read =
+            |angle: f64, k: usize, seed: f64| angle + noise * 2.0_f64.sqrt() * ((k * k) as f64 * 0.37 + seed).sin();
+        let channel = |angle: fn(&crate::effects::Reading<f64>) -> f64, seed: f64| {
+            Some(trace.readings.iter().take(n).enumerate().map(|(k, r)| read(angle(r), k, seed)).collect::<Vec<f64>>())
+        };
+        let record = Record {
+            start: 0.0,
+            dt,
+            hold: Hold::Zoh,
+            torque,
+            channels: [channel(|r| r.theta1, 0.0), None, channel(|r| r.theta2, 1.0), None],
+            noise: [noise, 1.0, noise, 1.0],
+        };
+        let nominal = Model::new(parameters, Structure::TwoInertia, Settings::default());
+        let windows = cut(0..n);
+        let states = states::along(&record, &nominal);
+        let initial: Vec<_> = windows.iter().map(|w| states.initial(w.begin)).collect();
+        let screen = Screen::new(&nominal, Data { record: &record, windows: &windows }, &initial, &states, &[]);
+        let suspects = [
+            Effect::CoulombTable,
+            Effect::ViscousMotor,
+            Effect::ViscousTable,
+            Effect::LoadMotor,
+            Effect::LoadTable,
+            Effect::Disturbance,
+            Effect::Backlash,
+        ];
+        let pairs = screen.pairs(&suspects, 3);
+        let named = |p: &Pair| {
+            let mut both = [p.first.0, p.second.effect];
+            both.sort();
+            both
+        };
+        assert_eq!(named(&pairs[0]), [Effect::ViscousMotor, Effect::LoadMotor]);
+        let [best, next] = [&pairs[0], &pairs[1]].map(|p| p.second.chi2 / screen.values() as f64);
+        assert!(best < 1.1 && next > 2.0 * best, "{best} {next}");
+        let found = pairs[0].second.settings;
+        assert!((found.of(Effect::LoadMotor)[0] / 0.017 - 1.0).abs() < 0.02, "{:?}", found.of(Effect::LoadMotor));
+        assert!((found.of(Effect::ViscousMotor)[0] / 3e-3 - 1.0).abs() < 0.02, "{:?}", found.of(Effect::ViscousMotor));
+    }
+}

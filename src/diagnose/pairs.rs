@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::joint::Pair;
 use super::screen::Screen;
 use super::search::{NO_RIVAL, Search, Tested};
 
@@ -14,16 +13,17 @@ const BATCH: usize = 4;
 const FINALISTS: usize = 4;
 
 impl Search<'_> {
-    /// Pairs of effects of the library, best first, from where `none`, the parameters alone, stands.
+    /// Pairs of effects of the library, best first: from the nominal parameters and the motion as measured; `none`, the fit
+    /// of the parameters alone, says what each must come below.
     #[must_use]
     pub fn two(&self, none: &Tested, progress: &(dyn Fn(&str) + Sync)) -> Vec<Tested> {
         progress("two effects at once");
         let initial = self.initial();
         let screen = Screen::new(&self.nominal, self.data, &initial, &self.states, &[]);
         let pairs = screen.pairs(&self.applicable(), LOOKED_AT);
-        let mut glances: Vec<(Tested, &Pair)> = Vec::new();
+        let mut glances: Vec<Tested> = Vec::new();
         for batch in pairs.chunks(BATCH) {
-            let best = glances.iter().map(|g| g.0.fitted.chi2).fold(f64::INFINITY, f64::min);
+            let best = glances.iter().map(|t| t.fitted.chi2).fold(f64::INFINITY, f64::min);
             if batch[0].second.chi2 > self.bar(best, 1) {
                 break;
             }
@@ -34,17 +34,17 @@ impl Search<'_> {
                 alone.effects.push((first, variant));
                 // What the parameters alone make of the initial states is as far off as they are.
                 alone.fitted.initial.clone_from(&initial);
-                (self.glance(&alone, &pair.second), pair)
+                self.glance(&alone, &pair.second)
             }));
         }
-        glances.retain(|(t, _)| t.fitted.chi2.is_finite());
-        glances.sort_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2));
-        let best = glances.first().map_or(f64::INFINITY, |g| g.0.fitted.chi2);
-        glances.retain(|g| g.0.fitted.chi2 <= self.near(best));
+        glances.retain(|t| t.fitted.chi2.is_finite());
+        glances.sort_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+        let best = glances.first().map_or(f64::INFINITY, |t| t.fitted.chi2);
+        glances.retain(|t| t.fitted.chi2 <= self.near(best));
         glances.truncate(FINALISTS);
         let mut tested: Vec<Tested> = glances
             .into_par_iter()
-            .map(|(glance, _)| {
+            .map(|glance| {
                 let refitted = self.refit(&glance.fitted, glance.effects.clone(), self.exploring(&glance.fitted));
                 if refitted.fitted.chi2.is_finite() { refitted } else { glance }
             })
