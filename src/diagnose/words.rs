@@ -25,7 +25,7 @@ pub fn fill(d: &mut Diagnosis, decision: &Decision) {
                 .to_owned()
         }
         Verdict::Unexplained => {
-            let nearest = d.ranking.first().map_or_else(String::new, |r| {
+            let nearest = d.ranking.iter().find(|r| r.place != "none").map_or_else(String::new, |r| {
                 format!(" The nearest, {}, closes {}.", r.id, percent(r.closure_holdout))
             });
             format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}")
