@@ -11,6 +11,9 @@ use eixo::fmu::package::Package;
 use eixo::fmu::simulate::{Inputs, Options, Record, Rows, Setting, SimulateError, simulate};
 use eixo::trace::{Machine, Signal, Trace};
 
+#[path = "program/run.rs"]
+mod program;
+
 const DT: f64 = 5.626e-4;
 
 /// The exported FMU, and the folder it lies in.
@@ -143,7 +146,7 @@ fn what_the_fmu_or_its_user_refuses_is_said_with_names() {
 
 /// Runs the program; gives exit code and what it said on standard error.
 fn eixo(folder: &std::path::Path, args: &[&str]) -> (i32, String) {
-    let done = std::process::Command::new(env!("CARGO_BIN_EXE_eixo")).current_dir(folder).args(args).output().unwrap();
+    let done = program::eixo_in(folder, args);
     (done.status.code().unwrap_or(-1), String::from_utf8_lossy(&done.stderr).into_owned())
 }
 
