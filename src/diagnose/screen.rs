@@ -50,6 +50,7 @@ pub struct Candidate {
     pub chi2: f64,
     /// Relative changes of the axis' parameters beside it.
     moves: Vec<f64>,
+    /// The shapes that it was found at.
     pub(super) trial: Trial,
 }
 
@@ -99,7 +100,7 @@ pub struct Screen<'a> {
     named: usize,
 }
 
-/// Columns, and their products with the columns that every hypothesis has, with each other, and with the residual.
+/// Products of some columns with those that every hypothesis has, with each other, and with the residual.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     common: DMatrix<f64>,
