@@ -59,6 +59,17 @@ pub struct Weighed {
     pub probability: f64,
 }
 
+/// An effect named, and another that explains the record as well in its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Confusable {
+    /// The one named.
+    pub named: Effect,
+    /// The other.
+    pub other: Effect,
+    /// BIC with the other in its place, less the BIC as named.
+    pub delta_bic: f64,
+}
+
 impl Confusable {
     /// Whether the two are the same but for where they act.
     #[must_use]
@@ -87,17 +98,6 @@ pub struct Decision {
     pub values: f64,
     /// Effects that the record cannot tell from chosen ones.
     pub confusable: Vec<Confusable>,
-}
-
-/// An effect named, and another that explains the record as well in its place.
-#[derive(Debug, Clone, Copy)]
-pub struct Confusable {
-    /// The one named.
-    pub named: Effect,
-    /// The other.
-    pub other: Effect,
-    /// BIC with the other in its place, less the BIC as named.
-    pub delta_bic: f64,
 }
 
 impl Decision {

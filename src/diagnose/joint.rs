@@ -49,8 +49,7 @@ impl Screen<'_> {
     /// Pairs of different effects, at most `most`, those first that leave least for the freedom they take.
     #[must_use]
     pub fn pairs(&self, suspects: &[Effect], most: usize) -> Vec<Pair> {
-        let firsts = self.firsts(suspects);
-        let columns: Vec<Vec<Column>> = firsts.par_iter().map(|f| self.columns(f.effect, f.form(), &f.trial)).collect();
+        let (firsts, columns) = self.firsts(suspects);
         let seconds = self.seconds(suspects, &firsts, &columns);
         // Products with the columns of every first, side by side.
         let crosses: Vec<(Probe, Vec<DMatrix<f64>>)> = seconds
@@ -102,8 +101,8 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// Every effect at its best start, a sine at several lines, best first.
-    fn firsts(&self, suspects: &[Effect]) -> Vec<Probe> {
+    /// Every effect at its best start, a sine at several lines, best first; and the columns of each.
+    fn firsts(&self, suspects: &[Effect]) -> (Vec<Probe>, Vec<Vec<Column>>) {
         let mut found: Vec<Candidate> = suspects
             .par_iter()
             .flat_map_iter(|&effect| {
@@ -119,10 +118,10 @@ impl Screen<'_> {
         found
             .into_iter()
             .map(|Candidate { effect, variant, trial, .. }| {
-                let block = self.block(&self.columns(effect, &effect.info().variants[variant], &trial));
-                Probe { effect, variant, trial, block }
+                let columns = self.columns(effect, &effect.info().variants[variant], &trial);
+                (Probe { effect, variant, trial, block: self.block(&columns) }, columns)
             })
-            .collect()
+            .unzip()
     }
 
     /// Every effect in every shape that is tried; sines at the lines of their own and at those beside the best of the others.

@@ -27,11 +27,17 @@ impl States {
         [theta1, omega1, theta2, omega2, 0.0, 0.0]
     }
 
-    /// Angle between the ends of the travel of motor (0) or table (1), rad.
+    /// Lowest and highest angle of motor (0) or table (1), rad.
+    #[must_use]
+    pub fn ends(&self, side: usize) -> [f64; 2] {
+        let angles = self.motion.iter().map(|s| s[2 * side]);
+        angles.fold([f64::MAX, f64::MIN], |[low, high], a| [low.min(a), high.max(a)])
+    }
+
+    /// Angle between the ends, rad.
     #[must_use]
     pub fn travel(&self, side: usize) -> f64 {
-        let angles = self.motion.iter().map(|s| s[2 * side]);
-        let (low, high) = angles.fold((f64::MAX, f64::MIN), |(l, h), a| (l.min(a), h.max(a)));
+        let [low, high] = self.ends(side);
         high - low
     }
 }

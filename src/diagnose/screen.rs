@@ -253,30 +253,28 @@ impl<'a> Screen<'a> {
     pub fn starts(&self, effect: Effect, variant: usize, most: usize) -> Vec<Candidate> {
         let form = &effect.info().variants[variant];
         let trials = self.scales.trials(effect, form, &self.tones(effect, form));
-        let mut found: Vec<(Candidate, &Trial)> = trials
-            .par_iter()
-            .filter_map(|trial| self.regress(effect, variant, form, trial).map(|candidate| (candidate, trial)))
-            .collect();
-        found.sort_by(|a, b| a.0.chi2.total_cmp(&b.0.chi2));
-        let mut best: Vec<(Candidate, &Trial)> = Vec::new();
-        for (candidate, trial) in found {
+        let mut found: Vec<Candidate> =
+            trials.par_iter().filter_map(|trial| self.regress(effect, variant, form, trial)).collect();
+        found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        let mut best: Vec<Candidate> = Vec::new();
+        for candidate in found {
             if best.len() == most {
                 break;
             }
-            if !best.iter().any(|(_, chosen)| self.scales.neighbours(effect, trial, chosen)) {
-                best.push((candidate, trial));
+            if !best.iter().any(|chosen| self.scales.neighbours(effect, &candidate.trial, &chosen.trial)) {
+                best.push(candidate);
             }
         }
-        best.into_iter().map(|(candidate, trial)| self.sharpened(candidate, trial, form)).collect()
+        best.into_iter().map(|candidate| self.sharpened(candidate, form)).collect()
     }
 
     /// The candidate with its frequency or order moved off the grid to where the regression leaves least: golden
     /// section between the grid's neighbours. Over a long record half a step of the grid is a phase of a quarter turn.
-    fn sharpened(&self, candidate: Candidate, trial: &Trial, form: &Variant) -> Candidate {
+    fn sharpened(&self, candidate: Candidate, form: &Variant) -> Candidate {
         let Candidate { effect, variant, .. } = candidate;
-        let Some((i, line, step)) = self.scales.line(effect, trial) else { return candidate };
+        let Some((i, line, step)) = self.scales.line(effect, &candidate.trial) else { return candidate };
         let at = |value: f64| {
-            let mut moved = trial.clone();
+            let mut moved = candidate.trial.clone();
             moved.settings.of_mut(effect)[i] = value;
             self.regress(effect, variant, form, &moved)
         };

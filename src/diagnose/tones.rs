@@ -168,4 +168,18 @@ mod tests {
             assert!(found[..half].iter().all(|c| *c == 0.0));
         }
     }
+
+    /// Against the sine taken anew at each line.
+    #[test]
+    fn power_is_the_transform_at_every_line() {
+        let angle: Vec<f64> = (0..200).map(|k| (k as f64 * 0.11).sin() * 9.0).collect();
+        let adjoint: Vec<f64> = (0..200).map(|k| (k as f64 * 0.7).cos()).collect();
+        let lines = Lines { step: 0.05, count: 700 };
+        for (i, p) in lines.power(&angle, &adjoint).iter().enumerate() {
+            let line = (i + 1) as f64 * lines.step;
+            let s: f64 = angle.iter().zip(&adjoint).map(|(x, a)| a * (line * x).sin()).sum();
+            let c: f64 = angle.iter().zip(&adjoint).map(|(x, a)| a * (line * x).cos()).sum();
+            assert!((p - (s * s + c * c)).abs() < 1e-8 * (1.0 + p), "{line}: {p}");
+        }
+    }
 }

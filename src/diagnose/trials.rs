@@ -85,7 +85,6 @@ impl Scales {
             Lines::up_to(FINEST / (record.dt * speed.max(1e-12)), step)
         };
         let length = record.len() as f64 * record.dt;
-        let travel = states.motion.iter().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s[2]), high.max(s[2])]);
         let mode = match model.structure {
             Structure::TwoInertia => p.modal().wn,
             Structure::Rigid => std::f64::consts::TAU * 0.05 / record.dt,
@@ -100,7 +99,7 @@ impl Scales {
             mode,
             inertia: p.i1 + p.i2,
             frequencies: Lines::up_to(HIGHEST / record.dt, 0.5 / length),
-            travel,
+            travel: states.ends(1),
         }
     }
 
