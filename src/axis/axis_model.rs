@@ -1,30 +1,24 @@
 //! The axis ready to step, and its state.
 
+use super::mechanics::Mechanics;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
-use super::propagator::{Compliance, Linear, Propagator};
-use crate::effects::{ActiveEffects, Base, Effect, Memory, Reading, Settings};
+use super::propagator::Linear;
+use crate::effects::{ActiveEffects, Effect, Memory, Reading, Settings};
 use crate::scalar::Scalar;
 
 /// The axis with its effects, prepared for steps of one length.
 #[derive(Debug, Clone, Copy)]
 pub struct Axis<S = f64> {
-    pub(super) parameters: Parameters<S>,
-    pub(super) structure: Structure,
-    pub(super) scheme: Scheme,
-    pub(super) effects: Settings<S>,
-    pub(super) on: ActiveEffects,
-    pub(super) step: Propagator<S>,
-    pub(super) compliance: Compliance,
-    pub(super) base: Base<S>,
-    /// Whether an effect that is on has internal states.
-    pub(super) remembers: bool,
+    pub(super) full: Mechanics<S>,
+    /// The same without derivatives.
+    pub(super) plain: Mechanics<f64>,
 }
 
 impl<S: Scalar> Axis<S> {
     /// Prepares the axis for steps of `h` seconds.
     pub fn new(parameters: Parameters<S>, structure: Structure, effects: Settings<S>, scheme: Scheme, h: f64) -> Self {
-        Self::with_active(parameters, structure, effects, effects.active(), scheme, h)
+        Self::with_on(parameters, structure, effects, &[], scheme, h)
     }
 
     /// The same with some effects taken as on whatever their size, so that derivatives at the off value exist.
@@ -36,50 +30,36 @@ impl<S: Scalar> Axis<S> {
         scheme: Scheme,
         h: f64,
     ) -> Self {
-        Self::with_active(parameters, structure, effects, effects.active_with(also), scheme, h)
+        Self::of(Mechanics::new(parameters, structure, effects, effects.active_with(also), scheme, h))
     }
 
-    fn with_active(
-        parameters: Parameters<S>,
-        structure: Structure,
-        effects: Settings<S>,
-        on: ActiveEffects,
-        scheme: Scheme,
-        h: f64,
-    ) -> Self {
-        let step = Propagator::new(&parameters, structure, scheme, h.into());
-        let base = match structure {
-            Structure::TwoInertia => Base { k: parameters.k, b: parameters.b },
-            // A rigid axis has no coupling for an effect to act on.
-            Structure::Rigid => Base { k: S::default(), b: S::default() },
-        };
-        let remembers = on.forces().iter().any(|e| e.info().memory > 0);
-        Self { parameters, structure, scheme, effects, on, step, compliance: step.compliance(), base, remembers }
+    pub(super) fn of(full: Mechanics<S>) -> Self {
+        Self { full, plain: full.plain() }
     }
 
     /// The parameters.
     pub fn parameters(&self) -> &Parameters<S> {
-        &self.parameters
+        &self.full.parameters
     }
 
     /// The effects.
     pub fn effects(&self) -> &Settings<S> {
-        &self.effects
+        &self.full.effects
     }
 
     /// Which effects act.
     pub fn on(&self) -> &ActiveEffects {
-        &self.on
+        &self.full.on
     }
 
     /// Length of a step, s.
     pub fn h(&self) -> f64 {
-        self.step.h().re()
+        self.full.whole.step.h().re()
     }
 
     /// The state with these angles and speeds at `time`, everything else at rest.
     pub fn state(&self, theta1: S, omega1: S, theta2: S, omega2: S, time: f64) -> State<S> {
-        let linear = match self.structure {
+        let linear = match self.full.structure {
             Structure::TwoInertia => [theta1, omega1, theta1 - theta2, omega1 - omega2],
             Structure::Rigid => [theta1, omega1, S::default(), S::default()],
         };
@@ -92,8 +72,8 @@ impl<S: Scalar> Axis<S> {
             contact: 0,
         };
         state.dry = [mode(state.omega1()), mode(state.omega2())];
-        self.settle_contact(&mut state);
-        self.refresh_force(&mut state, time);
+        self.full.settle_contact(&mut state);
+        self.full.refresh_force(&mut state, time);
         state
     }
 
@@ -101,7 +81,7 @@ impl<S: Scalar> Axis<S> {
     pub fn resume(&self, [theta1, omega1, theta2, omega2]: [S; 4], internals: &Memory<S>, time: f64) -> State<S> {
         let mut state = self.state(theta1, omega1, theta2, omega2, time);
         state.memory = *internals;
-        self.refresh_force(&mut state, time);
+        self.full.refresh_force(&mut state, time);
         state
     }
 
@@ -110,13 +90,13 @@ impl<S: Scalar> Axis<S> {
     /// Dry friction at rest answers the torque of now, whatever it held over the step before: up to its level the
     /// inertia stays.
     pub fn accelerations(&self, s: &State<S>, torque: S, time: f64) -> [S; 2] {
-        let coupling = match self.structure {
+        let coupling = match self.full.structure {
             Structure::Rigid => S::default(),
-            Structure::TwoInertia => self.parameters.k * s.linear[2] + self.parameters.b * s.linear[3],
+            Structure::TwoInertia => self.full.parameters.k * s.linear[2] + self.full.parameters.b * s.linear[3],
         };
         let mut push = [torque - s.force[0] - coupling, coupling - s.force[1]];
-        let sticks = [0, 1].map(|i| s.dry[i] == 0 && self.has_dry(i));
-        if self.structure == Structure::Rigid {
+        let sticks = self.full.sticks(s);
+        if self.full.structure == Structure::Rigid {
             let mut sum = push[0] + push[1];
             if sticks[0] || sticks[1] {
                 let level = |i: usize| {
@@ -124,7 +104,7 @@ impl<S: Scalar> Axis<S> {
                 };
                 sum = beyond(sum, level(0) + level(1));
             }
-            let a = sum / (self.parameters.i1 + self.parameters.i2);
+            let a = sum / (self.full.parameters.i1 + self.full.parameters.i2);
             return [a, a];
         }
         for i in 0..2 {
@@ -132,12 +112,12 @@ impl<S: Scalar> Axis<S> {
                 push[i] = beyond(push[i], self.rest_level(i, push[i], time));
             }
         }
-        [push[0] / self.parameters.i1, push[1] / self.parameters.i2]
+        [push[0] / self.full.parameters.i1, push[1] / self.full.parameters.i2]
     }
 
     /// Level of dry friction of inertia `i` at rest, against `push`, N.m.
     fn rest_level(&self, i: usize, push: S, time: f64) -> S {
-        self.level(i, push.re().signum(), S::default(), time).0
+        self.full.level(i, push.re().signum(), S::default(), time).0
     }
 }
 
@@ -161,9 +141,6 @@ fn mode<S: Scalar>(v: S) -> i8 {
         0
     }
 }
-
-/// Motion of motor, table and twist.
-pub type Motions<S> = [crate::effects::Motion<S>; 3];
 
 /// Everything that the axis remembers from one step to the next; `Copy`, so that a rollback is a copy.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,14 +2,14 @@
 //! can be stored as numbers.
 
 use super::axis_model::{Axis, State};
-use super::propagator::Propagator;
+use super::mechanics::Mechanics;
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Axis<S> {
     /// Goes on with steps of `h` seconds.
     pub fn set_step(&mut self, h: f64) {
-        self.step = Propagator::new(&self.parameters, self.structure, self.scheme, h.into());
-        self.compliance = self.step.compliance();
+        let Mechanics { parameters, structure, effects, on, scheme, .. } = self.full;
+        *self = Self::of(Mechanics::new(parameters, structure, effects, on, scheme, h));
     }
 
     /// The state taken over from an axis with other parameters or effects, at `time` s: the motion and the effects'
@@ -22,7 +22,7 @@ impl<S: Scalar> Axis<S> {
         state.dry = fresh.dry;
         state.contact = fresh.contact;
         state.force = fresh.force;
-        self.refresh_force(&mut state, time);
+        self.full.refresh_force(&mut state, time);
         state
     }
 }
@@ -38,6 +38,20 @@ impl<S: Scalar> State<S> {
             memory: s.memory.map(S::from),
             dry: s.dry,
             contact: s.contact,
+        }
+    }
+
+    /// The same without derivatives.
+    #[must_use]
+    #[inline]
+    pub fn plain(&self) -> State<f64> {
+        State {
+            linear: self.linear.map(S::re),
+            friction: self.friction.map(S::re),
+            force: self.force.map(S::re),
+            memory: self.memory.map(S::re),
+            dry: self.dry,
+            contact: self.contact,
         }
     }
 }

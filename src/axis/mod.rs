@@ -10,16 +10,21 @@
 //! their way out. The linear analogue (kg, N, m) is the same model in other units.
 
 mod axis_model;
+mod balance;
 mod continuation;
 mod criterion;
+mod events;
+mod hold;
+mod mechanics;
 mod oscillator;
 mod parameters;
 mod propagator;
 mod simulate;
 mod step;
 
-pub use axis_model::{Axis, Motions, State};
+pub use axis_model::{Axis, State};
 pub use criterion::{dt_criterion, period_elongation};
+pub use mechanics::Motions;
 pub use oscillator::Scheme;
 pub use parameters::{Modal, Motion, ParameterError, Parameters, PhysicalData, Structure};
 pub use propagator::{Linear, Propagator};

@@ -122,6 +122,12 @@ impl<S: Scalar> Parameters<S> {
         Self { i1: p.i1.into(), i2: p.i2.into(), b: p.b.into(), k: p.k.into(), rho: p.rho.into() }
     }
 
+    /// The same without derivatives.
+    #[must_use]
+    pub fn plain(&self) -> Parameters<f64> {
+        Parameters { i1: self.i1.re(), i2: self.i2.re(), b: self.b.re(), k: self.k.re(), rho: self.rho.re() }
+    }
+
     /// `1/I1 + 1/I2`: the inverse of the inertia that the twist sees.
     pub fn twist_mobility(&self) -> S {
         S::from(1.0) / self.i1 + S::from(1.0) / self.i2

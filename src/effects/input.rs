@@ -23,6 +23,13 @@ impl<S: Scalar> Ramp<S> {
         Self { start: torque, end: torque }
     }
 
+    /// The same without derivatives.
+    #[must_use]
+    #[inline]
+    pub fn plain(&self) -> Ramp<f64> {
+        Ramp { start: self.start.re(), end: self.end.re() }
+    }
+
     /// The ramp of mean `m0` and first moment `m1` (both over a step of unit length).
     fn from_moments(m0: S, m1: S) -> Self {
         Self { start: m0 * 4.0 - m1 * 6.0, end: m1 * 6.0 - m0 * 2.0 }

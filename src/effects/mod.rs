@@ -30,6 +30,7 @@ pub use input::{Ramp, TorqueHistory};
 pub use sensor::{Reading, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
 pub(crate) use settings::{MEMORY, PARAMETERS, StepMotion, effect_scope};
+pub(crate) use shapes::Coordinate;
 pub use shapes::{Base, DryFriction, Force, Input, Moment, Motion, Reaction, Sensor};
 
 use crate::scalar::Scalar;

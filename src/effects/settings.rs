@@ -5,7 +5,7 @@ use std::fmt;
 use super::info::{Place, Role};
 use super::input::{Ramp, TorqueHistory};
 use super::sensor::{Reading, SensorHistory};
-use super::shapes::{Base, Moment, Motion, Reaction};
+use super::shapes::{Base, Coordinate, Moment, Motion, Reaction};
 use super::{EFFECTS, Effect};
 use crate::scalar::Scalar;
 
@@ -121,6 +121,12 @@ impl<S: Scalar> Settings<S> {
         Self { values: other.values.map(S::from) }
     }
 
+    /// The same without derivatives.
+    #[must_use]
+    pub fn plain(&self) -> Settings<f64> {
+        Settings { values: self.values.map(S::re) }
+    }
+
     /// The settings from every effect's parameters in the order of the list.
     #[must_use]
     pub(crate) fn from_flat(values: [S; PARAMETERS]) -> Self {
@@ -184,12 +190,18 @@ impl<S: Scalar> Settings<S> {
         let mut sum = (S::default(), 0.0);
         for &effect in on.dry.as_slice() {
             if effect.info().place == place {
-                let (level, slope) = effect.level(self.of(effect), direction, speed, at);
+                let (level, slope) = self.level(effect, direction, speed, at);
                 sum.0 += level;
                 sum.1 += slope;
             }
         }
         sum
+    }
+
+    /// The same of one effect.
+    #[inline]
+    pub(crate) fn level(&self, effect: Effect, direction: f64, speed: S, at: f64) -> (S, f64) {
+        effect.level(self.of(effect), direction, speed, at)
     }
 
     /// Sums the force effects: torque on motor and table and the tangent, with the trial memory left in `memory`.
@@ -203,14 +215,26 @@ impl<S: Scalar> Settings<S> {
     ) -> Forces<S> {
         let mut sum = Forces::default();
         for &effect in on.forces.as_slice() {
-            let i = effect as usize;
-            let place = effect.info().place;
-            let moment = step.moment(place);
-            let reaction =
-                effect.torque(self.of(effect), base, &moment, &mut memory[MEMORY_OFFSETS[i]..MEMORY_OFFSETS[i + 1]]);
-            sum.add(place, &reaction);
+            let own = &mut memory[MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1]];
+            let coordinate = effect.info().place.coordinate();
+            sum.add(coordinate, &effect.torque(self.of(effect), base, &step.moment(coordinate), own));
         }
         sum
+    }
+
+    /// The torque of one force effect; its own part of `memory` goes from `committed` to the trial.
+    #[inline]
+    pub(crate) fn reaction(
+        &self,
+        effect: Effect,
+        base: &Base<S>,
+        moment: &Moment<S>,
+        committed: &Memory<S>,
+        memory: &mut Memory<S>,
+    ) -> Reaction<S> {
+        let own = MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1];
+        memory[own.clone()].copy_from_slice(&committed[own.clone()]);
+        effect.torque(self.of(effect), base, moment, &mut memory[own])
     }
 
     /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
@@ -266,12 +290,8 @@ pub(crate) struct StepMotion<S> {
 }
 
 impl<S: Scalar> StepMotion<S> {
-    fn moment(&self, place: Place) -> Moment<S> {
-        let coordinate = match place {
-            Place::Table => 1,
-            Place::Coupling => 2,
-            Place::Motor | Place::Input | Place::Sensor => 0,
-        };
+    fn moment(&self, coordinate: Coordinate) -> Moment<S> {
+        let coordinate = coordinate as usize;
         Moment {
             start: self.start[coordinate],
             end: self.end[coordinate],
@@ -292,14 +312,14 @@ pub(crate) struct Forces<S> {
 
 impl<S: Scalar> Forces<S> {
     #[inline]
-    pub(crate) fn add(&mut self, place: Place, r: &Reaction<S>) {
-        match place {
-            Place::Table => {
+    pub(crate) fn add(&mut self, coordinate: Coordinate, r: &Reaction<S>) {
+        match coordinate {
+            Coordinate::Table => {
                 self.torque[1] += r.torque;
                 self.stiffness[1][1] += r.stiffness;
                 self.damping[1][1] += r.damping;
             }
-            Place::Coupling => {
+            Coordinate::Twist => {
                 self.torque[0] += r.torque;
                 self.torque[1] -= r.torque;
                 for (row, column, sign) in [(0, 0, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)] {
@@ -307,7 +327,7 @@ impl<S: Scalar> Forces<S> {
                     self.damping[row][column] += sign * r.damping;
                 }
             }
-            Place::Motor | Place::Input | Place::Sensor => {
+            Coordinate::Motor => {
                 self.torque[0] += r.torque;
                 self.stiffness[0][0] += r.stiffness;
                 self.damping[0][0] += r.damping;

@@ -1,9 +1,44 @@
 //! The shapes of an effect: what each kind must provide.
 
-use super::info::EffectInfo;
+use super::info::{EffectInfo, Place};
 use super::input::{Ramp, TorqueHistory};
 use super::sensor::{Reading, SensorHistory};
 use crate::scalar::Scalar;
+
+/// What a torque from the motion sees and acts on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Coordinate {
+    /// `theta1`.
+    Motor,
+    /// `theta2`.
+    Table,
+    /// `theta1 - theta2`.
+    Twist,
+}
+
+impl Coordinate {
+    /// What a torque of one along it is on motor and table.
+    #[inline]
+    pub const fn push(self) -> [f64; 2] {
+        match self {
+            Self::Motor => [1.0, 0.0],
+            Self::Table => [0.0, 1.0],
+            Self::Twist => [1.0, -1.0],
+        }
+    }
+}
+
+impl Place {
+    /// The coordinate of the effects there.
+    #[inline]
+    pub(crate) const fn coordinate(self) -> Coordinate {
+        match self {
+            Self::Table => Coordinate::Table,
+            Self::Coupling => Coordinate::Twist,
+            Self::Motor | Self::Input | Self::Sensor => Coordinate::Motor,
+        }
+    }
+}
 
 /// Position and velocity of the coordinate an effect sees: `theta1`, `theta2`, or the twist `theta1 - theta2`.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,0 +1,165 @@
+//! Events inside a step: a velocity through zero under dry friction, a contact of backlash that closes or opens.
+//!
+//! They are found and located in time on plain numbers.
+
+use super::axis_model::State;
+use super::balance::Leg;
+use super::mechanics::Mechanics;
+use super::parameters::Structure;
+use crate::effects::Ramp;
+use crate::scalar::Scalar;
+
+/// Most iterations to locate an event.
+const LOCATE: usize = 60;
+/// An event is located to this share of the step.
+pub(super) const LOCATE_TOLERANCE: f64 = 1e-12;
+
+/// What ends a leg of the step early.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Event {
+    /// The velocity of inertia 0 or 1 reached zero.
+    Rest(usize),
+    /// The twist left the gap on this side.
+    Closes(i8),
+    /// The contact would pull.
+    Opens,
+}
+
+/// Where an event is.
+pub(super) struct Located {
+    /// Time into the leg, s.
+    pub at: f64,
+    /// The state there.
+    pub state: State<f64>,
+    /// Slope of the event's indicator along time; zero where it has none.
+    pub slope: f64,
+}
+
+impl<S: Scalar> Mechanics<S> {
+    /// The quantity whose zero is the event; it falls along the leg.
+    pub fn indicator(&self, event: Event, from: &State<S>, s: &State<S>) -> S {
+        match event {
+            Event::Rest(i) => velocity(s, i) * f64::from(from.dry[i]),
+            Event::Closes(side) => self.clearance(side, s),
+            Event::Opens => self.pressure(from.contact, s),
+        }
+    }
+
+    /// Changes the modes at an event.
+    pub fn enter(&self, event: Event, s: &mut State<S>, time: f64) {
+        match event {
+            Event::Rest(i) => {
+                s.dry[i] = 0;
+                // At rest exactly: the located velocity is zero but for rounding.
+                match i {
+                    0 => {
+                        let slip = s.linear[1];
+                        s.linear[1] = S::default();
+                        s.linear[3] -= slip;
+                    }
+                    _ => s.linear[3] = s.linear[1],
+                }
+                if self.structure == Structure::Rigid {
+                    s.linear = [s.linear[0], S::default(), S::default(), S::default()];
+                    s.dry = [0; 2];
+                }
+            }
+            Event::Closes(side) => s.contact = side,
+            Event::Opens => s.contact = 0,
+        }
+        self.refresh_force(s, time);
+    }
+}
+
+impl Mechanics<f64> {
+    /// The first event between a state and a trial, by the straight line between them.
+    pub fn first_event(&self, from: &State<f64>, to: &State<f64>) -> Option<Event> {
+        let mut first: Option<(f64, Event)> = None;
+        let mut propose = |before: f64, after: f64, event| {
+            if after < 0.0 {
+                let fraction = if before > 0.0 { before / (before - after) } else { 0.0 };
+                if first.is_none_or(|(f, _)| fraction < f) {
+                    first = Some((fraction, event));
+                }
+            }
+        };
+        for i in 0..2 {
+            if from.dry[i] != 0 && self.dry[i] {
+                let along = |s| self.indicator(Event::Rest(i), from, s);
+                propose(along(from), along(to), Event::Rest(i));
+            }
+        }
+        if self.backlash {
+            let event = if from.contact == 0 { Event::Closes(to.linear[2].signum() as i8) } else { Event::Opens };
+            propose(self.indicator(event, from, from), self.indicator(event, from, to), event);
+        }
+        first.map(|(_, e)| e)
+    }
+
+    /// Time into a leg of `h` seconds from `begin`, and the state, at which the event's indicator is zero: a bracketed
+    /// secant, and a last step of Newton's. `None` if it is there from the first.
+    pub fn locate(
+        &self,
+        event: Event,
+        from: &State<f64>,
+        to: &State<f64>,
+        ramp: Ramp<f64>,
+        [begin, h]: [f64; 2],
+    ) -> Option<Located> {
+        let mut low = (0.0, self.indicator(event, from, from));
+        if low.1 <= 0.0 {
+            return None;
+        }
+        let mut high = (h, self.indicator(event, from, to));
+        let at = |t: f64| {
+            let length = self.length(t);
+            let ramp = Ramp { start: ramp.start, end: along(&ramp, t / h) };
+            self.solve(from, &Leg { ramp, length: &length, end: begin + t })
+        };
+        let indicator = |s: &State<f64>| self.indicator(event, from, s);
+        let tolerance = LOCATE_TOLERANCE * self.whole.step.h();
+        let mut t = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let mut last_side = 0_i8;
+        let mut state = *from;
+        for _ in 0..LOCATE {
+            state = at(t);
+            let g = indicator(&state);
+            let side = if g > 0.0 { 1 } else { -1 };
+            // Illinois: the end that stays put counts half, so that the bracket closes from both sides.
+            if side > 0 {
+                low = (t, g);
+                if last_side > 0 {
+                    high.1 *= 0.5;
+                }
+            } else {
+                high = (t, g);
+                if last_side < 0 {
+                    low.1 *= 0.5;
+                }
+            }
+            last_side = side;
+            let next = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+            if (next - t).abs() <= tolerance || g == 0.0 || high.0 - low.0 <= tolerance {
+                break;
+            }
+            t = next;
+        }
+        // The indicator's slope along time, by a short difference of the step itself.
+        let dt = self.whole.step.h() * 1e-4;
+        let slope = (indicator(&at(t + dt)) - indicator(&state)) / dt;
+        if slope == 0.0 {
+            return Some(Located { at: t, state, slope });
+        }
+        t -= indicator(&state) / slope;
+        Some(Located { at: t, state: at(t), slope })
+    }
+}
+
+/// The torque `fraction` into a step.
+pub(super) fn along<S: Scalar>(ramp: &Ramp<S>, fraction: S) -> S {
+    ramp.start + (ramp.end - ramp.start) * fraction
+}
+
+fn velocity<S: Scalar>(s: &State<S>, i: usize) -> S {
+    if i == 0 { s.omega1() } else { s.omega2() }
+}

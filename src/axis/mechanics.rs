@@ -1,0 +1,163 @@
+//! The axis and its effects over one kind of numbers: laws at an instant, and what a step of some length does.
+
+use super::axis_model::State;
+use super::oscillator::Scheme;
+use super::parameters::{Parameters, Structure};
+use super::propagator::{Compliance, Linear, Propagator};
+use crate::effects::{ActiveEffects, Base, Coordinate, Effect, Motion, Place, Settings, StepMotion};
+use crate::scalar::Scalar;
+
+/// Motion of motor, table and twist.
+pub type Motions<S> = [Motion<S>; 3];
+
+const PLACES: [Place; 2] = [Place::Motor, Place::Table];
+
+/// Everything about the axis that does not change from step to step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mechanics<S> {
+    pub parameters: Parameters<S>,
+    pub structure: Structure,
+    pub scheme: Scheme,
+    pub effects: Settings<S>,
+    pub on: ActiveEffects,
+    pub base: Base<S>,
+    /// The effect on the motion, if it is one alone.
+    pub lone: Option<Effect>,
+    /// Whether dry friction acts on motor and table.
+    pub dry: [bool; 2],
+    /// Whether the coupling has play.
+    pub backlash: bool,
+    /// Whether an effect that is on has internal states.
+    pub remembers: bool,
+    /// The step that nothing ends early.
+    pub whole: Length<S>,
+}
+
+/// What a step of one length does to the linear axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Length<S> {
+    pub step: Propagator<S>,
+    pub compliance: Compliance,
+    /// What the end of the step loses to one unit of the lone effect's torque there.
+    pub answer: Linear<S>,
+}
+
+impl<S: Scalar> Mechanics<S> {
+    pub fn new(
+        parameters: Parameters<S>,
+        structure: Structure,
+        effects: Settings<S>,
+        on: ActiveEffects,
+        scheme: Scheme,
+        h: f64,
+    ) -> Self {
+        let base = match structure {
+            Structure::TwoInertia => Base { k: parameters.k, b: parameters.b },
+            // A rigid axis has no coupling for an effect to act on.
+            Structure::Rigid => Base { k: S::default(), b: S::default() },
+        };
+        let remembers = on.forces().iter().any(|e| e.info().memory > 0);
+        let dry = PLACES.map(|place| on.dry().iter().any(|e| e.info().place == place));
+        let backlash = on.forces().contains(&Effect::Backlash) && effects.of(Effect::Backlash)[0].re() > 0.0;
+        let lone = match (on.forces(), on.dry()) {
+            (&[one], []) | ([], &[one]) => Some(one),
+            _ => None,
+        };
+        let step = Propagator::new(&parameters, structure, scheme, h.into());
+        let whole = Length::new(step, lone);
+        Self { parameters, structure, scheme, effects, on, base, lone, dry, backlash, remembers, whole }
+    }
+
+    /// A step of that length.
+    pub fn length(&self, h: S) -> Length<S> {
+        Length::new(Propagator::new(&self.parameters, self.structure, self.scheme, h), self.lone)
+    }
+
+    /// The same without derivatives.
+    pub fn plain(&self) -> Mechanics<f64> {
+        let h = self.whole.step.h().re();
+        Mechanics::new(self.parameters.plain(), self.structure, self.effects.plain(), self.on, self.scheme, h)
+    }
+
+    /// Level of dry friction of inertia `i` for motion that way, and its derivative to the speed, N.m.
+    #[inline]
+    pub fn level(&self, i: usize, direction: f64, speed: S, at: f64) -> (S, f64) {
+        self.effects.dry_level(&self.on, PLACES[i], direction, speed, at)
+    }
+
+    /// Which inertias dry friction holds at rest.
+    pub fn sticks(&self, s: &State<S>) -> [bool; 2] {
+        [0, 1].map(|i| s.dry[i] == 0 && self.dry[i])
+    }
+
+    /// Whether a step may end early: something that sticks or opens.
+    pub fn has_events(&self) -> bool {
+        self.dry != [false, false] || self.backlash
+    }
+
+    fn gap(&self) -> S {
+        self.effects.of(Effect::Backlash)[0]
+    }
+
+    /// Contact torque of a side, N.m: positive while it pushes.
+    pub fn pressure(&self, side: i8, s: &State<S>) -> S {
+        let side = f64::from(side);
+        ((s.linear[2] - self.gap() * side) * self.base.k + s.linear[3] * self.base.b) * side
+    }
+
+    /// What is missing for a side to push, rad: negative where the twist is beyond the gap's end and the contact would
+    /// not pull. A contact that has opened while compressed closes again only when both hold.
+    pub fn clearance(&self, side: i8, s: &State<S>) -> S {
+        let gap = self.gap() - s.linear[2] * f64::from(side);
+        let pull = -(self.pressure(side, s) / self.base.k);
+        if pull.re() > gap.re() { pull } else { gap }
+    }
+
+    /// The side of contact that belongs to the twist: the one beyond whose end it is, if that side pushes.
+    pub fn settle_contact(&self, s: &mut State<S>) {
+        if self.backlash {
+            let side = s.linear[2].re().signum() as i8;
+            s.contact = if self.clearance(side, s).re() < 0.0 { side } else { 0 };
+        }
+    }
+
+    /// Recomputes the effects' torques at the state, as its modes are.
+    pub fn refresh_force(&self, s: &mut State<S>, time: f64) {
+        let motions = motions(&s.linear);
+        let step = StepMotion { start: motions, end: motions, time, h: S::default(), contact: s.contact };
+        let mut memory = s.memory;
+        let forces = self.effects.forces(&self.on, &self.base, &step, &mut memory);
+        s.force = forces.torque;
+        for (i, motion) in motions.iter().take(2).enumerate() {
+            if s.dry[i] != 0 && self.dry[i] {
+                let direction = f64::from(s.dry[i]);
+                s.force[i] += self.level(i, direction, motion.v.abs(), time).0 * direction;
+                s.friction[i] = S::default();
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Length<S> {
+    fn new(step: Propagator<S>, lone: Option<Effect>) -> Self {
+        let still = [S::default(); 4];
+        let push = lone.map_or([0.0; 2], |effect| effect.info().place.coordinate().push());
+        let answer = step.less(&still, push.map(S::from)).map(|x| -x);
+        Self { step, compliance: step.compliance(), answer }
+    }
+}
+
+/// The motion of one coordinate.
+#[inline]
+pub(super) fn motion<S: Scalar>(l: &Linear<S>, of: Coordinate) -> Motion<S> {
+    match of {
+        Coordinate::Motor => Motion { x: l[0], v: l[1] },
+        Coordinate::Table => Motion { x: l[0] - l[2], v: l[1] - l[3] },
+        Coordinate::Twist => Motion { x: l[2], v: l[3] },
+    }
+}
+
+/// The motion of all three.
+pub(super) fn motions<S: Scalar>(l: &Linear<S>) -> Motions<S> {
+    [Coordinate::Motor, Coordinate::Table, Coordinate::Twist].map(|of| motion(l, of))
+}
