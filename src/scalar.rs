@@ -38,8 +38,12 @@ pub trait Scalar:
 
     /// Sine.
     fn sin(self) -> Self {
+        self.sin_cos().0
+    }
+    /// Sine, and the value of the cosine.
+    fn sin_cos(self) -> (Self, f64) {
         let (s, c) = self.re().sin_cos();
-        self.chain(s, c)
+        (self.chain(s, c), c)
     }
     /// Cosine.
     fn cos(self) -> Self {
@@ -62,7 +66,8 @@ pub trait Scalar:
         if x <= 0.0 {
             return Self::default();
         }
-        let value = x.powf(n);
+        #[allow(clippy::float_cmp, reason = "the one exponent that leaves any base as it is")]
+        let value = if n == 1.0 { x } else { x.powf(n) };
         self.chain(0.0, n * value / x) + exponent.chain(0.0, value * x.ln()) + value
     }
     /// Absolute value, with the derivative +1 at zero.

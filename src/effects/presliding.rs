@@ -2,10 +2,10 @@
 //!
 //! `reach*z' = v - |v|*z`, `f = level*z + damping*reach*z'`: a bristle of stiffness `level/reach`. Canudas de Wit, Olsson,
 //! Astrom, Lischinsky, IEEE TAC 40(3), 1995, with a constant level (Dahl's curve). Over a step the bristle follows the
-//! mean velocity exactly: `z+ = z*exp(-a) + dx/reach*(1 - exp(-a))/a` with `dx = h*(v + v+)/2`, `a = |dx|/reach`.
+//! mean velocity exactly: `z+ = s + (z - s)*exp(-|dx|/reach)` with `dx = h*(v + v+)/2`, `s = sgn(dx)`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction, mean_decay};
+use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
@@ -19,16 +19,16 @@ const EQUATION: &str = "reach*z' = v - |v|*z; f = level*z + damping*reach*z'";
 const REFERENCE: &str = "Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40(3), 1995";
 
 fn torque<S: Scalar>(p: &[S], m: &Moment<S>, z: &mut [S]) -> Reaction<S> {
-    let dx = m.h * (m.start.v + m.end.v) * 0.5 / p[1];
-    let a = dx.abs();
-    let after = z[0] * (-a).exp() + dx * mean_decay(a);
+    let per_speed = m.h * 0.5 / p[1];
+    let dx = per_speed * (m.start.v + m.end.v);
+    let towards = if dx.re() < 0.0 { -1.0 } else { 1.0 };
+    let after = (z[0] - towards) * (-dx.abs()).exp() + towards;
     z[0] = after;
     let v = m.end.v;
     let rate = v - v.abs() * after;
     // The bristle's own equation: dz/dx = 1 - sgn(dx)*z.
-    let toward = |motion: S| 1.0 - if motion.re() < 0.0 { -1.0 } else { 1.0 } * after.re();
-    let per_v = toward(dx) * 0.5 * m.h.re() / p[1].re();
-    let rate_per_v = toward(v) - v.re().abs() * per_v;
+    let per_v = (1.0 - towards * after.re()) * per_speed.re();
+    let rate_per_v = 1.0 - v.re().signum() * after.re() - v.re().abs() * per_v;
     Reaction { torque: p[0] * after + p[2] * rate, stiffness: 0.0, damping: p[0].re() * per_v + p[2].re() * rate_per_v }
 }
 

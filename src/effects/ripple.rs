@@ -7,12 +7,8 @@ use super::shapes::{Base, Force, Moment, Reaction};
 use crate::scalar::Scalar;
 
 fn torque<S: Scalar>(amplitude: S, order: S, phase: S, x: S) -> Reaction<S> {
-    let angle = order * x + phase;
-    Reaction {
-        torque: -(amplitude * angle.sin()),
-        stiffness: -(amplitude.re() * order.re() * angle.re().cos()),
-        damping: 0.0,
-    }
+    let (sine, cosine) = (order * x + phase).sin_cos();
+    Reaction { torque: -(amplitude * sine), stiffness: -(amplitude.re() * order.re() * cosine), damping: 0.0 }
 }
 
 /// Torque ripple: cogging, commutation, screw eccentricity.
