@@ -1,11 +1,12 @@
 //! `fmi2DoStep` of the library that `eixo export` packs, called in a tight loop with one internal step a call.
 //!
 //! `cargo bench --bench do_step`. The linear model first, with and without setting the torque and reading all outputs;
-//! then each effect of the list switched on alone.
+//! then each effect of the list switched on alone, and the same of the step itself without the FMU around it.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark fails by panicking")]
 
-use eixo::effects::EFFECTS;
+use eixo::axis::{Axis, Parameters, Scheme, Structure};
+use eixo::effects::{EFFECTS, Effect, Ramp, Settings};
 use eixo::fmu::host::{Fmu, Instance};
 use eixo::fmu::package::Package;
 use eixo::variables::{Slot, at, first_of};
@@ -53,24 +54,44 @@ fn set_step_get(bencher: divan::Bencher) {
     });
 }
 
+/// An effect at a size that shows: its parameters by their place in its info.
+fn shown(effect: Effect) -> Vec<(usize, f64)> {
+    let size = effect.info().parameters[0].nominal;
+    match effect {
+        Effect::TorqueGain => vec![(0, 1.1)],
+        Effect::Saturation => vec![(0, 0.01)],
+        // A stop far away does nothing, so bring it near.
+        Effect::EndStop => vec![(0, 1.0), (1, 0.01)],
+        _ => vec![(0, (0.5 * size).min(0.01))],
+    }
+}
+
+fn named(id: &str) -> Effect {
+    Effect::from_id(id).unwrap()
+}
+
 #[divan::bench(args = EFFECTS.iter().map(|e| e.info().id))]
 fn set_step_with(bencher: divan::Bencher, id: &str) {
-    let effect = *EFFECTS.iter().find(|e| e.info().id == id).unwrap();
-    let size = at(first_of(effect));
-    let value = match id {
-        "torque_gain" => 1.1,
-        "saturation" => 0.01,
-        // The rest are sizes with a typical magnitude; a stop far away does nothing, so bring it near.
-        _ => (0.5 * size.nominal).min(0.01),
-    };
-    let mut settings = vec![(size.reference, value)];
-    if id == "end_stop" {
-        settings = vec![(size.reference, 1.0), (at(first_of(effect) + 1).reference, 0.01)];
-    }
+    let effect = named(id);
+    let settings: Vec<(u32, f64)> =
+        shown(effect).into_iter().map(|(i, value)| (at(first_of(effect) + i).reference, value)).collect();
     let (mut i, mut k) = (instance(&settings), 0_u64);
     bencher.bench_local(|| {
         i.set_real(&[T], &[torque(k)]).unwrap();
         i.do_step(k as f64 * DT, DT).unwrap();
+        k += 1;
+    });
+}
+
+/// One sample of the axis in the program itself; input and sensor effects act outside of it. Aim: 100 ns.
+#[divan::bench(sample_size = 5000, args = EFFECTS.iter().filter(|e| e.is_force() || e.is_dry()).map(|e| e.info().id))]
+fn advance_with(bencher: divan::Bencher, id: &str) {
+    let mut settings = Settings::default();
+    shown(named(id)).into_iter().for_each(|(i, value)| settings.of_mut(named(id))[i] = value);
+    let axis = Axis::new(Parameters::PAPER, Structure::TwoInertia, settings, Scheme::NEWMARK, DT);
+    let (mut state, mut k) = (axis.state(0.0, 0.0, 0.0, 0.0, 0.0), 0_u64);
+    bencher.bench_local(|| {
+        state = axis.advance(&state, Ramp::held(torque(k)), k as f64 * DT);
         k += 1;
     });
 }
