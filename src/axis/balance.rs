@@ -7,7 +7,7 @@ use super::axis_model::State;
 use super::hold::Hold;
 use super::mechanics::{Length, Mechanics, motion, motions};
 use super::propagator::{Linear, Propagator};
-use crate::effects::{Coordinate, Effect, Memory, Moment, Motion, Ramp, Reaction, StepMotion};
+use crate::effects::{Coordinate, Effect, Forces, Memory, Moment, Motion, Ramp, Reaction, StepMotion};
 use crate::scalar::Scalar;
 
 /// Most Newton iterations of a step.
@@ -80,20 +80,21 @@ fn newton<const N: usize>(
 ) -> [[f64; N]; 2] {
     let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let mut previous = f64::INFINITY;
+    let mut there = false;
     for iteration in 1.. {
         let pass = balance.pass(torque, memory);
         let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
         let scale = largest(&pass.found) + input.abs();
-        if size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
+        if there || size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
             return [torque, pass.found];
         }
         // A residual that grows means a kink was crossed: half the step.
         let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
         previous = size;
         torque = std::array::from_fn(|i| torque[i] - pass.correction[i] * damp);
-        // Newton squares the share that is missing, and is there at once where the motion has no say; an internal
-        // state would miss its last step.
-        if (size <= NEWTON_TOLERANCE.sqrt() * scale || pass.is_given) && !remembers {
+        // Newton squares the share that is missing.
+        there = size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && damp == 1.0);
+        if there && !remembers {
             break;
         }
     }
@@ -126,8 +127,8 @@ struct Pass<S, const N: usize> {
     found: [S; N],
     /// What is to be taken from the torques for them to agree with the laws, to first order.
     correction: [S; N],
-    /// Whether the laws do not hang on the motion at the end.
-    is_given: bool,
+    /// What is then still missing, at most.
+    left: f64,
 }
 
 enum Equation<'a, S> {
@@ -234,7 +235,7 @@ impl<S: Scalar> Balance<S, 1> for Lone<'_, S> {
         let found = if self.effect.is_dry() {
             // On trial the velocity may have passed zero: the sliding law continues there until the event is found.
             let (level, damping) = effects.level(self.effect, self.slides, end.v * self.slides, self.time);
-            Reaction { torque: level * self.slides, stiffness: 0.0, damping }
+            Reaction { torque: level * self.slides, stiffness: 0.0, damping, bend: bend_of_level(damping) }
         } else {
             let contact = self.from.contact;
             let moment = Moment { start: self.start, end, time: self.time, h: self.h, contact };
@@ -242,7 +243,9 @@ impl<S: Scalar> Balance<S, 1> for Lone<'_, S> {
         };
         let answers = found.stiffness * per.x.re() + found.damping * per.v.re();
         let correction = (torque - found.torque) / (1.0 + answers);
-        Pass { found: [found.torque], correction: [correction], is_given: answers == 0.0 }
+        let moved = per.x.re() * correction.re();
+        let left = if found.bend == 0.0 { 0.0 } else { 0.5 * found.bend * moved * moved };
+        Pass { found: [found.torque], correction: [correction], left }
     }
 }
 
@@ -282,36 +285,38 @@ impl<'a, S: Scalar> Coupled<'a, S> {
         self.hold.apply(self.step, &self.from.linear, self.tau0, tau1, free)
     }
 
-    /// Torques of the effects for that end, and their tangent `[stiffness, damping]`.
-    fn laws(&self, end: &Linear<S>, memory: &mut Memory<S>) -> ([S; 2], [[[f64; 2]; 2]; 2]) {
+    /// Torques of the effects for that end, and their tangent.
+    fn laws(&self, end: &Linear<S>, memory: &mut Memory<S>) -> Forces<S> {
         let (mechanics, from) = (self.mechanics, self.from);
         let end = motions(end);
         let start = motions(&from.linear);
         let step = StepMotion { start, end, time: self.time, h: self.step.h(), contact: from.contact };
         *memory = from.memory;
-        let forces = mechanics.effects.forces(&mechanics.on, &mechanics.base, &step, memory);
-        let mut torque = forces.torque;
-        let mut damping = forces.damping;
-        for i in 0..2 {
-            if from.dry[i] != 0 && mechanics.dry[i] {
-                let direction = f64::from(from.dry[i]);
-                // Past zero on trial, as for one alone.
-                let (level, slope) = mechanics.level(i, direction, end[i].v * direction, self.time);
-                torque[i] += level * direction;
-                damping[i][i] += slope;
-            }
+        let mut forces = mechanics.effects.forces(&mechanics.on, &mechanics.base, &step, memory);
+        for i in (0..2).filter(|i| from.dry[*i] != 0 && mechanics.dry[*i]) {
+            let direction = f64::from(from.dry[i]);
+            // Past zero on trial, as for one alone.
+            let (level, slope) = mechanics.level(i, direction, end[i].v * direction, self.time);
+            forces.torque[i] += level * direction;
+            forces.damping[i][i] += slope;
+            forces.bend += bend_of_level(slope);
         }
-        (torque, [forces.stiffness, damping])
+        forces
     }
 }
 
 impl<S: Scalar> Balance<S, 2> for Coupled<'_, S> {
     fn pass(&self, torque: [S; 2], memory: &mut Memory<S>) -> Pass<S, 2> {
-        let (found, tangent) = self.laws(&self.end(torque).0, memory);
+        let Forces { torque: found, stiffness, damping, bend } = self.laws(&self.end(torque).0, memory);
         let off = [torque[0] - found[0], torque[1] - found[1]];
-        let correction = solve2(&self.hold.jacobian(&tangent), off);
-        Pass { found, correction, is_given: tangent == [[[0.0; 2]; 2]; 2] }
+        let correction = solve2(&self.hold.jacobian(&[stiffness, damping]), off);
+        Pass { found, correction, left: if bend == 0.0 { 0.0 } else { f64::INFINITY } }
     }
+}
+
+/// A level that hangs on the speed may do so in any way.
+fn bend_of_level(slope: f64) -> f64 {
+    if slope == 0.0 { 0.0 } else { f64::INFINITY }
 }
 
 /// Solves a 2 x 2 system whose matrix is real.

@@ -25,14 +25,24 @@ pub(super) enum Event {
     Opens,
 }
 
-/// Where an event is.
-pub(super) struct Located {
-    /// Time into the leg, s.
-    pub at: f64,
-    /// The state there.
-    pub state: State<f64>,
-    /// Slope of the event's indicator along time; zero where it has none.
-    pub slope: f64,
+/// The stretch of a step in which an event is sought.
+pub(super) struct Stretch<S> {
+    pub ramp: Ramp<S>,
+    /// Its begin and its length, s.
+    pub begin: f64,
+    pub h: S,
+}
+
+impl<S: Scalar> Stretch<S> {
+    /// The torque up to `t` seconds into it.
+    pub fn until(&self, t: S) -> Ramp<S> {
+        Ramp { start: self.ramp.start, end: along(&self.ramp, t / self.h) }
+    }
+
+    /// The same without derivatives.
+    pub fn plain(&self) -> Stretch<f64> {
+        Stretch { ramp: self.ramp.plain(), begin: self.begin, h: self.h.re() }
+    }
 }
 
 impl<S: Scalar> Mechanics<S> {
@@ -96,34 +106,32 @@ impl Mechanics<f64> {
         first.map(|(_, e)| e)
     }
 
-    /// Time into a leg of `h` seconds from `begin`, and the state, at which the event's indicator is zero: a bracketed
-    /// secant, and a last step of Newton's. `None` if it is there from the first.
+    /// The state `t` seconds into a stretch.
+    fn at(&self, t: f64, from: &State<f64>, stretch: &Stretch<f64>) -> State<f64> {
+        self.solve(from, &Leg { ramp: stretch.until(t), length: &self.length(t), end: stretch.begin + t })
+    }
+
+    /// Time into a stretch, and the state, at which the event's indicator is zero, by a bracketed secant; `to` is the end
+    /// beyond it. `None` if it is there from the first.
     pub fn locate(
         &self,
         event: Event,
         from: &State<f64>,
         to: &State<f64>,
-        ramp: Ramp<f64>,
-        [begin, h]: [f64; 2],
-    ) -> Option<Located> {
+        stretch: &Stretch<f64>,
+    ) -> Option<(f64, State<f64>)> {
         let mut low = (0.0, self.indicator(event, from, from));
         if low.1 <= 0.0 {
             return None;
         }
-        let mut high = (h, self.indicator(event, from, to));
-        let at = |t: f64| {
-            let length = self.length(t);
-            let ramp = Ramp { start: ramp.start, end: along(&ramp, t / h) };
-            self.solve(from, &Leg { ramp, length: &length, end: begin + t })
-        };
-        let indicator = |s: &State<f64>| self.indicator(event, from, s);
+        let mut high = (stretch.h, self.indicator(event, from, to));
         let tolerance = LOCATE_TOLERANCE * self.whole.step.h();
         let mut t = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
         let mut last_side = 0_i8;
         let mut state = *from;
         for _ in 0..LOCATE {
-            state = at(t);
-            let g = indicator(&state);
+            state = self.at(t, from, stretch);
+            let g = self.indicator(event, from, &state);
             let side = if g > 0.0 { 1 } else { -1 };
             // Illinois: the end that stays put counts half, so that the bracket closes from both sides.
             if side > 0 {
@@ -144,14 +152,14 @@ impl Mechanics<f64> {
             }
             t = next;
         }
-        // The indicator's slope along time, by a short difference of the step itself.
+        Some((t, state))
+    }
+
+    /// Slope along time of the indicator of an event that happens `t` seconds into a stretch, by a short difference.
+    pub fn slope(&self, event: Event, t: f64, from: &State<f64>, stretch: &Stretch<f64>) -> f64 {
         let dt = self.whole.step.h() * 1e-4;
-        let slope = (indicator(&at(t + dt)) - indicator(&state)) / dt;
-        if slope == 0.0 {
-            return Some(Located { at: t, state, slope });
-        }
-        t -= indicator(&state) / slope;
-        Some(Located { at: t, state: at(t), slope })
+        let indicator = |t| self.indicator(event, from, &self.at(t, from, stretch));
+        (indicator(t + dt) - indicator(t)) / dt
     }
 }
 

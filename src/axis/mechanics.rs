@@ -70,7 +70,7 @@ impl<S: Scalar> Mechanics<S> {
 
     /// A step of that length.
     pub fn length(&self, h: S) -> Length<S> {
-        Length::new(Propagator::new(&self.parameters, self.structure, self.scheme, h), self.lone)
+        Length::new(self.whole.step.of_length(h), self.lone)
     }
 
     /// The same without derivatives.

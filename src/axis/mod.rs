@@ -31,4 +31,4 @@ pub use propagator::{Linear, Propagator};
 pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

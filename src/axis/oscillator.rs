@@ -47,6 +47,25 @@ impl<S: Scalar> OscillatorStep<S> {
         }
     }
 
+    /// The same without damping and stiffness.
+    pub fn free(scheme: Scheme, h: S) -> Self {
+        let one = S::from(1.0);
+        let (alpha, delta) = match scheme {
+            Scheme::Newmark { alpha, delta } => (alpha, delta),
+            Scheme::Exact => (1.0 / 6.0, 0.5),
+        };
+        Self {
+            yy: one,
+            yv: h,
+            y0: h * h * (0.5 - alpha),
+            y1: h * h * alpha,
+            vy: S::default(),
+            vv: one,
+            v0: h * (1.0 - delta),
+            v1: h * delta,
+        }
+    }
+
     fn newmark(alpha: f64, delta: f64, b: S, k: S, h: S) -> Self {
         let one = S::from(1.0);
         let effective = one / (one + h * b * delta + h * h * k * alpha);

@@ -15,6 +15,11 @@ pub type Linear<S> = [S; 4];
 #[derive(Debug, Clone, Copy)]
 pub struct Propagator<S = f64> {
     h: S,
+    structure: Structure,
+    scheme: Scheme,
+    /// Damping and stiffness of the twist, per unit of its inertia.
+    damping: S,
+    stiffness: S,
     /// `I2/M`.
     share: S,
     inverse_total: S,
@@ -29,41 +34,40 @@ impl<S: Scalar> Propagator<S> {
     pub fn new(p: &Parameters<S>, structure: Structure, scheme: Scheme, h: S) -> Self {
         let one = S::from(1.0);
         let total = p.i1 + p.i2;
-        let centre = match scheme {
-            Scheme::Exact => OscillatorStep {
-                y0: h * h * (1.0 / 3.0),
-                y1: h * h * (1.0 / 6.0),
-                v0: h * 0.5,
-                v1: h * 0.5,
-                ..OscillatorStep::default()
-            },
-            Scheme::Newmark { .. } => OscillatorStep::new(scheme, S::default(), S::default(), h),
-        };
-        let inverse_1 = one / p.i1;
-        match structure {
+        let inverse_total = one / total;
+        let zero = S::default();
+        // Rigid: every coefficient of the twist is zero, and both inertias move as one.
+        let (share, inverse_1, inverse_2, damping, stiffness) = match structure {
             Structure::TwoInertia => {
                 let mobility = p.twist_mobility();
-                Self {
-                    h,
-                    share: p.i2 / total,
-                    inverse_total: one / total,
-                    inverse_1,
-                    inverse_2: one / p.i2,
-                    centre,
-                    twist: OscillatorStep::new(scheme, p.b * mobility, p.k * mobility, h),
-                }
+                (p.i2 * inverse_total, one / p.i1, one / p.i2, p.b * mobility, p.k * mobility)
             }
-            // No twist: every coefficient of it is zero, and both inertias move as one.
-            Structure::Rigid => Self {
-                h,
-                share: S::default(),
-                inverse_total: one / total,
-                inverse_1: S::default(),
-                inverse_2: S::default(),
-                centre,
-                twist: OscillatorStep::default(),
-            },
+            Structure::Rigid => (zero, zero, zero, zero, zero),
+        };
+        let still = OscillatorStep::default();
+        Self {
+            h,
+            structure,
+            scheme,
+            damping,
+            stiffness,
+            share,
+            inverse_total,
+            inverse_1,
+            inverse_2,
+            centre: still,
+            twist: still,
         }
+        .of_length(h)
+    }
+
+    /// The same of another length.
+    pub(super) fn of_length(&self, h: S) -> Self {
+        let twist = match self.structure {
+            Structure::TwoInertia => OscillatorStep::new(self.scheme, self.damping, self.stiffness, h),
+            Structure::Rigid => OscillatorStep::default(),
+        };
+        Self { h, centre: OscillatorStep::free(self.scheme, h), twist, ..*self }
     }
 
     /// Length of the step, s.

@@ -14,20 +14,12 @@
 
 use super::axis_model::{Axis, State};
 use super::balance::Leg;
-use super::events::{Event, LOCATE_TOLERANCE, along};
+use super::events::{Event, LOCATE_TOLERANCE, Stretch, along};
 use crate::effects::Ramp;
 use crate::scalar::Scalar;
 
 /// Most events handled inside one step; past that the step is taken as it stands.
 const EVENTS: usize = 24;
-
-/// What is left of a step after an event.
-struct Rest<S> {
-    ramp: Ramp<S>,
-    /// Its begin and its length, s.
-    begin: f64,
-    h: S,
-}
 
 impl<S: Scalar> Axis<S> {
     /// The state one step later, under the torque `ramp` on the motor; `time` is the start of the step, s.
@@ -69,9 +61,8 @@ impl<S: Scalar> Axis<S> {
             let Some(reached) = reached else {
                 return self.carry(&now, ramp, left, leg.end, &solved);
             };
-            let rest = Rest { ramp, begin, h: left.unwrap_or(h) };
             let at;
-            (at, now) = self.locate(reached, &now, &from, &solved, &rest);
+            (at, now) = self.locate(reached, &now, &from, &solved, &Stretch { ramp, begin, h: left.unwrap_or(h) });
             done += at;
             self.full.enter(reached, &mut now, time + done.re());
             if (h - done).re() <= LOCATE_TOLERANCE * h.re() {
@@ -136,23 +127,24 @@ impl<S: Scalar> Axis<S> {
         now: &State<S>,
         from: &State<f64>,
         to: &State<f64>,
-        rest: &Rest<S>,
+        left: &Stretch<S>,
     ) -> (S, State<S>) {
-        let span = [rest.begin, rest.h.re()];
-        let Some(found) = self.plain.locate(event, from, to, rest.ramp.plain(), span) else {
+        let plain = left.plain();
+        let Some((found, solved)) = self.plain.locate(event, from, to, &plain) else {
             return (S::default(), *now);
         };
-        let at = |t: S| {
-            let ramp = Ramp { start: rest.ramp.start, end: along(&rest.ramp, t / rest.h) };
-            self.carry(now, ramp, Some(t), rest.begin + t.re(), &found.state)
-        };
-        let t = S::from(found.at);
+        let at = |t: S| self.carry(now, left.until(t), Some(t), left.begin + t.re(), &solved);
+        let t = S::from(found);
         let state = at(t);
-        if !S::HAS_DERIVATIVES || found.slope == 0.0 {
+        if !S::HAS_DERIVATIVES {
+            return (t, state);
+        }
+        let slope = self.plain.slope(event, found, from, &plain);
+        if slope == 0.0 {
             return (t, state);
         }
         // The derivatives of the time, by the implicit function theorem.
-        let t = t - self.full.indicator(event, now, &state) / found.slope;
+        let t = t - self.full.indicator(event, now, &state) / slope;
         (t, at(t))
     }
 }

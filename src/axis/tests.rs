@@ -216,7 +216,7 @@ fn a_contact_that_lets_go_while_compressed_closes_again_only_when_it_pushes() {
 }
 
 /// Each effect at a size that shows, on the paper's axis.
-pub(super) fn shown(effect: Effect) -> Settings {
+pub(crate) fn shown(effect: Effect) -> Settings {
     let mut s = Settings::default();
     let values: &[f64] = match effect {
         Effect::CoulombMotor => &[0.006, 0.4, 2.0, 0.1],

@@ -33,12 +33,13 @@ impl Force for Backlash {
         if p[0].re() <= 0.0 {
             // The derivative at a closed gap: the dead zone grows on the side that is in contact.
             let side = if m.end.x.re() < 0.0 { -1.0 } else { 1.0 };
-            return Reaction { torque: -(base.k * p[0] * side), ..Reaction::default() };
+            return Reaction::given(-(base.k * p[0] * side));
         }
         if m.contact == 0 {
-            Reaction { torque: -(base.k * m.end.x + base.b * m.end.v), stiffness: -base.k.re(), damping: -base.b.re() }
+            let torque = -(base.k * m.end.x + base.b * m.end.v);
+            Reaction { torque, stiffness: -base.k.re(), damping: -base.b.re(), bend: 0.0 }
         } else {
-            Reaction { torque: -(base.k * p[0] * f64::from(m.contact)), ..Reaction::default() }
+            Reaction::given(-(base.k * p[0] * f64::from(m.contact)))
         }
     }
 }

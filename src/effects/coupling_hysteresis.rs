@@ -20,7 +20,7 @@ fn slope<S: Scalar>(z: S, direction: f64, sharpness: S) -> S {
 fn advance<S: Scalar>(z: S, x: S, sharpness: S) -> S {
     let direction = x.re().signum();
     let parts = (2.0 * x.re().abs()).ceil().clamp(1.0, 32.0);
-    let dx = x / parts;
+    let dx = if parts > 1.0 { x / parts } else { x };
     let mut z = z;
     for _ in 0..parts as usize {
         let a = slope(z, direction, sharpness);
@@ -56,10 +56,12 @@ impl Force for CouplingHysteresis {
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, z: &mut [S]) -> Reaction<S> {
-        let dx = if m.h.re() == 0.0 { S::default() } else { (m.end.x - m.start.x) / p[1] };
+        let per_reach = S::from(1.0) / p[1];
+        let dx = if m.h.re() == 0.0 { S::default() } else { (m.end.x - m.start.x) * per_reach };
         let after = advance(z[0], dx, p[2]);
         z[0] = after;
         let tangent = slope(after, if dx.re() < 0.0 { -1.0 } else { 1.0 }, p[2]).re();
-        Reaction { torque: p[0] * after, stiffness: p[0].re() / p[1].re() * tangent, damping: 0.0 }
+        let stiffness = p[0].re() * per_reach.re() * tangent;
+        Reaction { torque: p[0] * after, stiffness, damping: 0.0, bend: f64::INFINITY }
     }
 }

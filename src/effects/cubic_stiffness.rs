@@ -25,6 +25,7 @@ impl Force for CubicStiffness {
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
         let k3 = base.k * p[0];
         let square = m.end.x.squared();
-        Reaction { torque: k3 * square * m.end.x, stiffness: 3.0 * k3.re() * square.re(), damping: 0.0 }
+        let stiffness = 3.0 * k3.re() * square.re();
+        Reaction { torque: k3 * square * m.end.x, stiffness, damping: 0.0, bend: f64::INFINITY }
     }
 }

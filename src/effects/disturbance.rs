@@ -31,6 +31,6 @@ impl Force for Disturbance {
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
         let angle = p[1] * (TAU * m.time) + p[2];
-        Reaction { torque: -(p[0] * angle.sin()), ..Reaction::default() }
+        Reaction::given(-(p[0] * angle.sin()))
     }
 }

@@ -48,22 +48,24 @@ impl Force for EndStop {
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+        let free = Reaction { bend: f64::INFINITY, ..Reaction::given(S::default()) };
         let x = m.end.x;
         let (depth, inward) = if x.re() > p[1].re() {
             (x - p[1], 1.0)
         } else if x.re() < p[2].re() {
             (x - p[2], -1.0)
         } else {
-            return Reaction::default();
+            return free;
         };
         let push = p[3] * m.end.v * inward + 1.0;
         if push.re() <= 0.0 {
-            return Reaction::default();
+            return free;
         }
         Reaction {
             torque: p[0] * depth * push,
             stiffness: p[0].re() * push.re(),
             damping: p[0].re() * depth.re() * p[3].re() * inward,
+            bend: f64::INFINITY,
         }
     }
 }

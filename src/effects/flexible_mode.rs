@@ -42,12 +42,12 @@ impl Force for FlexibleMode {
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
         let (inertia, k, b) = (p[0], p[1], p[2]);
         if inertia.re() <= 0.0 && m.h.re() == 0.0 {
-            return Reaction::default();
+            return Reaction::given(S::default());
         }
         // Absolute motion of the third inertia, from the relative memory.
         let (e, rate) = (memory[0], memory[1]);
         if m.h.re() == 0.0 {
-            return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re() };
+            return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re(), bend: 0.0 };
         }
         let half = m.h * 0.5;
         let w3 = m.start.v - rate;
@@ -65,6 +65,6 @@ impl Force for FlexibleMode {
         memory[1] = m.end.v - w;
         memory[2] = a;
         let ratio = inertia.re() / effective.re();
-        Reaction { torque, stiffness: ratio * k.re(), damping: ratio * b.re() }
+        Reaction { torque, stiffness: ratio * k.re(), damping: ratio * b.re(), bend: 0.0 }
     }
 }

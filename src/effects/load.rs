@@ -29,7 +29,7 @@ impl Force for LoadMotor {
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
-        Reaction { torque: p[0], ..Reaction::default() }
+        Reaction::given(p[0])
     }
 }
 
@@ -52,6 +52,6 @@ impl Force for LoadTable {
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
-        Reaction { torque: p[0], ..Reaction::default() }
+        Reaction::given(p[0])
     }
 }

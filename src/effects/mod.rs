@@ -29,7 +29,7 @@ pub use info::{EffectInfo, Family, ParameterInfo, Place, Role, Scale, Start, Var
 pub use input::{Ramp, TorqueHistory};
 pub use sensor::{Reading, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
-pub(crate) use settings::{MEMORY, PARAMETERS, StepMotion, effect_scope};
+pub(crate) use settings::{Forces, MEMORY, PARAMETERS, StepMotion, effect_scope};
 pub(crate) use shapes::Coordinate;
 pub use shapes::{Base, DryFriction, Force, Input, Moment, Motion, Reaction, Sensor};
 
@@ -110,7 +110,7 @@ macro_rules! effects {
             fn torque<S: Scalar>(self, p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
                 match self {
                     $(Self::$name => when!(
-                        force, $shape, <$law>::torque(p, base, moment, memory), Reaction::default()
+                        force, $shape, <$law>::torque(p, base, moment, memory), Reaction::given(S::default())
                     ),)*
                 }
             }

@@ -29,7 +29,8 @@ fn torque<S: Scalar>(p: &[S], m: &Moment<S>, z: &mut [S]) -> Reaction<S> {
     // The bristle's own equation: dz/dx = 1 - sgn(dx)*z.
     let per_v = (1.0 - towards * after.re()) * per_speed.re();
     let rate_per_v = 1.0 - v.re().signum() * after.re() - v.re().abs() * per_v;
-    Reaction { torque: p[0] * after + p[2] * rate, stiffness: 0.0, damping: p[0].re() * per_v + p[2].re() * rate_per_v }
+    let damping = p[0].re() * per_v + p[2].re() * rate_per_v;
+    Reaction { torque: p[0] * after + p[2] * rate, stiffness: 0.0, damping, bend: f64::INFINITY }
 }
 
 /// Presliding friction on the motor side.

@@ -26,6 +26,7 @@ impl Force for QuadraticDrag {
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
         let speed = m.end.v.abs();
-        Reaction { torque: p[0] * m.end.v * speed, stiffness: 0.0, damping: 2.0 * p[0].re() * speed.re() }
+        let damping = 2.0 * p[0].re() * speed.re();
+        Reaction { torque: p[0] * m.end.v * speed, stiffness: 0.0, damping, bend: f64::INFINITY }
     }
 }

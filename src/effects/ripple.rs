@@ -8,7 +8,9 @@ use crate::scalar::Scalar;
 
 fn torque<S: Scalar>(amplitude: S, order: S, phase: S, x: S) -> Reaction<S> {
     let (sine, cosine) = (order * x + phase).sin_cos();
-    Reaction { torque: -(amplitude * sine), stiffness: -(amplitude.re() * order.re() * cosine), damping: 0.0 }
+    let steepest = amplitude.re() * order.re();
+    let bend = (steepest * order.re()).abs();
+    Reaction { torque: -(amplitude * sine), stiffness: -(steepest * cosine), damping: 0.0, bend }
 }
 
 /// Torque ripple: cogging, commutation, screw eccentricity.

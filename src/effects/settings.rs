@@ -308,11 +308,14 @@ pub(crate) struct Forces<S> {
     pub torque: [S; 2],
     pub stiffness: [[f64; 2]; 2],
     pub damping: [[f64; 2]; 2],
+    /// Sum of the laws' bends: zero if all are straight.
+    pub bend: f64,
 }
 
 impl<S: Scalar> Forces<S> {
     #[inline]
     pub(crate) fn add(&mut self, coordinate: Coordinate, r: &Reaction<S>) {
+        self.bend += r.bend;
         match coordinate {
             Coordinate::Table => {
                 self.torque[1] += r.torque;
@@ -404,6 +407,33 @@ impl ActiveEffects {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::tests::shown;
+
+    /// Newton's method ends where the bend says that its step has left nothing.
+    #[test]
+    fn no_law_leaves_its_tangent_by_more_than_its_bend() {
+        let base = Base { k: 1.76e-2, b: 5.4e-4 };
+        let mut straight = 0;
+        for &effect in EFFECTS.iter().filter(|e| e.is_force()) {
+            let settings = shown(effect);
+            let committed = [0.1; MEMORY];
+            for (x, v, contact) in [(0.3, 1.7, 0), (-0.2, -0.6, 1), (2.0, 0.4, -1)] {
+                let reaction = |dx: f64, dv: f64| {
+                    let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
+                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact };
+                    settings.reaction(effect, &base, &moment, &committed, &mut [0.0; MEMORY])
+                };
+                let at = reaction(0.0, 0.0);
+                for (dx, dv) in [(1e-2, 0.2), (-3e-3, 0.1), (0.5, -0.3)] {
+                    let off = reaction(dx, dv).torque - (at.torque + at.stiffness * dx + at.damping * dv);
+                    assert!(off.abs() <= 0.5 * at.bend * dx * dx + 1e-15, "{effect:?} {off} {}", at.bend);
+                }
+                straight += usize::from(at.bend == 0.0);
+            }
+        }
+        // Loads, play, drift of stiffness, third inertia and disturbance, at each of the three.
+        assert!(straight >= 6 * 3, "{straight}");
+    }
 
     #[test]
     fn kin_are_the_laws_of_one_thing_on_both_sides_of_the_coupling() {

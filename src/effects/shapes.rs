@@ -74,7 +74,7 @@ pub struct Moment<S> {
 }
 
 /// A torque that resists the motion, with its tangent for Newton's method.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Reaction<S> {
     /// Torque on the left-hand side of the equation of motion (positive resists positive motion), N.m.
     pub torque: S,
@@ -82,6 +82,16 @@ pub struct Reaction<S> {
     pub stiffness: f64,
     /// Its derivative to the velocity at the end, N.m.s/rad.
     pub damping: f64,
+    /// A move `dx` of the end takes the torque no more than `bend*dx^2/2` off this tangent, N.m/rad2: zero for a law that
+    /// is straight, infinite where nothing is known.
+    pub bend: f64,
+}
+
+impl<S: Scalar> Reaction<S> {
+    /// A torque that does not hang on the end of the step.
+    pub fn given(torque: S) -> Self {
+        Self { torque, stiffness: 0.0, damping: 0.0, bend: 0.0 }
+    }
 }
 
 /// A set-valued friction: `torque = level*sgn(v)`, anything between while at rest.
