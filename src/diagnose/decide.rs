@@ -27,8 +27,6 @@ const GRAIN: f64 = 0.05;
 const BEAM: usize = 3;
 /// How many times less than one effect two must leave for a third to be looked for.
 const WORTH_A_THIRD: f64 = 3.0;
-/// Most effects at once.
-const MOST: usize = 3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
 /// Smallest relative change of the parameters that is called one.
@@ -217,7 +215,7 @@ fn alike<'a>(singles: &'a [Tested], best: &'a Tested, values: f64) -> &'a Tested
         .unwrap_or(best)
 }
 
-/// Adds effects while a material remainder is closed by one more.
+/// A second and a third effect, where a material remainder is closed by them.
 ///
 /// Two at once are looked for as two: the best single effect may be the one that imitates both. Where the regression over
 /// pairs does not lead to the floor, the best few singles are each given a partner.
@@ -267,21 +265,17 @@ fn further(
                 pair = pair.into_iter().chain(turned).min_by(closer);
             }
         }
-        match pair.map(|p| search.among_kin(p)).filter(|p| closes_more(p, &chosen)) {
-            Some(pair) => {
-                let closed = chosen.fitted.chi2 / pair.fitted.chi2;
-                chosen = pair;
-                if closed < WORTH_A_THIRD {
-                    return chosen;
-                }
+        let Some(pair) = pair.map(|p| search.among_kin(p)) else { return chosen };
+        let third = if suffices(&pair, gap, values) || chosen.fitted.chi2 < WORTH_A_THIRD * pair.fitted.chi2 {
+            None
+        } else {
+            best_partner(&pair, f64::INFINITY).map(|t| if material(&t) { search.among_kin(t) } else { t })
+        };
+        // Beside a cause that is all but everything two more may count together where neither does alone.
+        for next in [Some(pair), third].into_iter().flatten() {
+            if closes_more(&next, &chosen) {
+                chosen = next;
             }
-            None => return chosen,
-        }
-    }
-    while chosen.effects.len() < MOST && !suffices(&chosen, gap, values) && !little_left(&chosen) {
-        match best_partner(&chosen, f64::INFINITY).filter(|next| closes_more(next, &chosen)) {
-            Some(next) => chosen = next,
-            None => break,
         }
     }
     chosen
