@@ -22,16 +22,18 @@ import effects
 import plant
 import visible
 
-CLASSES = (*effects.FAMILY, "none", "parameters", "pairs")
+SEVERAL = {"pairs": 2, "triples": 3}  # effects at once
+CLASSES = (*effects.FAMILY, "none", "parameters", *SEVERAL)
+ALL = [c for c in CLASSES if c != "triples"]  # the check as it is defined; three at once are drawn when asked for
 PREROLL = 64  # samples of the periodic excitation before the record begins
 MIN_GAP = 2.0  # least rms of the effect after a linear re-fit of the base model, in multiples of the encoder noise
 # A quantum of some 30 times the noise and more: below that the true model with the true quantum predicts no better than without.
 MIN_GAP_QUANTISATION = 10.0
-LEAST_SHARE = 0.1  # of two effects, the rms that the smaller leaves after the re-fit over that of the larger, at least
+LEAST_SHARE = 0.1  # of several effects, the rms that the smallest leaves after the re-fit over that of the largest, at least
 TRIES = 40
 # Two effects that would move the same plant parameter, or that need opposite experiments, are not drawn together.
 FRICTION_MOTOR = {"coulomb_motor", "presliding_motor", "friction_drift"}
-NOT_IN_PAIRS = {"torque_gain", "encoder_quantisation", "end_stop"}
+ALONE = {"torque_gain", "encoder_quantisation", "end_stop"}
 
 
 @dataclass
@@ -152,12 +154,12 @@ def residual_rms(base, exp, draws, others, sensors) -> float:
     return effects.rms(visible.refit_residual(base, exp.dt, with_all, error, outputs_of(sensors)))
 
 
-def pick_pair(rng):
-    ids = [e for e in effects.FAMILY if e not in NOT_IN_PAIRS]
+def pick_several(rng, count: int):
+    ids = [e for e in effects.FAMILY if e not in ALONE]
     while True:
-        a, b = (str(x) for x in rng.choice(ids, 2, replace=False))
-        if effects.FAMILY[a][0] != effects.FAMILY[b][0] and not {a, b} <= FRICTION_MOTOR:
-            return [a, b]
+        picked = [str(x) for x in rng.choice(ids, count, replace=False)]
+        if len({effects.FAMILY[e][0] for e in picked}) == count and len(FRICTION_MOTOR.intersection(picked)) < 2:
+            return picked
 
 
 def log_uniform(rng, low, high):
@@ -168,7 +170,7 @@ def draw_case(cls: str, kind: str, seed) -> dict | None:
     """One attempt at a case; None when the drawn effect would not be visible with any noise of the allowed range."""
     rng = np.random.default_rng(seed)
     axis = draw_axis(kind, rng)
-    ids = pick_pair(rng) if cls == "pairs" else [] if cls in ("none", "parameters") else [cls]
+    ids = pick_several(rng, SEVERAL[cls]) if cls in SEVERAL else [] if cls in ("none", "parameters") else [cls]
     turning = any(e in effects.TURNING for e in ids)
     tilt = rng.uniform(0.5, 1.0) if turning or rng.random() < 0.5 else 0.0
     top = axis.resonance * (rng.uniform(3, 10) if kind == "seed" else rng.uniform(1.3, 2.0))
@@ -209,9 +211,9 @@ def draw_case(cls: str, kind: str, seed) -> dict | None:
             gaps.setdefault(d.id, {})[name] = gap
     need = [min(g.values()) / (MIN_GAP_QUANTISATION if e == "encoder_quantisation" else MIN_GAP)
             for e, g in gaps.items() if e not in effects.ABSORBED]
-    for part in ("train", "holdout") if len(gaps) == 2 else ():
-        pair = [g[part] for g in gaps.values()]
-        if min(pair) < LEAST_SHARE * max(pair):
+    for part in ("train", "holdout") if cls in SEVERAL else ():
+        each = [g[part] for g in gaps.values()]
+        if min(each) < LEAST_SHARE * max(each):
             return None
     if need:
         largest = min(need)
@@ -329,11 +331,11 @@ def make(out: pathlib.Path, cls: str, r: int, seed: int) -> tuple[str, str, int]
 def main(argv=None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder to write; cases/ and seals/ in it are replaced")
-    parser.add_argument("--classes", default="all", help="all, singles, or a comma-separated list of: " + ", ".join(CLASSES))
+    parser.add_argument("--classes", default="all", help="all (without triples), singles, or a comma-separated list of: " + ", ".join(CLASSES))
     parser.add_argument("--per-class", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args(argv)
-    wanted = {"all": list(CLASSES), "singles": list(effects.FAMILY)}.get(args.classes) or args.classes.split(",")
+    wanted = {"all": ALL, "singles": list(effects.FAMILY)}.get(args.classes) or args.classes.split(",")
     unknown = [c for c in wanted if c not in CLASSES]
     if unknown:
         parser.error(f"unknown class {', '.join(unknown)}; there are: {', '.join(CLASSES)}")

@@ -10,6 +10,8 @@ import effects
 # Likelihood proof of a confusable pair: the two differ by less than this in BIC ("very strong" begins at 10, Kass & Raftery 1995).
 BIC_PROOF = 10.0
 NOT_AN_EFFECT = ("parameters", "no_gap")
+# Classes of several effects at once: what they are called, and the share to reach.
+SEVERAL = {"pairs": ("two effects", "90 %"), "triples": ("three effects", "")}
 
 
 def wilson(hits: int, n: int, z: float = 1.96):
@@ -125,10 +127,10 @@ def judge(seal: dict, answer: dict | None, seconds: float | None) -> dict:
         "suspect_right": suspects[0] == true_family, "where_right": where == true_place,
         "confusable_proven": proven, "closure": found, "oracle_closure": best,
         "closure_of_oracle": None if best is None else (found or 0.0) / best, "seconds": seconds,
-        "pair_named": len(ids) == 2 and {family_of(i) for i in ids} <= {family_of(c) for c in causes},
-        "pair_ids_named": len(ids) == 2 and set(ids) <= set(causes),
-        "pair_ids_confusable": len(ids) == 2 and set(ids) <= set(causes) | rivals(answer, causes),
-        "pair_hits": sum(family_of(i) in {family_of(c) for c in causes} for i in ids) if len(ids) == 2 else None,
+        "all_named": {family_of(i) for i in ids} <= {family_of(c) for c in causes},
+        "all_ids_named": set(ids) <= set(causes),
+        "all_ids_confusable": set(ids) <= set(causes) | rivals(answer, causes),
+        "hits": sum(family_of(i) in {family_of(c) for c in causes} for i in ids),
         # A step below the noise is there in some cases, beside the hidden effect: naming it too is not wrong.
         "extra": len([c for c in causes if family_of(c) not in {family_of(i) for i in ids}
                       and not (c == "encoder_quantisation" and seal.get("light_step_rad"))]),
@@ -160,9 +162,8 @@ def quantiles(values) -> dict:
 
 def summary(rows: list[dict], without: list[dict]) -> dict:
     """All figures from judged rows and, for the abstention, rows {case, class, outcome}."""
-    singles = [r for r in rows if r["class"] not in ("none", "parameters", "pairs")]
+    singles = [r for r in rows if r["class"] not in ("none", "parameters", *SEVERAL)]
     quiet = [r for r in rows if r["class"] in ("none", "parameters")]
-    pairs = [r for r in rows if r["class"] == "pairs"]
     for r in quiet:
         r["false_alarm"] = r["told"] in effects.FAMILY and r["told_family"] != "parameters"
     keys = ("family_right", "place_right", "id_right", "family_confusable", "place_confusable", "confusable_proven", "suspect_right")
@@ -186,10 +187,12 @@ def summary(rows: list[dict], without: list[dict]) -> dict:
     out["quiet_right"] = {c: proportion([r for r in quiet if r["class"] == c], "family_right") for c in ("none", "parameters")}
     out["closure_of_oracle"] = {"all_singles": quantiles(r["closure_of_oracle"] for r in singles),
                                 "family_right": quantiles(r["closure_of_oracle"] for r in singles if r["family_right"])}
-    out["pairs"] = {"families": proportion(pairs, "pair_named"), "ids": proportion(pairs, "pair_ids_named"),
-                    "ids_confusable": proportion(pairs, "pair_ids_confusable"),
-                    "causes_found": sum(r["pair_hits"] or 0 for r in pairs), "causes": 2 * len(pairs),
-                    "false_causes": sum(r["extra"] for r in pairs)}
+    for several in SEVERAL:
+        of = [r for r in rows if r["class"] == several]
+        out[several] = {"families": proportion(of, "all_named"), "ids": proportion(of, "all_ids_named"),
+                        "ids_confusable": proportion(of, "all_ids_confusable"),
+                        "causes_found": sum(r["hits"] for r in of), "causes": sum(len(r["truth"]) for r in of),
+                        "false_causes": sum(r["extra"] for r in of)}
     out["extra_causes_in_singles"] = sum(r["extra"] > 0 and r["family_right"] for r in singles)
     judged = [w for w in without if w["outcome"] != "excused"]
     for w in judged:
@@ -243,12 +246,14 @@ def markdown(s: dict, rows: list[dict], title: str) -> str:
         q = c[key]
         share = "-" if q["at_least_0_95"] is None else f"{100 * q['at_least_0_95']:.1f} %"
         lines.append(f"| closure over the oracle's, {text}: median; share of cases at 0.95 or more | {number(q['median'], 4)}; {share} | 0.98; 90 % |")
-    p = s["pairs"]
-    lines += [f"| two effects, both families named | {percent(p['families'])} | 90 % |",
-              f"| two effects, both effects named | {percent(p['ids'])} | |",
-              f"| two effects, each named or named as confusable with one that is | {percent(p['ids_confusable'])} | |",
-              f"| two effects: causes found, false ones | {p['causes_found']}/{p['causes']}, {p['false_causes']} | |",
-              f"| single effects with a further, false cause | {s['extra_causes_in_singles']} | |"]
+    for several, (text, aim) in SEVERAL.items():
+        p = s[several]
+        if p["causes"] or aim:
+            lines += [f"| {text}, all families named | {percent(p['families'])} | {aim} |",
+                      f"| {text}, all effects named | {percent(p['ids'])} | |",
+                      f"| {text}, each named or named as confusable with one that is | {percent(p['ids_confusable'])} | |",
+                      f"| {text}: causes found, false ones | {p['causes_found']}/{p['causes']}, {p['false_causes']} | |"]
+    lines.append(f"| single effects with a further, false cause | {s['extra_causes_in_singles']} | |")
     if s["seconds"]:
         lines.append(f"| seconds a case: median, longest | {s['seconds']['median']:.1f}, {s['seconds']['max']:.1f} | 10 |")
     lines.append(f"| diagnosis failed | {len(s['failed'])} | 0 |")
@@ -258,8 +263,8 @@ def markdown(s: dict, rows: list[dict], title: str) -> str:
                   for g, v in s["by"][axis].items()]
     lines += ["", "## Confusion by family", "", *matrix(s["confusion_family"])]
     lines += ["", "## Confusion by place", "", *matrix(s["confusion_place"])]
-    wrong = [r for r in rows if r["class"] != "pairs" and not (r["family_right"] and r["place_right"])]
-    wrong += [r for r in rows if r["class"] == "pairs" and not r["pair_named"]]
+    wrong = [r for r in rows if r["class"] not in SEVERAL and not (r["family_right"] and r["place_right"])]
+    wrong += [r for r in rows if r["class"] in SEVERAL and not r["all_named"]]
     lines += ["", "## Cases not right", "",
               "| case | truth | told | confusable | axis | sensors | noise | gap/noise | closure |", "|---|---|---|---|---|---|---|---|---|"]
     for r in sorted(wrong, key=lambda r: (r["class"], r["case"])):

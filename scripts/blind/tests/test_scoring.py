@@ -84,9 +84,9 @@ def test_abstention_is_excused_only_where_another_family_closes_the_gap():
 def test_a_pair_needs_both_families():
     two = seal(effects=[seal()["effects"][0], seal()["effects"][0] | {"id": "delay", "family": "delay", "place": "input"}])
     both = answer("coulomb_motor")
-    assert not score.judge(two, both, 1.0)["pair_named"]
+    assert not score.judge(two, both, 1.0)["all_named"]
     both["causes"].append({"id": "delay", "family": "delay", "place": "input"})
-    assert score.judge(two, both, 1.0)["pair_named"] and score.judge(two, both, 1.0)["extra"] == 0
+    assert score.judge(two, both, 1.0)["all_named"] and score.judge(two, both, 1.0)["extra"] == 0
 
 
 FAKE = """#!{python}
