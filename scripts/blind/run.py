@@ -68,7 +68,7 @@ def check(needs: list[str], s: dict) -> list[str]:
         "family": s["singles"]["family_right"]["share"], "place": s["singles"]["place_right"]["share"],
         "family_confusable": s["singles"]["family_confusable"]["share"],
         "place_confusable": s["singles"]["place_confusable"]["share"],
-        "abstention": s["abstention"]["share"], "pairs": s["pairs"]["families"]["share"],
+        "abstention": s["abstention"]["share"], **{several: s[several]["families"]["share"] for several in score.SEVERAL},
         "closure_median": c["median"], "closure_share": c["at_least_0_95"], "false_alarms": s["false_alarms"]["both"]["share"],
     }
     missed = []

@@ -8,7 +8,7 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 BLIND = ROOT / "scripts" / "blind"
-CLASSES = "coulomb_motor,presliding_table,backlash,torque_ripple,actuator_lag,flexible_mode,none,parameters"
+CLASSES = "coulomb_motor,presliding_table,backlash,torque_ripple,actuator_lag,flexible_mode,none,parameters,pairs,triples"
 
 
 @pytest.fixture(scope="module")
@@ -23,6 +23,7 @@ def test_every_withheld_cause_of_a_small_set_is_named(program, tmp_path):
     subprocess.run([sys.executable, BLIND / "generate.py", "--out", tmp_path, "--classes", CLASSES, "--per-class", "1",
                     "--seed", "4242"], check=True)
     ran = subprocess.run([sys.executable, BLIND / "run.py", "--cases", tmp_path, "--eixo", program, "--no-without",
-                          "--need", "family=0.99", "--need", "place=0.99", "--need", "false_alarms=0", "--need", "closure_share=0.99"],
+                          "--need", "family=0.99", "--need", "place=0.99", "--need", "false_alarms=0", "--need", "closure_share=0.99",
+                          "--need", "pairs=1", "--need", "triples=1"],
                          capture_output=True, text=True)
     assert ran.returncode == 0, ran.stdout + ran.stderr
