@@ -28,21 +28,15 @@ impl Mechanics<f64> {
     /// The state at the end of a leg.
     pub fn solve(&self, s: &State<f64>, leg: &Leg<f64>) -> State<f64> {
         let mut memory = s.memory;
-        match Equation::of(self, s, leg) {
-            Equation::Lone(lone) => {
-                let [drives, found] = newton(&lone, [lone.at_start()], leg.ramp.end, self.remembers, &mut memory);
-                State { linear: lone.end(drives[0]), friction: [0.0; 2], force: lone.force(found[0]), memory, ..*s }
-            }
-            Equation::Coupled(coupled) => {
-                let [drives, force] = newton(&coupled, s.force, leg.ramp.end, self.remembers, &mut memory);
-                let (linear, friction) = coupled.end(drives);
-                State { linear, friction, force, memory, ..*s }
-            }
-            Equation::Known(coupled) => {
-                let (linear, friction) = coupled.end(s.force);
-                State { linear, friction, ..*s }
-            }
-        }
+        let equation = Equation::of(self, s, leg);
+        let mut seek = Newton { input: leg.ramp.end, remembers: self.remembers, memory: &mut memory };
+        let [drives, force] = match &equation {
+            Equation::Lone(lone) => seek.from([lone.at_start()], lone).map(|[torque]| lone.force(torque)),
+            Equation::Coupled(coupled) => seek.from(s.force, coupled),
+            Equation::Known(_) => [s.force; 2],
+        };
+        let (linear, friction) = equation.end(drives);
+        State { linear, friction, force, memory, ..*s }
     }
 }
 
@@ -50,55 +44,55 @@ impl<S: Scalar> Mechanics<S> {
     /// The state at the end of a leg, with derivatives, from what [`Mechanics::solve`] found without.
     pub fn carry(&self, s: &State<S>, leg: &Leg<S>, solved: &State<f64>) -> State<S> {
         let mut memory = s.memory;
-        match Equation::of(self, s, leg) {
+        let equation = Equation::of(self, s, leg);
+        let solved = solved.force.map(S::from);
+        let force = match &equation {
             Equation::Lone(lone) => {
-                let [torque] = derive(&lone, [lone.along(solved.force.map(S::from))], self.remembers, &mut memory);
-                let friction = [S::default(); 2];
-                State { linear: lone.end(torque), friction, force: lone.force(torque), memory, ..*s }
+                let [torque] = derive(lone, [lone.along(solved)], self.remembers, &mut memory);
+                lone.force(torque)
             }
-            Equation::Coupled(coupled) => {
-                let force = derive(&coupled, solved.force.map(S::from), self.remembers, &mut memory);
-                let (linear, friction) = coupled.end(force);
-                State { linear, friction, force, memory, ..*s }
-            }
-            Equation::Known(coupled) => {
-                let (linear, friction) = coupled.end(s.force);
-                State { linear, friction, ..*s }
-            }
-        }
+            Equation::Coupled(coupled) => derive(coupled, solved, self.remembers, &mut memory),
+            Equation::Known(_) => s.force,
+        };
+        let (linear, friction) = equation.end(force);
+        State { linear, friction, force, memory, ..*s }
     }
 }
 
-/// Newton's method from `torque`: the torques that led to the end, and those that the laws give there; `memory` is left as
-/// it is at the end.
-fn newton<const N: usize>(
-    balance: &impl Balance<f64, N>,
-    mut torque: [f64; N],
+/// Newton's method for the torques at the end of a leg.
+struct Newton<'a> {
+    /// Torque on the motor there: a size to measure by.
     input: f64,
     remembers: bool,
-    memory: &mut Memory<f64>,
-) -> [[f64; N]; 2] {
-    let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let mut previous = f64::INFINITY;
-    let mut there = false;
-    for iteration in 1.. {
-        let pass = balance.pass(torque, memory);
-        let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
-        let scale = largest(&pass.found) + input.abs();
-        if there || size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
-            return [torque, pass.found];
+    /// Left as it is at the end.
+    memory: &'a mut Memory<f64>,
+}
+
+impl Newton<'_> {
+    /// From `torque`: the torques that led to the end, and those that the laws give there.
+    fn from<const N: usize>(&mut self, mut torque: [f64; N], balance: &impl Balance<f64, N>) -> [[f64; N]; 2] {
+        let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let mut previous = f64::INFINITY;
+        let mut there = false;
+        for iteration in 1.. {
+            let pass = balance.pass(torque, self.memory);
+            let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
+            let scale = largest(&pass.found) + self.input.abs();
+            if there || size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
+                return [torque, pass.found];
+            }
+            // A residual that grows means a kink was crossed: half the step.
+            let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
+            previous = size;
+            torque = std::array::from_fn(|i| torque[i] - pass.correction[i] * damp);
+            // Newton squares the share that is missing; an internal state is to be taken along.
+            there = size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && damp == 1.0);
+            if there && !self.remembers {
+                break;
+            }
         }
-        // A residual that grows means a kink was crossed: half the step.
-        let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
-        previous = size;
-        torque = std::array::from_fn(|i| torque[i] - pass.correction[i] * damp);
-        // Newton squares the share that is missing.
-        there = size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && damp == 1.0);
-        if there && !remembers {
-            break;
-        }
+        [torque, torque]
     }
-    [torque, torque]
 }
 
 /// The derivatives of torques whose values balance.
@@ -155,6 +149,16 @@ impl<'a, S: Scalar> Equation<'a, S> {
             Self::Known(coupled)
         } else {
             Self::Coupled(coupled)
+        }
+    }
+}
+
+impl<S: Scalar> Equation<'_, S> {
+    /// The end under the effects' torques there, and the friction that holds.
+    fn end(&self, force: [S; 2]) -> (Linear<S>, [S; 2]) {
+        match self {
+            Self::Lone(lone) => (lone.end(lone.along(force)), [S::default(); 2]),
+            Self::Coupled(coupled) | Self::Known(coupled) => coupled.end(force),
         }
     }
 }
