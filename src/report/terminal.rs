@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{CellAlignment, ContentArrangement, presets};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 
 use super::format::{self, Medium, printable};
 use super::{Block, Cell, Report, Table, Tone, Verdict};
@@ -86,6 +86,10 @@ pub fn table(t: &Table, layout: Layout) -> String {
     for (i, column) in out.column_iter_mut().enumerate() {
         column.set_padding((0, if marked && i == 0 { 1 } else { 2 }));
         let Some(i) = i.checked_sub(usize::from(marked)) else { continue };
+        // A name or a number is not broken.
+        let cells = t.rows.iter().filter_map(|r| r.cells.get(i)).map(|c| format::cell(c, Medium::Terminal));
+        let widest = cells.flat_map(|c| longest_word(&c)).chain(longest_word(&t.columns[i])).max().unwrap_or(0);
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(widest as u16 + 2)));
         let mut cells = t.rows.iter().filter_map(|r| r.cells.get(i)).filter(|c| **c != Cell::Empty).peekable();
         if cells.peek().is_some() && cells.all(Cell::is_numeric) {
             column.set_cell_alignment(CellAlignment::Right);
@@ -134,13 +138,19 @@ fn key_values(pairs: &[(String, Cell)]) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
+/// Characters of the longest word, if there is one.
+fn longest_word(text: &str) -> Option<usize> {
+    text.split_whitespace().map(|word| word.chars().count()).max()
+}
+
 /// Text broken at spaces to at most `width` characters a line; further lines begin with `indent`.
 fn wrapped(text: &str, width: u16, indent: &str) -> String {
     let width = usize::from(width.max(20));
     let mut lines: Vec<String> = Vec::new();
     for paragraph in printable(text).lines() {
         let mut line = String::new();
-        for word in paragraph.split_whitespace() {
+        // A percent sign stays with its number.
+        for word in paragraph.replace(" %", "\u{a0}%").split([' ', '\t']).filter(|w| !w.is_empty()) {
             if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > width {
                 lines.push(std::mem::take(&mut line));
             }
@@ -151,7 +161,7 @@ fn wrapped(text: &str, width: u16, indent: &str) -> String {
         }
         lines.push(line);
     }
-    lines.join(&format!("\n{indent}"))
+    lines.join(&format!("\n{indent}")).replace('\u{a0}', " ")
 }
 
 fn bold(text: &str, layout: Layout) -> String {
@@ -166,4 +176,25 @@ fn painted(text: &str, tone: Tone, layout: Layout) -> String {
         Tone::Neutral => 36,
     };
     if layout.colour { format!("\u{1b}[1;{code}m{text}\u{1b}[0m") } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_keeps_its_percent_sign_and_a_name_its_letters() {
+        let text = "On held-out data the model's error falls from 2.28 % of the signal to 5.1e-4 % in all.";
+        for width in 20..60 {
+            let lines = wrapped(text, width, "");
+            assert!(lines.lines().all(|l| !l.starts_with('%') && l.chars().count() <= usize::from(width)), "{lines}");
+            assert_eq!(lines.replace('\n', " "), text);
+        }
+        let mut long = Table::new("", ["cause", "parameter", "value"]);
+        let cause = "friction of motor and screw that yields before it breaks away, as ever";
+        let cells = [cause, "presliding_motor.damping", "6.391058e-4 ± 2.5e-9 N.m.s/rad"];
+        long.row(cells.map(|c| Cell::Text(c.to_owned())).to_vec());
+        let shown = table(&long, Layout { width: 70, colour: false });
+        assert!(shown.contains("presliding_motor.damping"), "{shown}");
+    }
 }
