@@ -298,12 +298,24 @@ fn levels(f: &Findings) -> Table {
     row("as given", |l| l.before, false);
     row("parameters re-identified", |l| l.reidentified, false);
     match f.diagnosis.verdict {
-        Answer::Effect => row("with the effect", |l| l.after, true),
-        Answer::Unexplained => row("with the nearest effect", |l| l.after, false),
+        Answer::Effect | Answer::Unexplained => {
+            row(improved(f.diagnosis), |l| l.after, f.diagnosis.verdict == Answer::Effect);
+        }
         Answer::Parameters | Answer::NoGap => {}
     }
     row("noise floor", |l| l.noise_floor, false);
     table
+}
+
+/// What the model at its best is called.
+fn improved(d: &Diagnosis) -> &'static str {
+    match (d.verdict, d.causes.len()) {
+        (Answer::Effect, 2..) => "with the effects",
+        (Answer::Effect, _) => "with the effect",
+        (Answer::Unexplained, 2..) => "with the nearest effects",
+        (Answer::Unexplained, _) => "with the nearest effect",
+        (Answer::Parameters | Answer::NoGap, _) => "re-identified",
+    }
 }
 
 fn how_far(f: &Findings) -> Vec<Block> {
@@ -311,17 +323,13 @@ fn how_far(f: &Findings) -> Vec<Block> {
     let mut blocks = vec![Block::Table(levels(f))];
     if d.verdict == Answer::Effect && d.gap.closure_of_effect.is_finite() {
         blocks.push(Block::Paragraph(format!(
-            "Counted from the model whose parameters alone were fitted again, the effect closes {} of what was left.",
+            "Counted from the model whose parameters alone were fitted again, {} {} of what was left.",
+            if d.causes.len() > 1 { "the effects close" } else { "the effect closes" },
             percent(d.gap.closure_of_effect)
         )));
     }
-    let after = match d.verdict {
-        Answer::Effect => "with the effect",
-        Answer::Unexplained => "with the nearest effect",
-        Answer::Parameters | Answer::NoGap => "re-identified",
-    };
     for o in f.evidence.iter().flat_map(|e| &e.held) {
-        blocks.extend(residual::overlay(o, after, f.motion));
+        blocks.extend(residual::overlay(o, improved(d), f.motion));
     }
     if !d.parameters.is_empty() {
         blocks.push(Block::Table(parameters(&d.parameters)));
