@@ -16,6 +16,8 @@ const COMPARED: f64 = 3.0;
 pub const WAY: usize = 8;
 /// leaves this many times the first is given up.
 pub const NO_RIVAL: f64 = 1.5;
+/// Another law of the same thing starts beside its minimum, in a valley that events make rough: it has longer.
+const WAY_OF_KIN: usize = 3 * WAY;
 
 /// A hypothesis that was fitted.
 #[derive(Debug, Clone)]
@@ -157,7 +159,8 @@ impl Search<'_> {
         let known = combination.ids();
         let kin = self.suspects.iter().copied().filter(|k| effect.is_kin_of(*k) && !known.contains(&k.info().id));
         kin.filter_map(|kin| {
-            let forms = (0..kin.info().variants.len()).map(|form| self.replaced(combination, at, kin, form));
+            let forms =
+                (0..kin.info().variants.len()).map(|form| self.replaced(combination, at, (kin, form), WAY_OF_KIN));
             simplest_of(forms.collect(), self.data.values() as f64)
         })
         .collect()
@@ -170,22 +173,23 @@ impl Search<'_> {
         for i in 0..best.effects.len() {
             let (effect, form) = best.effects[i];
             let others = (0..effect.info().variants.len()).filter(|other| *other != form);
-            let mut forms: Vec<Tested> = others.map(|other| self.replaced(&best, i, effect, other)).collect();
+            let mut forms: Vec<Tested> = others.map(|other| self.replaced(&best, i, (effect, other), WAY)).collect();
             forms.push(best.clone());
             best = simplest_of(forms, self.data.values() as f64).unwrap_or(best);
         }
         best
     }
 
-    /// A combination with one of its effects replaced by a form of its kin, or of itself, from where it stands.
-    fn replaced(&self, combination: &Tested, at: usize, kin: Effect, form: usize) -> Tested {
+    /// A combination with one of its effects replaced by a form of its kin, or of itself, from where it stands; given up
+    /// where it is no rival after so many steps.
+    fn replaced(&self, combination: &Tested, at: usize, (kin, form): (Effect, usize), way: usize) -> Tested {
         let (effect, _) = combination.effects[at];
         let mut model = combination.fitted.model;
         model.effects = inherited(&model.effects, effect, kin, &kin.info().variants[form], &self.nominal.effects);
         let mut effects = combination.effects.clone();
         effects[at] = (kin, form);
         let from = Fitted { model, ..combination.fitted.clone() };
-        self.refit(&from, effects, self.exploring(&from).unless(WAY, NO_RIVAL * from.chi2))
+        self.refit(&from, effects, self.exploring(&from).unless(way, NO_RIVAL * from.chi2))
     }
 
     /// What is free when these effects are on.
