@@ -91,7 +91,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let held = Held { record: other, windows: &held_windows, states: states::along(other, &case.nominal) };
     let fitted = [case.nominal, decision.parameters.fitted.model, decision.chosen.fitted.model];
     let on_held = held.gap(fitted);
-    decision.confirm(on_held.closure, on_held.closure_of_effect);
+    decision.confirm(&on_held);
     progress("lines of the excitation");
     let unexplained = decision.verdict == Verdict::Unexplained;
     let linear = unexplained.then(|| lines::examine(case, &all, &all_held)).flatten().and_then(|found| {

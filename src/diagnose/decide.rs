@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::gap::{Gap, Levels};
 use super::search::{Search, Tested};
 use crate::effects::Effect;
 
@@ -100,14 +101,17 @@ pub struct Decision {
 
 impl Decision {
     /// Takes back or gives the verdict that an effect is the cause by what it closes of the gap on data that no fit has
-    /// seen: `closure` from the model as given, `of_effect` from its parameters fitted. A fit at the floor stands.
-    pub fn confirm(&mut self, closure: f64, of_effect: f64) {
-        if self.chosen.effects.is_empty() || unexplained_part(&self.chosen, self.values) == 0.0 {
+    /// seen. A fit at the floor stands if its error there is below the noise, too.
+    pub fn confirm(&mut self, held: &Gap) {
+        let Levels { after, noise_floor, .. } = held.figures.combined;
+        let below_noise = after.powi(2) <= (1.0 + BELOW_NOISE) * noise_floor.powi(2);
+        let at_floor = below_noise && unexplained_part(&self.chosen, self.values) == 0.0;
+        if self.chosen.effects.is_empty() || at_floor {
             return;
         }
-        if closure < CLOSES {
+        if held.closure < CLOSES {
             self.verdict = Verdict::Unexplained;
-        } else if of_effect >= CLOSES {
+        } else if held.closure_of_effect >= CLOSES {
             self.verdict = Verdict::Effect;
         }
     }

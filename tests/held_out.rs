@@ -1,0 +1,40 @@
+//! A cause that explains the record to the noise, but not the one held out, is none.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use serde_json::Value;
+
+#[path = "program/run.rs"]
+mod run;
+
+use run::eixo_in;
+
+const AXIS: &str = "[parameters]\nI1 = 2.37e-4\nI2 = 6.07e-6\nB = 5.4e-4\nK = 1.76e-2\n";
+
+#[test]
+fn a_load_that_hangs_on_the_other_side_in_the_held_out_record_explains_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let done = |arguments: &[&str]| {
+        let run = eixo_in(at, arguments);
+        assert!(matches!(run.status.code(), Some(0 | 1)), "{arguments:?}: {}", String::from_utf8_lossy(&run.stderr));
+    };
+    std::fs::write(at.join("axis.toml"), AXIS).unwrap();
+    done(&["export", "axis.fmu"]);
+    done(&["excite", "-o", "u.csv", "--samples", "2048"]);
+    for (name, load) in [("train.csv", "3e-3"), ("same.csv", "3e-3"), ("other.csv", "-3e-3")] {
+        let seed = name.len().to_string();
+        let load = format!("load_motor.torque={load}");
+        let record = ["simulate", "axis.fmu", "-i", "u.csv", "-o", name, "--outputs", "theta1,theta2", "--set", &load];
+        let noise = ["--noise", "theta1=1e-4", "--noise", "theta2=1e-4", "--seed", &seed];
+        done(&[&record[..], &noise[..]].concat());
+    }
+    let verdict = |holdout: &str| {
+        done(&["diagnose", "train.csv", "--axis", "axis.toml", "--holdout", holdout, "--json", "found.json"]);
+        let found: Value = serde_json::from_slice(&std::fs::read(at.join("found.json")).unwrap()).unwrap();
+        assert_eq!(found["ranking"][0]["id"], "load_motor");
+        found["verdict"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(verdict("same.csv"), "effect");
+    assert_eq!(verdict("other.csv"), "unexplained");
+}
