@@ -94,12 +94,16 @@ pub(super) fn percent(share: f64) -> String {
     format::percent(share, Medium::Page)
 }
 
+/// Error over noise below which a model explains a trace.
+const TO_THE_NOISE: f64 = 1.2;
+
 fn verdict(f: &Findings) -> Verdict {
     let d = f.diagnosis;
     let held = &d.gap.holdout.combined;
     let fall = format!(
-        "On held-out data ({}) the model's error falls from {} of the signal to {}; the noise alone is {}.",
+        "On held-out data ({}) the model's error {} from {} of the signal to {}; the noise alone is {}.",
         d.gap.holdout_is,
+        if held.after > held.before { "rises" } else { "falls" },
         percent(held.before),
         percent(held.after),
         percent(held.noise_floor)
@@ -150,8 +154,14 @@ fn verdict(f: &Findings) -> Verdict {
                 "none" | "" => "at no single place".to_owned(),
                 place => format!("at the {place}"),
             };
+            let fitted = &d.gap.train.combined;
             let nearest = d.ranking.first().filter(|r| r.id != "no_gap").map_or_else(String::new, |r| {
-                format!("The nearest, {}, closes {} of it. ", lower(&title(&r.id)), percent(r.closure_holdout))
+                let title = lower(&title(&r.id));
+                if fitted.after < TO_THE_NOISE * fitted.noise_floor {
+                    format!("The nearest, {title}, explains the fitted trace alone: has the machine changed between the two? ")
+                } else {
+                    format!("The nearest, {title}, closes {} of it. ", percent(r.closure_holdout))
+                }
             });
             (
                 Tone::Unsure,
