@@ -5,7 +5,7 @@
 
 use super::axis_model::State;
 use super::hold::Hold;
-use super::mechanics::{Length, Mechanics, motion, motions};
+use super::mechanics::{Length, Mechanics, Motions, motion, motions};
 use super::propagator::{Linear, Propagator};
 use crate::effects::{Coordinate, Effect, Forces, Memory, Moment, Motion, Ramp, Reaction, StepMotion};
 use crate::scalar::Scalar;
@@ -259,6 +259,7 @@ struct Coupled<'a, S> {
     hold: Hold<'a, S>,
     step: &'a Propagator<S>,
     from: &'a State<S>,
+    start: Motions<S>,
     tau0: [S; 2],
     tau1: [S; 2],
     /// The end without torques there.
@@ -275,6 +276,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
             hold: Hold::new(sticks, step, &leg.length.compliance, mechanics.structure),
             step,
             from,
+            start: motions(&from.linear),
             tau0,
             tau1,
             free: step.apply(&from.linear, tau0, tau1),
@@ -293,8 +295,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
     fn laws(&self, end: &Linear<S>, memory: &mut Memory<S>) -> Forces<S> {
         let (mechanics, from) = (self.mechanics, self.from);
         let end = motions(end);
-        let start = motions(&from.linear);
-        let step = StepMotion { start, end, time: self.time, h: self.step.h(), contact: from.contact };
+        let step = StepMotion { start: self.start, end, time: self.time, h: self.step.h(), contact: from.contact };
         *memory = from.memory;
         let mut forces = mechanics.effects.forces(&mechanics.on, &mechanics.base, &step, memory);
         for i in (0..2).filter(|i| from.dry[*i] != 0 && mechanics.dry[*i]) {

@@ -36,7 +36,7 @@ pub(super) struct Stretch<S> {
 impl<S: Scalar> Stretch<S> {
     /// The torque up to `t` seconds into it.
     pub fn until(&self, t: S) -> Ramp<S> {
-        Ramp { start: self.ramp.start, end: along(&self.ramp, t / self.h) }
+        Ramp { start: self.ramp.start, end: self.ramp.at(t / self.h) }
     }
 
     /// The same without derivatives.
@@ -161,11 +161,6 @@ impl Mechanics<f64> {
         let indicator = |t| self.indicator(event, from, &self.at(t, from, stretch));
         (indicator(t + dt) - indicator(t)) / dt
     }
-}
-
-/// The torque `fraction` into a step.
-pub(super) fn along<S: Scalar>(ramp: &Ramp<S>, fraction: S) -> S {
-    ramp.start + (ramp.end - ramp.start) * fraction
 }
 
 fn velocity<S: Scalar>(s: &State<S>, i: usize) -> S {

@@ -14,7 +14,7 @@
 
 use super::axis_model::{Axis, State};
 use super::balance::Leg;
-use super::events::{Event, LOCATE_TOLERANCE, Stretch, along};
+use super::events::{Event, LOCATE_TOLERANCE, Stretch};
 use crate::effects::Ramp;
 use crate::scalar::Scalar;
 
@@ -50,13 +50,11 @@ impl<S: Scalar> Axis<S> {
             } else {
                 let left = h - done;
                 length = self.plain.length(left.re());
-                (Ramp { start: along(&ramp, done / h), end: ramp.end }, &length, Some(left))
+                (Ramp { start: ramp.at(done / h), end: ramp.end }, &length, Some(left))
             };
             let begin = time + done.re();
             let leg = Leg { ramp: ramp.plain(), length, end: time + h.re() };
-            self.leave_rest(&mut now, &leg, begin);
-            let from = now.plain();
-            let solved = self.plain.solve(&from, &leg);
+            let (from, solved) = self.leave_rest(&mut now, &leg, begin);
             let reached = self.plain.first_event(&from, &solved).filter(|_| event < EVENTS);
             let Some(reached) = reached else {
                 return self.carry(&now, ramp, left, leg.end, &solved);
@@ -89,19 +87,17 @@ impl<S: Scalar> Axis<S> {
         self.full.carry(s, &Leg { ramp, length, end }, solved)
     }
 
-    /// Where dry friction sticks and cannot hold, lets it slip in the direction of the excess.
-    fn leave_rest(&self, now: &mut State<S>, leg: &Leg<f64>, time: f64) {
+    /// Where dry friction sticks and cannot hold, lets it slip in the direction of the excess; the state that the leg then
+    /// leaves and its end, without derivatives.
+    fn leave_rest(&self, now: &mut State<S>, leg: &Leg<f64>, time: f64) -> (State<f64>, State<f64>) {
         let plain = &self.plain;
         let mut s = now.plain();
+        let mut solved = plain.solve(&s, leg);
         for _ in 0..3 {
             let sticks = plain.sticks(&s);
-            if sticks == [false, false] {
-                break;
-            }
-            let trial = plain.solve(&s, leg);
             let mut worst = (0.0, 0, 0);
             for i in (0..2).filter(|i| sticks[*i]) {
-                let hold = trial.friction[i];
+                let hold = solved.friction[i];
                 let level = plain.level(i, hold.signum(), 0.0, time).0;
                 let excess = hold.abs() - level;
                 if excess > 1e-12 * level.abs() && excess > worst.0 {
@@ -113,11 +109,13 @@ impl<S: Scalar> Axis<S> {
             }
             s.dry[worst.1] = worst.2;
             plain.refresh_force(&mut s, time);
+            solved = plain.solve(&s, leg);
         }
         if s.dry != now.dry {
             now.dry = s.dry;
             self.full.refresh_force(now, time);
         }
+        (s, solved)
     }
 
     /// Time into what is left of the step, and the state, at which an event happens; `to` is the trial beyond it.

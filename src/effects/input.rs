@@ -35,7 +35,8 @@ impl<S: Scalar> Ramp<S> {
         Self { start: m0 * 4.0 - m1 * 6.0, end: m1 * 6.0 - m0 * 2.0 }
     }
 
-    fn at(&self, s: S) -> S {
+    /// The torque at the share `s` of the step.
+    pub(crate) fn at(&self, s: S) -> S {
         self.start + (self.end - self.start) * s
     }
 }

@@ -1,6 +1,7 @@
 //! Which effects are on, and with which parameters.
 
 use std::fmt;
+use std::ops::Range;
 
 use super::info::{Place, Role};
 use super::input::{Ramp, TorqueHistory};
@@ -32,6 +33,11 @@ const MEMORY_OFFSETS: [usize; COUNT + 1] = {
     }
     offsets
 };
+
+/// Where an effect's internal states lie.
+fn memory_of(effect: Effect) -> Range<usize> {
+    MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1]
+}
 
 /// Number of effect parameters in all.
 pub(crate) const PARAMETERS: usize = OFFSETS[COUNT];
@@ -215,7 +221,7 @@ impl<S: Scalar> Settings<S> {
     ) -> Forces<S> {
         let mut sum = Forces::default();
         for &effect in on.forces.as_slice() {
-            let own = &mut memory[MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1]];
+            let own = &mut memory[memory_of(effect)];
             let coordinate = effect.info().place.coordinate();
             sum.add(coordinate, &effect.torque(self.of(effect), base, &step.moment(coordinate), own));
         }
@@ -232,7 +238,7 @@ impl<S: Scalar> Settings<S> {
         committed: &Memory<S>,
         memory: &mut Memory<S>,
     ) -> Reaction<S> {
-        let own = MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1];
+        let own = memory_of(effect);
         memory[own.clone()].copy_from_slice(&committed[own.clone()]);
         effect.torque(self.of(effect), base, moment, &mut memory[own])
     }
