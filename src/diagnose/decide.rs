@@ -233,7 +233,6 @@ fn further(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Tested {
     let material = |t: &Tested| unexplained_part(t, values) > 0.0;
-    let little_left = |t: &Tested| t.fitted.chi2 - values < FURTHER_OF_ALL * gap;
     let closes_more = |next: &Tested, chosen: &Tested| {
         let gain = chosen.fitted.chi2 - next.fitted.chi2;
         let rest = chosen.fitted.chi2 - values;
@@ -248,38 +247,39 @@ fn further(
         pairs.first().map(|best| alike(&pairs, best, values).clone())
     };
     let left = |pair: &Option<Tested>| pair.as_ref().map_or(f64::INFINITY, |p| p.fitted.chi2);
-    let first_is_most = little_left(&first);
     let mut chosen = first;
+    if suffices(&chosen, gap, values) {
+        return chosen;
+    }
     // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
+    let first_is_most = chosen.fitted.chi2 - values < FURTHER_OF_ALL * gap;
     let beam = if first_is_most { 1 } else { BEAM };
-    if !suffices(&chosen, gap, values) {
-        let mut pair: Option<Tested> = search.two(parameters, progress).into_iter().min_by(closer);
-        for single in singles.iter().take(beam) {
-            if pair.as_ref().is_some_and(|p| !material(p)) {
-                break;
-            }
-            let partnered = best_partner(single, left(&pair));
-            pair = pair.into_iter().chain(partnered).min_by(closer);
+    let mut pair: Option<Tested> = search.two(parameters, progress).into_iter().min_by(closer);
+    for single in singles.iter().take(beam) {
+        if pair.as_ref().is_some_and(|p| !material(p)) {
+            break;
         }
-        if let Some(found) = pair.as_ref().filter(|p| material(p)) {
-            // With the partner in, was the first the right one? And with the first where it is then, the partner?
-            let found = found.clone();
-            for &(kept, variant) in found.effects.iter().rev() {
-                let turned = best_partner(&search.only(&found, kept, variant), left(&pair));
-                pair = pair.into_iter().chain(turned).min_by(closer);
-            }
+        let partnered = best_partner(single, left(&pair));
+        pair = pair.into_iter().chain(partnered).min_by(closer);
+    }
+    if let Some(found) = pair.as_ref().filter(|p| material(p)) {
+        // With the partner in, was the first the right one? And with the first where it is then, the partner?
+        let found = found.clone();
+        for &(kept, variant) in found.effects.iter().rev() {
+            let turned = best_partner(&search.only(&found, kept, variant), left(&pair));
+            pair = pair.into_iter().chain(turned).min_by(closer);
         }
-        let Some(pair) = pair.map(|p| search.among_kin(p)) else { return chosen };
-        let third = if suffices(&pair, gap, values) || chosen.fitted.chi2 < WORTH_A_THIRD * pair.fitted.chi2 {
-            None
-        } else {
-            best_partner(&pair, f64::INFINITY).map(|t| if material(&t) { search.among_kin(t) } else { t })
-        };
-        // Beside a cause that is all but everything two more may count together where neither does alone.
-        for next in [Some(pair), third].into_iter().flatten() {
-            if closes_more(&next, &chosen) {
-                chosen = next;
-            }
+    }
+    let Some(pair) = pair.map(|p| search.among_kin(p)) else { return chosen };
+    let third = if suffices(&pair, gap, values) || chosen.fitted.chi2 < WORTH_A_THIRD * pair.fitted.chi2 {
+        None
+    } else {
+        best_partner(&pair, f64::INFINITY).map(|t| if material(&t) { search.among_kin(t) } else { t })
+    };
+    // Beside a cause that is all but everything two more may count together where neither does alone.
+    for next in [Some(pair), third].into_iter().flatten() {
+        if closes_more(&next, &chosen) {
+            chosen = next;
         }
     }
     chosen
