@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::chart::{Axis, Chart, Colour, Dash, Series};
-use super::diagnose::{Findings, percent, title};
+use super::diagnose::{Findings, improved, percent, title};
 use super::{Block, Cell, Figure, Table};
 use crate::diagnose::{LoopErrors, Verdict as Answer};
 use crate::trace::Signal;
@@ -19,9 +19,10 @@ pub(super) fn short(f: &Findings) -> Vec<Block> {
         |name: &str, e: &LoopErrors| vec![Cell::text(name), Cell::Percent(e.command), Cell::Percent(e.position)];
     table.row(cells("as given", &l.before));
     table.row(cells("parameters re-identified", &l.reidentified));
+    let after = cells(improved(f.diagnosis), &l.after);
     match f.diagnosis.verdict {
-        Answer::Effect => table.strong_row(cells("with the effect", &l.after)),
-        Answer::Unexplained => table.row(cells("with the nearest effect", &l.after)),
+        Answer::Effect => table.strong_row(after),
+        Answer::Unexplained => table.row(after),
         Answer::Parameters | Answer::NoGap => {}
     }
     let others = l.ranking.iter().find(|r| r.closure < l.closure && !r.id.is_empty() && r.errors != l.after);
@@ -46,11 +47,7 @@ pub(super) fn blocks(f: &Findings) -> Vec<Block> {
     let mut blocks = short(f);
     let Some(l) = &f.diagnosis.closed_loop else { return blocks };
     let unit = Signal::Command.unit(f.motion);
-    let after = match f.diagnosis.verdict {
-        Answer::Effect => "with the effect",
-        Answer::Unexplained => "with the nearest effect",
-        Answer::Parameters | Answer::NoGap => "re-identified",
-    };
+    let after = improved(f.diagnosis);
     let time: Arc<[f64]> = l.commands.time.as_slice().into();
     let line = |name: &str, values: &[f64]| Series::line(name, time.clone(), values);
     let measured = line("measured", &l.commands.measured).in_colour(Colour::Ink).with_dash(Dash::Broad);

@@ -155,9 +155,10 @@ fn verdict(f: &Findings) -> Verdict {
                 place => format!("at the {place}"),
             };
             let fitted = &d.gap.train.combined;
+            let only_there = !d.causes.is_empty() && fitted.after < TO_THE_NOISE * fitted.noise_floor;
             let nearest = d.ranking.first().filter(|r| r.id != "no_gap").map_or_else(String::new, |r| {
                 let title = lower(&title(&r.id));
-                if fitted.after < TO_THE_NOISE * fitted.noise_floor {
+                if only_there {
                     format!("The nearest, {title}, explains the fitted trace alone: has the machine changed between the two? ")
                 } else {
                     format!("The nearest, {title}, closes {} of it. ", percent(r.closure_holdout))
@@ -318,7 +319,7 @@ fn levels(f: &Findings) -> Table {
 }
 
 /// What the model at its best is called.
-fn improved(d: &Diagnosis) -> &'static str {
+pub(super) fn improved(d: &Diagnosis) -> &'static str {
     match (d.verdict, d.causes.len()) {
         (Answer::Effect, 2..) => "with the effects",
         (Answer::Effect, _) => "with the effect",
