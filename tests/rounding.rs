@@ -8,7 +8,7 @@ use serde_json::Value;
 #[path = "program/run.rs"]
 mod run;
 
-use run::eixo_in;
+use run::answered_in;
 
 const AXIS: &str = "[parameters]\nI1 = 2.37e-4\nI2 = 6.07e-6\nB = 5.4e-4\nK = 1.76e-2\n";
 const ROUNDING: &str = "[effects.encoder_quantisation]\nstep = 2e-3\n";
@@ -17,11 +17,7 @@ const ROUNDING: &str = "[effects.encoder_quantisation]\nstep = 2e-3\n";
 fn rounding_is_named_where_it_may_be_and_is_no_gap_where_the_model_knows_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let done = |arguments: &[&str]| {
-        let run = eixo_in(at, arguments);
-        assert!(matches!(run.status.code(), Some(0 | 1)), "{arguments:?}: {}", String::from_utf8_lossy(&run.stderr));
-        String::from_utf8_lossy(&run.stdout).into_owned()
-    };
+    let done = |arguments: &[&str]| answered_in(at, arguments);
     std::fs::write(at.join("axis.toml"), AXIS).unwrap();
     std::fs::write(at.join("rounding.toml"), format!("{AXIS}{ROUNDING}")).unwrap();
     done(&["export", "axis.fmu"]);

@@ -16,6 +16,14 @@ pub fn eixo_in(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_eixo")).current_dir(folder).args(arguments).output().expect("eixo runs")
 }
 
+/// Runs the program in a folder, which must answer, findings or none, and gives what it said.
+#[track_caller]
+pub fn answered_in(folder: &Path, arguments: &[impl AsRef<OsStr> + std::fmt::Debug]) -> String {
+    let done = eixo_in(folder, arguments);
+    assert!(matches!(done.status.code(), Some(0 | 1)), "{arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
+    String::from_utf8_lossy(&done.stdout).into_owned()
+}
+
 /// Runs the program, which must end well, and gives what it said.
 #[track_caller]
 pub fn fine(arguments: &[&str]) -> String {
