@@ -14,14 +14,11 @@ import numpy as np
 from scipy.signal import butter, filtfilt
 
 import generate
+from generate import log_uniform
 
 KINDS = {"prbs": 0.2, "chirp": 0.2, "steps": 0.2, "noise": 0.25, "multi": 0.15}
 PERIODS = 7  # of the axis' `samples`, more than any record has
-LINES = np.arange(1, 9)  # only their spacing is used of an excitation that has none
-
-
-def log_uniform(rng, low, high):
-    return math.exp(rng.uniform(math.log(low), math.log(high)))
+LINES = np.arange(1, 9)  # the seal counts them; these excitations have none
 
 
 def draw_axis(kind: str, rng) -> generate.Axis:
@@ -73,7 +70,7 @@ def moves(rng, t, step, length, top):
         torque = rng.uniform(0.4, 1)
         u[at : at + half], u[at + half : at + 2 * half] = torque, -torque
         at += 2 * half + int(rng.uniform(0, 0.01) * t.size)
-        rng.random()
+        rng.random()  # decides nothing; without it the set in RESULT.md would be another
         u[at - 2 * half : at] *= rng.choice([-1, 1])
     width = max(1, int(1 / (2 * top) / step))
     return np.convolve(u, np.ones(width) / width, "same")
