@@ -7,7 +7,9 @@ use super::axis_model::State;
 use super::hold::Hold;
 use super::mechanics::{Length, Mechanics, Motions, motion, motions};
 use super::propagator::{Linear, Propagator};
-use crate::effects::{Coordinate, Effect, Forces, Memory, Moment, Motion, Ramp, Reaction, StepMotion};
+use crate::effects::{
+    Coordinate, Effect, Forces, Internal, Internals, Memory, Moment, Motion, Ramp, Reaction, StepMotion, memory_of,
+};
 use crate::scalar::Scalar;
 
 /// Most Newton iterations of a step.
@@ -29,10 +31,11 @@ impl Mechanics<f64> {
     pub fn solve(&self, s: &State<f64>, leg: &Leg<f64>) -> State<f64> {
         let mut memory = s.memory;
         let equation = Equation::of(self, s, leg);
-        let mut seek = Newton { input: leg.ramp.end, remembers: self.remembers, memory: &mut memory };
         let [drives, force] = match &equation {
-            Equation::Lone(lone) => seek.from([lone.at_start()], lone).map(|[torque]| lone.force(torque)),
-            Equation::Coupled(coupled) => seek.from(s.force, coupled),
+            Equation::Lone(lone) => {
+                newton(lone, [lone.at_start()], leg.ramp.end, &mut memory).map(|[torque]| lone.force(torque))
+            }
+            Equation::Coupled(coupled) => newton(coupled, s.force, leg.ramp.end, &mut memory),
             Equation::Known(_) => [s.force; 2],
         };
         let (linear, friction) = equation.end(drives);
@@ -48,10 +51,10 @@ impl<S: Scalar> Mechanics<S> {
         let solved = solved.force.map(S::from);
         let force = match &equation {
             Equation::Lone(lone) => {
-                let [torque] = derive(lone, [lone.along(solved)], self.remembers, &mut memory);
+                let [torque] = derive(lone, [lone.along(solved)], &mut memory);
                 lone.force(torque)
             }
-            Equation::Coupled(coupled) => derive(coupled, solved, self.remembers, &mut memory),
+            Equation::Coupled(coupled) => derive(coupled, solved, &mut memory),
             Equation::Known(_) => s.force,
         };
         let (linear, friction) = equation.end(force);
@@ -59,61 +62,59 @@ impl<S: Scalar> Mechanics<S> {
     }
 }
 
-/// Newton's method for the torques at the end of a leg.
-struct Newton<'a> {
-    /// Torque on the motor there: a size to measure by.
+/// Newton's method from `torque`, with `input` on the motor to measure by: the torques that led to the end, and those that
+/// the laws give there; `memory` goes along.
+fn newton<const N: usize>(
+    balance: &impl Balance<f64, N>,
+    mut torque: [f64; N],
     input: f64,
-    remembers: bool,
-    /// Left as it is at the end.
-    memory: &'a mut Memory<f64>,
-}
-
-impl Newton<'_> {
-    /// From `torque`: the torques that led to the end, and those that the laws give there.
-    fn from<const N: usize>(&mut self, mut torque: [f64; N], balance: &impl Balance<f64, N>) -> [[f64; N]; 2] {
-        let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let mut previous = f64::INFINITY;
-        let mut there = false;
-        for iteration in 1.. {
-            let pass = balance.pass(torque, self.memory);
-            let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
-            let scale = largest(&pass.found) + self.input.abs();
-            if there || size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
-                return [torque, pass.found];
-            }
-            // A residual that grows means a kink was crossed: half the step.
-            let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
-            previous = size;
-            torque = std::array::from_fn(|i| torque[i] - pass.correction[i] * damp);
-            // Newton squares the share that is missing; an internal state is to be taken along.
-            there = size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && damp == 1.0);
-            if there && !self.remembers {
-                break;
-            }
+    memory: &mut Memory<f64>,
+) -> [[f64; N]; 2] {
+    let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let mut internals = memory.map(Internal::at);
+    let mut previous = f64::INFINITY;
+    for iteration in 1.. {
+        let pass = balance.pass(torque, &mut internals);
+        let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
+        let scale = largest(&pass.found) + input.abs();
+        if size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
+            balance.remember(&internals, torque, [0.0; N], memory);
+            return [torque, pass.found];
         }
-        [torque, torque]
+        // A residual that grows means a kink was crossed: half the step.
+        let damp = if size > previous * 2.0 { 0.5 } else { 1.0 };
+        previous = size;
+        let less = pass.correction.map(|c| c * damp);
+        // Newton squares the share that is missing.
+        if size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && damp == 1.0) {
+            balance.remember(&internals, torque, less, memory);
+            torque = std::array::from_fn(|i| torque[i] - less[i]);
+            break;
+        }
+        torque = std::array::from_fn(|i| torque[i] - less[i]);
     }
+    [torque, torque]
 }
 
-/// The derivatives of torques whose values balance.
+/// The derivatives of torques whose values balance; `memory` goes along.
 fn derive<S: Scalar, const N: usize>(
     balance: &impl Balance<S, N>,
     torque: [S; N],
-    remembers: bool,
     memory: &mut Memory<S>,
 ) -> [S; N] {
-    let pass = balance.pass(torque, memory);
-    let torque = std::array::from_fn(|i| torque[i] - pass.correction[i]);
-    if remembers {
-        balance.pass(torque, memory);
-    }
-    torque
+    let mut internals = memory.map(Internal::at);
+    let pass = balance.pass(torque, &mut internals);
+    balance.remember(&internals, torque, pass.correction, memory);
+    std::array::from_fn(|i| torque[i] - pass.correction[i])
 }
 
 /// An equation of `N` torques at the end of a leg.
 trait Balance<S, const N: usize> {
-    /// What the laws give for the motion under `torque`; `memory` is left as it is there.
-    fn pass(&self, torque: [S; N], memory: &mut Memory<S>) -> Pass<S, N>;
+    /// What the laws give for the motion under `torque`; the internal states reach their end there.
+    fn pass(&self, torque: [S; N], memory: &mut Internals<S>) -> Pass<S, N>;
+
+    /// The internal states for `less` than the torque of the last pass, by their tangents there.
+    fn remember(&self, internals: &Internals<S>, torque: [S; N], less: [S; N], memory: &mut Memory<S>);
 }
 
 struct Pass<S, const N: usize> {
@@ -232,7 +233,7 @@ impl<'a, S: Scalar> Lone<'a, S> {
 
 impl<S: Scalar> Balance<S, 1> for Lone<'_, S> {
     #[inline]
-    fn pass(&self, [torque]: [S; 1], memory: &mut Memory<S>) -> Pass<S, 1> {
+    fn pass(&self, [torque]: [S; 1], memory: &mut Internals<S>) -> Pass<S, 1> {
         let (free, per) = (&self.end, &self.per_torque);
         let end = Motion { x: free.x - per.x * torque, v: free.v - per.v * torque };
         let effects = &self.mechanics.effects;
@@ -243,13 +244,20 @@ impl<S: Scalar> Balance<S, 1> for Lone<'_, S> {
         } else {
             let contact = self.from.contact;
             let moment = Moment { start: self.start, end, time: self.time, h: self.h, contact };
-            effects.reaction(self.effect, &self.mechanics.base, &moment, &self.from.memory, memory)
+            effects.reaction(self.effect, &self.mechanics.base, &moment, memory)
         };
         let answers = found.stiffness * per.x.re() + found.damping * per.v.re();
         let correction = (torque - found.torque) / (1.0 + answers);
         let moved = per.x.re() * correction.re();
         let left = if found.bend == 0.0 { 0.0 } else { 0.5 * found.bend * moved * moved };
         Pass { found: [found.torque], correction: [correction], left }
+    }
+
+    #[inline]
+    fn remember(&self, internals: &Internals<S>, _torque: [S; 1], [less]: [S; 1], memory: &mut Memory<S>) {
+        let per = &self.per_torque;
+        let moved = Motion { x: per.x * less, v: per.v * less };
+        memory_of(self.effect).for_each(|i| memory[i] = internals[i].after(&moved));
     }
 }
 
@@ -292,11 +300,10 @@ impl<'a, S: Scalar> Coupled<'a, S> {
     }
 
     /// Torques of the effects for that end, and their tangent.
-    fn laws(&self, end: &Linear<S>, memory: &mut Memory<S>) -> Forces<S> {
+    fn laws(&self, end: &Linear<S>, memory: &mut Internals<S>) -> Forces<S> {
         let (mechanics, from) = (self.mechanics, self.from);
         let end = motions(end);
         let step = StepMotion { start: self.start, end, time: self.time, h: self.step.h(), contact: from.contact };
-        *memory = from.memory;
         let mut forces = mechanics.effects.forces(&mechanics.on, &mechanics.base, &step, memory);
         for i in (0..2).filter(|i| from.dry[*i] != 0 && mechanics.dry[*i]) {
             let direction = f64::from(from.dry[i]);
@@ -311,11 +318,25 @@ impl<'a, S: Scalar> Coupled<'a, S> {
 }
 
 impl<S: Scalar> Balance<S, 2> for Coupled<'_, S> {
-    fn pass(&self, torque: [S; 2], memory: &mut Memory<S>) -> Pass<S, 2> {
+    fn pass(&self, torque: [S; 2], memory: &mut Internals<S>) -> Pass<S, 2> {
         let Forces { torque: found, stiffness, damping, bend } = self.laws(&self.end(torque).0, memory);
         let off = [torque[0] - found[0], torque[1] - found[1]];
         let correction = solve2(&self.hold.jacobian(&[stiffness, damping]), off);
         Pass { found, correction, left: if bend == 0.0 { 0.0 } else { f64::INFINITY } }
+    }
+
+    fn remember(&self, internals: &Internals<S>, torque: [S; 2], less: [S; 2], memory: &mut Memory<S>) {
+        let remembering = || self.mechanics.on.forces().iter().filter(|e| e.info().memory > 0);
+        if remembering().next().is_none() {
+            return;
+        }
+        let there = motions(&self.end(torque).0);
+        let end = motions(&self.end([torque[0] - less[0], torque[1] - less[1]]).0);
+        for effect in remembering() {
+            let i = effect.info().place.coordinate() as usize;
+            let moved = Motion { x: end[i].x - there[i].x, v: end[i].v - there[i].v };
+            memory_of(*effect).for_each(|i| memory[i] = internals[i].after(&moved));
+        }
     }
 }
 

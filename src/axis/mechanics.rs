@@ -4,7 +4,7 @@ use super::axis_model::State;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
 use super::propagator::{Compliance, Linear, Propagator};
-use crate::effects::{ActiveEffects, Base, Coordinate, Effect, Motion, Place, Settings, StepMotion};
+use crate::effects::{ActiveEffects, Base, Coordinate, Effect, Internal, Motion, Place, Settings, StepMotion};
 use crate::scalar::Scalar;
 
 /// Motion of motor, table and twist.
@@ -27,8 +27,6 @@ pub(super) struct Mechanics<S> {
     pub dry: [bool; 2],
     /// Whether the coupling has play.
     pub backlash: bool,
-    /// Whether an effect that is on has internal states.
-    pub remembers: bool,
     /// The step that nothing ends early.
     pub whole: Length<S>,
 }
@@ -56,7 +54,6 @@ impl<S: Scalar> Mechanics<S> {
             // A rigid axis has no coupling for an effect to act on.
             Structure::Rigid => Base { k: S::default(), b: S::default() },
         };
-        let remembers = on.forces().iter().any(|e| e.info().memory > 0);
         let dry = PLACES.map(|place| on.dry().iter().any(|e| e.info().place == place));
         let backlash = on.forces().contains(&Effect::Backlash) && effects.of(Effect::Backlash)[0].re() > 0.0;
         let lone = match (on.forces(), on.dry()) {
@@ -65,7 +62,7 @@ impl<S: Scalar> Mechanics<S> {
         };
         let step = Propagator::new(&parameters, structure, scheme, h.into());
         let whole = Length::new(step, lone);
-        Self { parameters, structure, scheme, effects, on, base, lone, dry, backlash, remembers, whole }
+        Self { parameters, structure, scheme, effects, on, base, lone, dry, backlash, whole }
     }
 
     /// A step of that length.
@@ -125,7 +122,7 @@ impl<S: Scalar> Mechanics<S> {
     pub fn refresh_force(&self, s: &mut State<S>, time: f64) {
         let motions = motions(&s.linear);
         let step = StepMotion { start: motions, end: motions, time, h: S::default(), contact: s.contact };
-        let mut memory = s.memory;
+        let mut memory = s.memory.map(Internal::at);
         let forces = self.effects.forces(&self.on, &self.base, &step, &mut memory);
         s.force = forces.torque;
         for (i, motion) in motions.iter().take(2).enumerate() {

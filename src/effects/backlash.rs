@@ -6,7 +6,7 @@
 //! Nordin, Gutman, Automatica 38(10), 2002 (the physical model of backlash).
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Backlash of the coupling.
@@ -29,7 +29,7 @@ impl Force for Backlash {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         if p[0].re() <= 0.0 {
             // The derivative at a closed gap: the dead zone grows on the side that is in contact.
             let side = if m.end.x.re() < 0.0 { -1.0 } else { 1.0 };

@@ -32,6 +32,7 @@ const EQUATION: &str =
     "f = sgn(v)*level*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2)); |f| <= level*... at v = 0";
 const REFERENCE: &str = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994";
 
+#[inline]
 fn level<S: Scalar>(p: &[S], direction: f64, speed: S) -> (S, f64) {
     let level = p[0] * (p[3] * direction + 1.0);
     if p[1].re() == 0.0 && level.re() == 0.0 {

@@ -5,7 +5,7 @@
 //! with Hysteresis, Wiley 2007, chapter 2.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Hysteresis of the coupling.
@@ -55,13 +55,12 @@ impl Force for CouplingHysteresis {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, z: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, z: &mut [Internal<S>]) -> Reaction<S> {
         let per_reach = S::from(1.0) / p[1];
         let dx = if m.h.re() == 0.0 { S::default() } else { (m.end.x - m.start.x) * per_reach };
-        let after = advance(z[0], dx, p[2]);
-        z[0] = after;
-        let tangent = slope(after, if dx.re() < 0.0 { -1.0 } else { 1.0 }, p[2]).re();
-        let stiffness = p[0].re() * per_reach.re() * tangent;
-        Reaction { torque: p[0] * after, stiffness, damping: 0.0, bend: f64::INFINITY }
+        let after = advance(z[0].start, dx, p[2]);
+        let tangent = slope(after, if dx.re() < 0.0 { -1.0 } else { 1.0 }, p[2]).re() * per_reach.re();
+        z[0].reach(after, tangent, 0.0);
+        Reaction { torque: p[0] * after, stiffness: p[0].re() * tangent, damping: 0.0, bend: f64::INFINITY }
     }
 }

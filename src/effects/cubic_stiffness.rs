@@ -1,7 +1,7 @@
 //! Cubic stiffness: the spring is `K*(d + k3*d^3)`, hardening (`k3 > 0`) or softening.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Cubic stiffness of the coupling.
@@ -22,7 +22,7 @@ impl Force for CubicStiffness {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let k3 = base.k * p[0];
         let square = m.end.x.squared();
         let stiffness = 3.0 * k3.re() * square.re();

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// A periodic torque from outside.
@@ -29,7 +29,7 @@ impl Force for Disturbance {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let angle = p[1] * (TAU * m.time) + p[2];
         Reaction::given(-(p[0] * angle.sin()))
     }

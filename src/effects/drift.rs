@@ -4,7 +4,7 @@
 //! `fade` it has changed by `rate*s`, `s = (1 - exp(-fade*t))/fade`; `fade = 0` is the straight line `s = t`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
-use super::shapes::{Base, DryFriction, Force, Moment, Reaction, mean_decay};
+use super::shapes::{Base, DryFriction, Force, Internal, Moment, Reaction, mean_decay};
 use crate::scalar::Scalar;
 
 /// How fast a drift comes to rest.
@@ -37,7 +37,7 @@ impl Force for StiffnessDrift {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let k = base.k * p[0] * drifted(p[1], m.time);
         Reaction { torque: k * m.end.x, stiffness: k.re(), damping: 0.0, bend: 0.0 }
     }

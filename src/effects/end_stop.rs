@@ -4,7 +4,7 @@
 //! 1975 (exponent 1), which starts from zero at the touch whatever the speed.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Travel limit of the table.
@@ -47,7 +47,7 @@ impl Force for EndStop {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let free = Reaction { bend: f64::INFINITY, ..Reaction::given(S::default()) };
         let x = m.end.x;
         let (depth, inward) = if x.re() > p[1].re() {

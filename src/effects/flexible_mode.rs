@@ -4,7 +4,7 @@
 //! out of the step: trapezoidal rule for it alone, driven by the trial motion of the table.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// A flexible mode behind the table.
@@ -39,20 +39,20 @@ impl Force for FlexibleMode {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
         let (inertia, k, b) = (p[0], p[1], p[2]);
         if inertia.re() <= 0.0 && m.h.re() == 0.0 {
             return Reaction::given(S::default());
         }
         // Absolute motion of the third inertia, from the relative memory.
-        let (e, rate) = (memory[0], memory[1]);
+        let (e, rate) = (memory[0].start, memory[1].start);
         if m.h.re() == 0.0 {
             return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re(), bend: 0.0 };
         }
         let half = m.h * 0.5;
         let w3 = m.start.v - rate;
         // Trapezoid: w3+ = w3 + h/2*(a3 + a3+), e+ = e + (x2+ - x2) - h/2*(w3 + w3+), I3*a3 = b*(w2 - w3) + k*(th2 - th3).
-        let a3 = memory[2];
+        let a3 = memory[2].start;
         let free = w3 + half * a3;
         let dx = m.end.x - m.start.x;
         // I3*a3+ = b*(v2+ - w3+) + k*(e + dx - half*(w3 + w3+)), w3+ = free + half*a3+.
@@ -61,10 +61,12 @@ impl Force for FlexibleMode {
         let a = rhs / effective;
         let w = free + half * a;
         let torque = inertia * a;
-        memory[0] = e + dx - half * (w3 + w);
-        memory[1] = m.end.v - w;
-        memory[2] = a;
-        let ratio = inertia.re() / effective.re();
-        Reaction { torque, stiffness: ratio * k.re(), damping: ratio * b.re(), bend: 0.0 }
+        let [per_x, per_v] = [k, b].map(|c| c.re() / effective.re());
+        let h2 = half.re();
+        memory[0].reach(e + dx - half * (w3 + w), 1.0 - h2 * h2 * per_x, -h2 * h2 * per_v);
+        memory[1].reach(m.end.v - w, -h2 * per_x, 1.0 - h2 * per_v);
+        memory[2].reach(a, per_x, per_v);
+        let inertia = inertia.re();
+        Reaction { torque, stiffness: inertia * per_x, damping: inertia * per_v, bend: 0.0 }
     }
 }

@@ -1,7 +1,7 @@
 //! A constant torque: gravity on a tilted axis, the offset of an amplifier. `f = torque`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] =
@@ -28,7 +28,7 @@ impl Force for LoadMotor {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         Reaction::given(p[0])
     }
 }
@@ -51,7 +51,7 @@ impl Force for LoadTable {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         Reaction::given(p[0])
     }
 }

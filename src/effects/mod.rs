@@ -29,9 +29,9 @@ pub use info::{EffectInfo, Family, ParameterInfo, Place, Role, Scale, Start, Var
 pub use input::{Ramp, TorqueHistory};
 pub use sensor::{Reading, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
-pub(crate) use settings::{Forces, MEMORY, PARAMETERS, StepMotion, effect_scope};
+pub(crate) use settings::{Forces, Internals, MEMORY, PARAMETERS, StepMotion, effect_scope, memory_of};
 pub(crate) use shapes::Coordinate;
-pub use shapes::{Base, DryFriction, Force, Input, Moment, Motion, Reaction, Sensor};
+pub use shapes::{Base, DryFriction, Force, Input, Internal, Moment, Motion, Reaction, Sensor};
 
 use crate::scalar::Scalar;
 
@@ -107,7 +107,13 @@ macro_rules! effects {
             }
 
             #[inline]
-            fn torque<S: Scalar>(self, p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
+            fn torque<S: Scalar>(
+                self,
+                p: &[S],
+                base: &Base<S>,
+                moment: &Moment<S>,
+                memory: &mut [Internal<S>],
+            ) -> Reaction<S> {
                 match self {
                     $(Self::$name => when!(
                         force, $shape, <$law>::torque(p, base, moment, memory), Reaction::given(S::default())

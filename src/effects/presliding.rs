@@ -5,7 +5,7 @@
 //! mean velocity exactly: `z+ = s + (z - s)*exp(-|dx|/reach)` with `dx = h*(v + v+)/2`, `s = sgn(dx)`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
@@ -18,16 +18,17 @@ const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0, 1] }, Variant { na
 const EQUATION: &str = "reach*z' = v - |v|*z; f = level*z + damping*reach*z'";
 const REFERENCE: &str = "Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40(3), 1995";
 
-fn torque<S: Scalar>(p: &[S], m: &Moment<S>, z: &mut [S]) -> Reaction<S> {
+#[inline]
+fn torque<S: Scalar>(p: &[S], m: &Moment<S>, z: &mut Internal<S>) -> Reaction<S> {
     let per_speed = m.h * 0.5 / p[1];
     let dx = per_speed * (m.start.v + m.end.v);
     let towards = if dx.re() < 0.0 { -1.0 } else { 1.0 };
-    let after = (z[0] - towards) * (-dx.abs()).exp() + towards;
-    z[0] = after;
-    let v = m.end.v;
-    let rate = v - v.abs() * after;
+    let after = (z.start - towards) * (-dx.abs()).exp() + towards;
     // The bristle's own equation: dz/dx = 1 - sgn(dx)*z.
     let per_v = (1.0 - towards * after.re()) * per_speed.re();
+    z.reach(after, 0.0, per_v);
+    let v = m.end.v;
+    let rate = v - v.abs() * after;
     let rate_per_v = 1.0 - v.re().signum() * after.re() - v.re().abs() * per_v;
     let damping = p[0].re() * per_v + p[2].re() * rate_per_v;
     Reaction { torque: p[0] * after + p[2] * rate, stiffness: 0.0, damping, bend: f64::INFINITY }
@@ -51,8 +52,8 @@ impl Force for PreslidingMotor {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
-        torque(p, m, memory)
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
+        torque(p, m, &mut memory[0])
     }
 }
 
@@ -74,7 +75,7 @@ impl Force for PreslidingTable {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [S]) -> Reaction<S> {
-        torque(p, m, memory)
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
+        torque(p, m, &mut memory[0])
     }
 }

@@ -1,7 +1,7 @@
 //! Quadratic drag: `f = coefficient*w2*|w2|`, the churning of oil or air.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Quadratic drag on the table.
@@ -24,7 +24,7 @@ impl Force for QuadraticDrag {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let speed = m.end.v.abs();
         let damping = 2.0 * p[0].re() * speed.re();
         Reaction { torque: p[0] * m.end.v * speed, stiffness: 0.0, damping, bend: f64::INFINITY }

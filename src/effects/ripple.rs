@@ -3,7 +3,7 @@
 //! `f = -amplitude*sin(order*theta + phase)`: the sign makes the amplitude a torque that drives.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 fn torque<S: Scalar>(amplitude: S, order: S, phase: S, x: S) -> Reaction<S> {
@@ -43,7 +43,7 @@ impl Force for TorqueRipple {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         torque(p[0], p[1], p[2], m.end.x)
     }
 }
@@ -70,7 +70,7 @@ impl Force for Unbalance {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         torque(p[0], S::from(1.0), p[1], m.end.x)
     }
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::info::{Place, Role};
 use super::input::{Ramp, TorqueHistory};
 use super::sensor::{Reading, SensorHistory};
-use super::shapes::{Base, Coordinate, Moment, Motion, Reaction};
+use super::shapes::{Base, Coordinate, Internal, Moment, Motion, Reaction};
 use super::{EFFECTS, Effect};
 use crate::scalar::Scalar;
 
@@ -35,7 +35,8 @@ const MEMORY_OFFSETS: [usize; COUNT + 1] = {
 };
 
 /// Where an effect's internal states lie.
-fn memory_of(effect: Effect) -> Range<usize> {
+#[inline]
+pub(crate) fn memory_of(effect: Effect) -> Range<usize> {
     MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1]
 }
 
@@ -45,6 +46,8 @@ pub(crate) const MEMORY: usize = MEMORY_OFFSETS[COUNT];
 
 /// Internal states of all effects.
 pub type Memory<S> = [S; MEMORY];
+/// The same over a step.
+pub(crate) type Internals<S> = [Internal<S>; MEMORY];
 
 /// A name that is no effect, or no parameter of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -210,37 +213,33 @@ impl<S: Scalar> Settings<S> {
         effect.level(self.of(effect), direction, speed, at)
     }
 
-    /// Sums the force effects: torque on motor and table and the tangent, with the trial memory left in `memory`.
+    /// Sums the force effects: torque on motor and table and the tangent; the internal states reach their end on trial.
     #[inline]
     pub(crate) fn forces(
         &self,
         on: &ActiveEffects,
         base: &Base<S>,
         step: &StepMotion<S>,
-        memory: &mut Memory<S>,
+        memory: &mut Internals<S>,
     ) -> Forces<S> {
         let mut sum = Forces::default();
         for &effect in on.forces.as_slice() {
-            let own = &mut memory[memory_of(effect)];
             let coordinate = effect.info().place.coordinate();
-            sum.add(coordinate, &effect.torque(self.of(effect), base, &step.moment(coordinate), own));
+            sum.add(coordinate, &self.reaction(effect, base, &step.moment(coordinate), memory));
         }
         sum
     }
 
-    /// The torque of one force effect; its own part of `memory` goes from `committed` to the trial.
+    /// The torque of one force effect; its internal states reach their end on trial.
     #[inline]
     pub(crate) fn reaction(
         &self,
         effect: Effect,
         base: &Base<S>,
         moment: &Moment<S>,
-        committed: &Memory<S>,
-        memory: &mut Memory<S>,
+        memory: &mut Internals<S>,
     ) -> Reaction<S> {
-        let own = memory_of(effect);
-        memory[own.clone()].copy_from_slice(&committed[own.clone()]);
-        effect.torque(self.of(effect), base, moment, &mut memory[own])
+        effect.torque(self.of(effect), base, moment, &mut memory[memory_of(effect)])
     }
 
     /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
@@ -422,12 +421,11 @@ mod tests {
         let mut straight = 0;
         for &effect in EFFECTS.iter().filter(|e| e.is_force()) {
             let settings = shown(effect);
-            let committed = [0.1; MEMORY];
             for (x, v, contact) in [(0.3, 1.7, 0), (-0.2, -0.6, 1), (2.0, 0.4, -1)] {
                 let reaction = |dx: f64, dv: f64| {
                     let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
                     let moment = Moment { start, end, time: 0.7, h: 1e-3, contact };
-                    settings.reaction(effect, &base, &moment, &committed, &mut [0.0; MEMORY])
+                    settings.reaction(effect, &base, &moment, &mut [Internal::at(0.1); MEMORY])
                 };
                 let at = reaction(0.0, 0.0);
                 for (dx, dv) in [(1e-2, 0.2), (-3e-3, 0.1), (0.5, -0.3)] {

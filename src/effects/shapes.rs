@@ -94,6 +94,35 @@ impl<S: Scalar> Reaction<S> {
     }
 }
 
+/// An internal state of an effect over a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Internal<S> {
+    /// At the start, committed.
+    pub start: S,
+    /// At the end, on trial.
+    pub end: S,
+    /// Derivative of the end to the position and to the velocity at the end of the step.
+    pub per: Motion<f64>,
+}
+
+impl<S: Scalar> Internal<S> {
+    /// A state that stays as it is.
+    pub fn at(start: S) -> Self {
+        Self { start, end: start, per: Motion::default() }
+    }
+
+    /// The end on trial, and its derivative to position and velocity there.
+    pub fn reach(&mut self, end: S, x: f64, v: f64) {
+        self.end = end;
+        self.per = Motion { x, v };
+    }
+
+    /// The end after the end of the motion `moved`.
+    pub(crate) fn after(&self, moved: &Motion<S>) -> S {
+        self.end + moved.x * self.per.x + moved.v * self.per.v
+    }
+}
+
 /// A set-valued friction: `torque = level*sgn(v)`, anything between while at rest.
 pub trait DryFriction {
     /// What the effect is.
@@ -105,14 +134,14 @@ pub trait DryFriction {
 
 /// A torque from the motion.
 ///
-/// `memory` comes in as committed and is left as the trial value: the caller keeps the committed copy, so that Newton
-/// may retry a step (trial / commit / revert, as OpenSees' `UniaxialMaterial`).
+/// Its internal states keep what is committed beside what is on trial, so that Newton may retry a step (trial / commit /
+/// revert, as OpenSees' `UniaxialMaterial`).
 pub trait Force {
     /// What the effect is.
     const INFO: EffectInfo;
 
-    /// The torque at the end of the step, and its tangent.
-    fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [S]) -> Reaction<S>;
+    /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
+    fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
 }
 
 /// A change of the torque on its way from the command to the motor.

@@ -1,7 +1,7 @@
 //! Viscous friction to ground: `f = coefficient*(1 + asymmetry*sgn(v))*v`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Start, Variant};
-use super::shapes::{Base, Force, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
@@ -39,7 +39,7 @@ impl Force for ViscousMotor {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         torque(p, m)
     }
 }
@@ -62,7 +62,7 @@ impl Force for ViscousTable {
     };
 
     #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [S]) -> Reaction<S> {
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         torque(p, m)
     }
 }
