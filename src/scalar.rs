@@ -83,9 +83,11 @@ pub trait Scalar:
 impl Scalar for f64 {
     const HAS_DERIVATIVES: bool = false;
 
+    #[inline]
     fn re(self) -> f64 {
         self
     }
+    #[inline]
     fn chain(self, value: f64, _derivative: f64) -> Self {
         value
     }
@@ -128,6 +130,7 @@ impl<const N: usize> From<f64> for Dual<N> {
 impl<const N: usize> Scalar for Dual<N> {
     const HAS_DERIVATIVES: bool = true;
 
+    #[inline]
     fn re(self) -> f64 {
         self.re
     }

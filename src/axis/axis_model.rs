@@ -4,7 +4,7 @@ use super::mechanics::Mechanics;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
 use super::propagator::Linear;
-use crate::effects::{ActiveEffects, Effect, Memory, Reading, Settings};
+use crate::effects::{ActiveEffects, Effect, Memory, Modes, Reading, Settings};
 use crate::scalar::Scalar;
 
 /// The axis with its effects, prepared for steps of one length.
@@ -68,10 +68,9 @@ impl<S: Scalar> Axis<S> {
             friction: [S::default(); 2],
             force: [S::default(); 2],
             memory: [S::default(); crate::effects::MEMORY],
-            dry: [0; 2],
-            contact: 0,
+            modes: Modes::default(),
         };
-        state.dry = [mode(state.omega1()), mode(state.omega2())];
+        state.modes.dry = [mode(state.omega1()), mode(state.omega2())];
         self.full.settle_contact(&mut state);
         self.full.refresh_force(&mut state, time);
         state
@@ -117,7 +116,7 @@ impl<S: Scalar> Axis<S> {
 
     /// Level of dry friction of inertia `i` at rest, against `push`, N.m.
     fn rest_level(&self, i: usize, push: S, time: f64) -> S {
-        self.full.level(i, push.re().signum(), S::default(), time).0
+        self.full.rest_level(i, push.re().signum(), time)
     }
 }
 
@@ -153,10 +152,7 @@ pub struct State<S = f64> {
     pub(super) force: [S; 2],
     /// Internal states of the effects.
     pub(super) memory: Memory<S>,
-    /// Dry friction of motor and table: -1 or +1 sliding that way, 0 sticking.
-    pub(super) dry: [i8; 2],
-    /// Backlash: -1 or +1 in contact at that side, 0 in the gap.
-    pub(super) contact: i8,
+    pub(super) modes: Modes,
 }
 
 impl<S: Scalar> State<S> {

@@ -19,8 +19,7 @@ impl<S: Scalar> Axis<S> {
         let mut state = *s;
         let fresh = self.state(s.theta1(), s.omega1(), s.theta2(), s.omega2(), time);
         state.friction = fresh.friction;
-        state.dry = fresh.dry;
-        state.contact = fresh.contact;
+        state.modes = fresh.modes;
         state.force = fresh.force;
         self.full.refresh_force(&mut state, time);
         state
@@ -30,14 +29,14 @@ impl<S: Scalar> Axis<S> {
 impl<S: Scalar> State<S> {
     /// The same state over another scalar, as constants.
     #[must_use]
+    #[inline]
     pub fn lift(s: &State<f64>) -> Self {
         Self {
             linear: s.linear.map(S::from),
             friction: s.friction.map(S::from),
             force: s.force.map(S::from),
             memory: s.memory.map(S::from),
-            dry: s.dry,
-            contact: s.contact,
+            modes: s.modes,
         }
     }
 
@@ -50,8 +49,7 @@ impl<S: Scalar> State<S> {
             friction: self.friction.map(S::re),
             force: self.force.map(S::re),
             memory: self.memory.map(S::re),
-            dry: self.dry,
-            contact: self.contact,
+            modes: self.modes,
         }
     }
 }
@@ -69,7 +67,7 @@ impl State<f64> {
     pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
         let numbers = self.linear.iter_mut().chain(&mut self.friction).chain(&mut self.force).chain(&mut self.memory);
         numbers.for_each(&mut *word);
-        for mode in self.dry.iter_mut().chain([&mut self.contact]) {
+        for mode in self.modes.dry.iter_mut().chain([&mut self.modes.contact]) {
             let mut value = f64::from(*mode);
             word(&mut value);
             *mode = if value > 0.0 { 1 } else { -i8::from(value < 0.0) };

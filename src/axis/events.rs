@@ -49,9 +49,9 @@ impl<S: Scalar> Mechanics<S> {
     /// The quantity whose zero is the event; it falls along the leg.
     pub fn indicator(&self, event: Event, from: &State<S>, s: &State<S>) -> S {
         match event {
-            Event::Rest(i) => velocity(s, i) * f64::from(from.dry[i]),
+            Event::Rest(i) => velocity(s, i) * f64::from(from.modes.dry[i]),
             Event::Closes(side) => self.clearance(side, s),
-            Event::Opens => self.pressure(from.contact, s),
+            Event::Opens => self.pressure(from.modes.contact, s),
         }
     }
 
@@ -59,7 +59,7 @@ impl<S: Scalar> Mechanics<S> {
     pub fn enter(&self, event: Event, s: &mut State<S>, time: f64) {
         match event {
             Event::Rest(i) => {
-                s.dry[i] = 0;
+                s.modes.dry[i] = 0;
                 // At rest exactly: the located velocity is zero but for rounding.
                 match i {
                     0 => {
@@ -71,11 +71,11 @@ impl<S: Scalar> Mechanics<S> {
                 }
                 if self.structure == Structure::Rigid {
                     s.linear = [s.linear[0], S::default(), S::default(), S::default()];
-                    s.dry = [0; 2];
+                    s.modes.dry = [0; 2];
                 }
             }
-            Event::Closes(side) => s.contact = side,
-            Event::Opens => s.contact = 0,
+            Event::Closes(side) => s.modes.contact = side,
+            Event::Opens => s.modes.contact = 0,
         }
         self.refresh_force(s, time);
     }
@@ -94,13 +94,13 @@ impl Mechanics<f64> {
             }
         };
         for i in 0..2 {
-            if from.dry[i] != 0 && self.dry[i] {
+            if from.modes.dry[i] != 0 && self.dry[i] {
                 let along = |s| self.indicator(Event::Rest(i), from, s);
                 propose(along(from), along(to), Event::Rest(i));
             }
         }
         if self.backlash {
-            let event = if from.contact == 0 { Event::Closes(to.linear[2].signum() as i8) } else { Event::Opens };
+            let event = if from.modes.contact == 0 { Event::Closes(to.linear[2].signum() as i8) } else { Event::Opens };
             propose(self.indicator(event, from, from), self.indicator(event, from, to), event);
         }
         first.map(|(_, e)| e)
@@ -111,8 +111,11 @@ impl Mechanics<f64> {
         self.solve(from, &Leg { ramp: stretch.until(t), length: &self.length(t), end: stretch.begin + t })
     }
 
-    /// Time into a stretch, and the state, at which the event's indicator is zero, by a bracketed secant; `to` is the end
-    /// beyond it. `None` if it is there from the first.
+    /// Time into a stretch, and the state, at which the event's indicator is zero; `to` is the end beyond it. `None` if it
+    /// is there from the first.
+    ///
+    /// By inverse quadratic interpolation inside a bracket, halved where that is not to be trusted (Chandrupatla, Advances
+    /// in Engineering Software 28(3), 1997).
     pub fn locate(
         &self,
         event: Event,
@@ -120,39 +123,28 @@ impl Mechanics<f64> {
         to: &State<f64>,
         stretch: &Stretch<f64>,
     ) -> Option<(f64, State<f64>)> {
-        let mut low = (0.0, self.indicator(event, from, from));
-        if low.1 <= 0.0 {
+        let before = (0.0, self.indicator(event, from, from));
+        if before.1 <= 0.0 {
             return None;
         }
-        let mut high = (stretch.h, self.indicator(event, from, to));
         let tolerance = LOCATE_TOLERANCE * self.whole.step.h();
-        let mut t = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-        let mut last_side = 0_i8;
+        // The newest point, the one across the zero from it, and the one that was given up.
+        let mut newest = (stretch.h, self.indicator(event, from, to));
+        let mut across = before;
+        let mut t = stretch.h * before.1 / (before.1 - newest.1);
         let mut state = *from;
         for _ in 0..LOCATE {
             state = self.at(t, from, stretch);
-            let g = self.indicator(event, from, &state);
-            let side = if g > 0.0 { 1 } else { -1 };
-            // Illinois: the end that stays put counts half, so that the bracket closes from both sides.
-            if side > 0 {
-                low = (t, g);
-                if last_side > 0 {
-                    high.1 *= 0.5;
-                }
-            } else {
-                high = (t, g);
-                if last_side < 0 {
-                    low.1 *= 0.5;
-                }
-            }
-            last_side = side;
-            let next = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-            if (next - t).abs() <= tolerance || g == 0.0 || high.0 - low.0 <= tolerance {
+            let point = (t, self.indicator(event, from, &state));
+            let given_up =
+                if (point.1 > 0.0) == (newest.1 > 0.0) { newest } else { std::mem::replace(&mut across, newest) };
+            newest = point;
+            t = interpolate(newest, across, given_up);
+            if (t - newest.0).abs() <= tolerance || newest.1 == 0.0 || (across.0 - newest.0).abs() <= tolerance {
                 break;
             }
-            t = next;
         }
-        Some((t, state))
+        Some((newest.0, state))
     }
 
     /// Slope along time of the indicator of an event that happens `t` seconds into a stretch, by a short difference.
@@ -161,6 +153,18 @@ impl Mechanics<f64> {
         let indicator = |t| self.indicator(event, from, &self.at(t, from, stretch));
         (indicator(t + dt) - indicator(t)) / dt
     }
+}
+
+/// Where a function through three points is zero: the first two lie on both sides of that.
+fn interpolate(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
+    let (xi, phi) = ((a.0 - b.0) / (c.0 - b.0), (a.1 - b.1) / (c.1 - b.1));
+    let share = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+        let far = (c.0 - a.0) / (b.0 - a.0);
+        a.1 / (b.1 - a.1) * (c.1 / (b.1 - c.1)) + far * (a.1 / (c.1 - a.1)) * (b.1 / (c.1 - b.1))
+    } else {
+        0.5
+    };
+    a.0 + share * (b.0 - a.0)
 }
 
 fn velocity<S: Scalar>(s: &State<S>, i: usize) -> S {

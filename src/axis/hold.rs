@@ -5,15 +5,15 @@ use super::propagator::{Compliance, Propagator};
 use crate::scalar::Scalar;
 
 /// Dry friction that holds: the torques, constant over the step, that bring the held velocities to zero at its end.
-pub(super) struct Hold<'a, S> {
+pub(super) struct Hold<S> {
     sticks: [bool; 2],
     /// Inverse of the velocity answers of the held inertias.
     inverse: [[S; 2]; 2],
-    c: &'a Compliance,
+    c: Compliance,
 }
 
-impl<'a, S: Scalar> Hold<'a, S> {
-    pub fn new(sticks: [bool; 2], step: &Propagator<S>, c: &'a Compliance, structure: Structure) -> Self {
+impl<S: Scalar> Hold<S> {
+    pub fn new(sticks: [bool; 2], step: &Propagator<S>, c: Compliance, structure: Structure) -> Self {
         let zero = S::default();
         let mut inverse = [[zero; 2]; 2];
         let mut sticks = sticks;

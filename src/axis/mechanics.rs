@@ -35,7 +35,8 @@ pub(super) struct Mechanics<S> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Length<S> {
     pub step: Propagator<S>,
-    pub compliance: Compliance,
+    /// Prepared for the step that nothing ends early.
+    pub compliance: Option<Compliance>,
     /// What the end of the step loses to one unit of the lone effect's torque there.
     pub answer: Linear<S>,
 }
@@ -61,7 +62,7 @@ impl<S: Scalar> Mechanics<S> {
             _ => None,
         };
         let step = Propagator::new(&parameters, structure, scheme, h.into());
-        let whole = Length::new(step, lone);
+        let whole = Length { compliance: Some(step.compliance()), ..Length::new(step, lone) };
         Self { parameters, structure, scheme, effects, on, base, lone, dry, backlash, whole }
     }
 
@@ -76,15 +77,15 @@ impl<S: Scalar> Mechanics<S> {
         Mechanics::new(self.parameters.plain(), self.structure, self.effects.plain(), self.on, self.scheme, h)
     }
 
-    /// Level of dry friction of inertia `i` for motion that way, and its derivative to the speed, N.m.
-    #[inline]
-    pub fn level(&self, i: usize, direction: f64, speed: S, at: f64) -> (S, f64) {
-        self.effects.dry_level(&self.on, PLACES[i], direction, speed, at)
+    /// Level up to which dry friction holds inertia `i` against a push that way, N.m.
+    pub fn rest_level(&self, i: usize, direction: f64, at: f64) -> S {
+        self.effects.dry_level(&self.on, PLACES[i], direction, S::default(), at)
     }
 
     /// Which inertias dry friction holds at rest.
     pub fn sticks(&self, s: &State<S>) -> [bool; 2] {
-        [0, 1].map(|i| s.dry[i] == 0 && self.dry[i])
+        let [motor, table] = s.modes.dry;
+        [motor == 0 && self.dry[0], table == 0 && self.dry[1]]
     }
 
     /// Whether a step may end early: something that sticks or opens.
@@ -114,23 +115,18 @@ impl<S: Scalar> Mechanics<S> {
     pub fn settle_contact(&self, s: &mut State<S>) {
         if self.backlash {
             let side = s.linear[2].re().signum() as i8;
-            s.contact = if self.clearance(side, s).re() < 0.0 { side } else { 0 };
+            s.modes.contact = if self.clearance(side, s).re() < 0.0 { side } else { 0 };
         }
     }
 
     /// Recomputes the effects' torques at the state, as its modes are.
     pub fn refresh_force(&self, s: &mut State<S>, time: f64) {
         let motions = motions(&s.linear);
-        let step = StepMotion { start: motions, end: motions, time, h: S::default(), contact: s.contact };
+        let step = StepMotion { start: motions, end: motions, time, h: S::default(), modes: s.modes };
         let mut memory = s.memory.map(Internal::at);
-        let forces = self.effects.forces(&self.on, &self.base, &step, &mut memory);
-        s.force = forces.torque;
-        for (i, motion) in motions.iter().take(2).enumerate() {
-            if s.dry[i] != 0 && self.dry[i] {
-                let direction = f64::from(s.dry[i]);
-                s.force[i] += self.level(i, direction, motion.v.abs(), time).0 * direction;
-                s.friction[i] = S::default();
-            }
+        s.force = self.effects.forces(&self.on, &self.base, &step, &mut memory).torque;
+        for i in (0..2).filter(|i| s.modes.dry[*i] != 0 && self.dry[*i]) {
+            s.friction[i] = S::default();
         }
     }
 }
@@ -140,7 +136,7 @@ impl<S: Scalar> Length<S> {
         let still = [S::default(); 4];
         let push = lone.map_or([0.0; 2], |effect| effect.info().place.coordinate().push());
         let answer = step.less(&still, push.map(S::from)).map(|x| -x);
-        Self { step, compliance: step.compliance(), answer }
+        Self { step, compliance: None, answer }
     }
 }
 

@@ -12,10 +12,13 @@
 mod axis_model;
 mod balance;
 mod continuation;
+mod coupled;
 mod criterion;
 mod events;
 mod hold;
+mod lone;
 mod mechanics;
+mod newton;
 mod oscillator;
 mod parameters;
 mod propagator;

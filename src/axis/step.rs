@@ -54,7 +54,11 @@ impl<S: Scalar> Axis<S> {
             };
             let begin = time + done.re();
             let leg = Leg { ramp: ramp.plain(), length, end: time + h.re() };
-            let (from, solved) = self.leave_rest(&mut now, &leg, begin);
+            let mut from = now.plain();
+            let mut solved = self.plain.solve(&from, &leg);
+            if self.plain.sticks(&from) != [false, false] {
+                self.leave_rest(&mut now, &mut from, &mut solved, &leg, begin);
+            }
             let reached = self.plain.first_event(&from, &solved).filter(|_| event < EVENTS);
             let Some(reached) = reached else {
                 return self.carry(&now, ramp, left, leg.end, &solved);
@@ -87,18 +91,23 @@ impl<S: Scalar> Axis<S> {
         self.full.carry(s, &Leg { ramp, length, end }, solved)
     }
 
-    /// Where dry friction sticks and cannot hold, lets it slip in the direction of the excess; the state that the leg then
-    /// leaves and its end, without derivatives.
-    fn leave_rest(&self, now: &mut State<S>, leg: &Leg<f64>, time: f64) -> (State<f64>, State<f64>) {
+    /// Where dry friction sticks and cannot hold, lets it slip in the direction of the excess: `now`, which is `from` with
+    /// derivatives, and what is `solved` from there.
+    fn leave_rest(
+        &self,
+        now: &mut State<S>,
+        from: &mut State<f64>,
+        solved: &mut State<f64>,
+        leg: &Leg<f64>,
+        time: f64,
+    ) {
         let plain = &self.plain;
-        let mut s = now.plain();
-        let mut solved = plain.solve(&s, leg);
         for _ in 0..3 {
-            let sticks = plain.sticks(&s);
+            let sticks = plain.sticks(from);
             let mut worst = (0.0, 0, 0);
             for i in (0..2).filter(|i| sticks[*i]) {
                 let hold = solved.friction[i];
-                let level = plain.level(i, hold.signum(), 0.0, time).0;
+                let level = plain.rest_level(i, hold.signum(), time);
                 let excess = hold.abs() - level;
                 if excess > 1e-12 * level.abs() && excess > worst.0 {
                     worst = (excess, i, hold.signum() as i8);
@@ -107,15 +116,14 @@ impl<S: Scalar> Axis<S> {
             if worst.2 == 0 {
                 break;
             }
-            s.dry[worst.1] = worst.2;
-            plain.refresh_force(&mut s, time);
-            solved = plain.solve(&s, leg);
+            from.modes.dry[worst.1] = worst.2;
+            plain.refresh_force(from, time);
+            *solved = plain.solve(from, leg);
         }
-        if s.dry != now.dry {
-            now.dry = s.dry;
+        if from.modes.dry != now.modes.dry {
+            now.modes.dry = from.modes.dry;
             self.full.refresh_force(now, time);
         }
-        (s, solved)
     }
 
     /// Time into what is left of the step, and the state, at which an event happens; `to` is the trial beyond it.

@@ -5,7 +5,7 @@ use super::record::Record;
 use super::response::{Column, Responder, States, Torques};
 use crate::axis::Structure;
 use crate::effects::{
-    ActiveEffects, Base, Effect, MEMORY, Motion, Place, Ramp, Reading, SensorHistory, Settings, StepMotion,
+    ActiveEffects, Base, Effect, MEMORY, Modes, Motion, Place, Ramp, Reading, SensorHistory, Settings, StepMotion,
     TorqueHistory,
 };
 
@@ -44,8 +44,9 @@ pub fn free_decay(settings: &Settings, record: &Record, responder: &Responder<'_
             let at: Vec<[f64; 2]> = (0..record.len())
                 .map(|k| {
                     let h = if k == 0 { 0.0 } else { record.dt };
-                    let step = StepMotion { start: still, end: still, time: record.time(k), h, contact: 0 };
-                    let forces = settings.forces(&on, &Base { k: 0.0, b: 0.0 }, &step, &mut memory);
+                    let step =
+                        StepMotion { start: still, end: still, time: record.time(k), h, modes: Modes::default() };
+                    let forces = settings.forces_along(&on, &Base { k: 0.0, b: 0.0 }, &step, &mut memory);
                     [-forces.torque[0], -forces.torque[1]]
                 })
                 .collect();
@@ -115,15 +116,21 @@ fn force_torques(
                 let coordinate = usize::from(place == Place::Table);
                 let v = end[coordinate].v;
                 let direction = v.signum();
-                let level = settings.dry_level(on, place, direction, v.abs(), time).0;
+                let level = settings.dry_level(on, place, direction, v.abs(), time);
                 let mut torque = [0.0; 2];
                 torque[coordinate] = -level * direction;
                 return torque;
             }
             let start = motions(states, k.saturating_sub(1));
             let contact = contact(&base, settings.of(Effect::Backlash)[0], &end[2]);
-            let step = StepMotion { start, end, time, h: if k == 0 { 0.0 } else { record.dt }, contact };
-            let forces = settings.forces(on, &base, &step, &mut memory);
+            let step = StepMotion {
+                start,
+                end,
+                time,
+                h: if k == 0 { 0.0 } else { record.dt },
+                modes: Modes { contact, ..Modes::default() },
+            };
+            let forces = settings.forces_along(on, &base, &step, &mut memory);
             [-forces.torque[0], -forces.torque[1]]
         })
         .collect();

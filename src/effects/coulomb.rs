@@ -35,7 +35,7 @@ const REFERENCE: &str = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 
 #[inline]
 fn level<S: Scalar>(p: &[S], direction: f64, speed: S) -> (S, f64) {
     let level = p[0] * (p[3] * direction + 1.0);
-    if p[1].re() == 0.0 && level.re() == 0.0 {
+    if p[1].re() == 0.0 && (level.re() == 0.0 || !S::HAS_DERIVATIVES) {
         return (level, 0.0);
     }
     let ratio = speed / p[2];

@@ -19,15 +19,19 @@ fn slope<S: Scalar>(z: S, direction: f64, sharpness: S) -> S {
 /// The loop after a move `x` in units of the reach: classical Runge-Kutta, in parts of at most half a reach.
 fn advance<S: Scalar>(z: S, x: S, sharpness: S) -> S {
     let direction = x.re().signum();
-    let parts = (2.0 * x.re().abs()).ceil().clamp(1.0, 32.0);
-    let dx = if parts > 1.0 { x / parts } else { x };
+    let (mut dx, mut parts) = (x, 1);
+    if x.re().abs() > 0.5 {
+        let many = (2.0 * x.re().abs()).ceil().min(32.0);
+        (dx, parts) = (x / many, many as usize);
+    }
+    let (half, sixth) = (dx * 0.5, dx * (1.0 / 6.0));
     let mut z = z;
-    for _ in 0..parts as usize {
+    for _ in 0..parts {
         let a = slope(z, direction, sharpness);
-        let b = slope(z + dx * a * 0.5, direction, sharpness);
-        let c = slope(z + dx * b * 0.5, direction, sharpness);
+        let b = slope(z + half * a, direction, sharpness);
+        let c = slope(z + half * b, direction, sharpness);
         let d = slope(z + dx * c, direction, sharpness);
-        z += dx * (a + b * 2.0 + c * 2.0 + d) * (1.0 / 6.0);
+        z += sixth * (a + b * 2.0 + c * 2.0 + d);
         if z.re().abs() > 1.0 {
             z = S::from(z.re().signum());
         }

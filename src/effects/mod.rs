@@ -16,6 +16,7 @@ mod end_stop;
 mod flexible_mode;
 mod info;
 mod input;
+mod law;
 mod load;
 mod presliding;
 mod quadratic_drag;
@@ -27,11 +28,13 @@ mod viscous;
 
 pub use info::{EffectInfo, Family, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
+use law::{Absent, Forced, Sliding};
+pub(crate) use law::{Law, WithLaw};
 pub use sensor::{Reading, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
-pub(crate) use settings::{Forces, Internals, MEMORY, PARAMETERS, StepMotion, effect_scope, memory_of};
-pub(crate) use shapes::Coordinate;
+pub(crate) use settings::{Forces, Internals, MEMORY, MEMORY_OF_ONE, PARAMETERS, StepMotion, effect_scope, memory_of};
 pub use shapes::{Base, DryFriction, Force, Input, Internal, Moment, Motion, Reaction, Sensor};
+pub(crate) use shapes::{Coordinate, Modes};
 
 use crate::scalar::Scalar;
 
@@ -100,23 +103,21 @@ macro_rules! effects {
             }
 
             #[inline]
-            fn level<S: Scalar>(self, p: &[S], direction: f64, speed: S, at: f64) -> (S, f64) {
+            fn level<S: Scalar>(self, p: &[S], direction: f64, speed: S, at: f64) -> S {
                 match self {
-                    $(Self::$name => when!(dry, $shape, <$law>::level(p, direction, speed, at), (S::default(), 0.0)),)*
+                    $(Self::$name => when!(dry, $shape, <$law>::level(p, direction, speed, at).0, S::default()),)*
                 }
             }
 
+            /// Does it with the effect's law on the motion.
             #[inline]
-            fn torque<S: Scalar>(
-                self,
-                p: &[S],
-                base: &Base<S>,
-                moment: &Moment<S>,
-                memory: &mut [Internal<S>],
-            ) -> Reaction<S> {
+            pub(crate) fn with_law<W: WithLaw>(self, work: W) -> W::Output {
                 match self {
                     $(Self::$name => when!(
-                        force, $shape, <$law>::torque(p, base, moment, memory), Reaction::given(S::default())
+                        force,
+                        $shape,
+                        work.with::<Forced<$law>>(),
+                        when!(dry, $shape, work.with::<Sliding<$law>>(), work.with::<Absent>())
                     ),)*
                 }
             }

@@ -23,15 +23,17 @@ fn torque<S: Scalar>(p: &[S], m: &Moment<S>, z: &mut Internal<S>) -> Reaction<S>
     let per_speed = m.h * 0.5 / p[1];
     let dx = per_speed * (m.start.v + m.end.v);
     let towards = if dx.re() < 0.0 { -1.0 } else { 1.0 };
-    let after = (z.start - towards) * (-dx.abs()).exp() + towards;
-    // The bristle's own equation: dz/dx = 1 - sgn(dx)*z.
-    let per_v = (1.0 - towards * after.re()) * per_speed.re();
-    z.reach(after, 0.0, per_v);
+    // What the bristle lacks of sliding that way: dz/dx = 1 - sgn(dx)*z.
+    let lack = (S::from(1.0) - z.start * towards) * (-dx.abs()).exp();
+    z.reach(S::from(towards) - lack * towards, 0.0, lack.re() * per_speed.re());
+    // The bristle's rate over the speed at the end; that may have turned since.
     let v = m.end.v;
-    let rate = v - v.abs() * after;
-    let rate_per_v = 1.0 - v.re().signum() * after.re() - v.re().abs() * per_v;
-    let damping = p[0].re() * per_v + p[2].re() * rate_per_v;
-    Reaction { torque: p[0] * after + p[2] * rate, stiffness: 0.0, damping, bend: f64::INFINITY }
+    let rate = if v.re() * towards < 0.0 { S::from(2.0) - lack } else { lack };
+    let (level, bristle) = (p[0] * towards, p[2] * v);
+    let torque = level - level * lack + bristle * rate;
+    let per_lack = (p[0].re() - p[2].re() * v.re().abs()) * per_speed.re();
+    let damping = per_lack * lack.re() + p[2].re() * rate.re();
+    Reaction { torque, stiffness: 0.0, damping, bend: f64::INFINITY }
 }
 
 /// Presliding friction on the motor side.

@@ -6,8 +6,8 @@ use std::ops::Range;
 use super::info::{Place, Role};
 use super::input::{Ramp, TorqueHistory};
 use super::sensor::{Reading, SensorHistory};
-use super::shapes::{Base, Coordinate, Internal, Moment, Motion, Reaction};
-use super::{EFFECTS, Effect};
+use super::shapes::{Base, Coordinate, Internal, Modes, Moment, Motion, Reaction};
+use super::{EFFECTS, Effect, Law, WithLaw};
 use crate::scalar::Scalar;
 
 const COUNT: usize = EFFECTS.len();
@@ -43,6 +43,16 @@ pub(crate) fn memory_of(effect: Effect) -> Range<usize> {
 /// Number of effect parameters in all.
 pub(crate) const PARAMETERS: usize = OFFSETS[COUNT];
 pub(crate) const MEMORY: usize = MEMORY_OFFSETS[COUNT];
+/// Most internal states of one effect.
+pub(crate) const MEMORY_OF_ONE: usize = {
+    let (mut most, mut i) = (0, 0);
+    while i < COUNT {
+        let states = EFFECTS[i].info().memory;
+        most = if states > most { states } else { most };
+        i += 1;
+    }
+    most
+};
 
 /// Internal states of all effects.
 pub type Memory<S> = [S; MEMORY];
@@ -193,27 +203,17 @@ impl<S: Scalar> Settings<S> {
         active
     }
 
-    /// Level of dry friction at a place, for motion in `direction` at `speed`, and its derivative to the speed, N.m.
-    #[inline]
-    pub(crate) fn dry_level(&self, on: &ActiveEffects, place: Place, direction: f64, speed: S, at: f64) -> (S, f64) {
-        let mut sum = (S::default(), 0.0);
-        for &effect in on.dry.as_slice() {
-            if effect.info().place == place {
-                let (level, slope) = self.level(effect, direction, speed, at);
-                sum.0 += level;
-                sum.1 += slope;
-            }
+    /// Level of dry friction at a place, for motion in `direction` at `speed`, N.m.
+    pub(crate) fn dry_level(&self, on: &ActiveEffects, place: Place, direction: f64, speed: S, at: f64) -> S {
+        let mut sum = S::default();
+        for effect in on.dry().iter().filter(|e| e.info().place == place) {
+            sum += effect.level(self.of(*effect), direction, speed, at);
         }
         sum
     }
 
-    /// The same of one effect.
-    #[inline]
-    pub(crate) fn level(&self, effect: Effect, direction: f64, speed: S, at: f64) -> (S, f64) {
-        effect.level(self.of(effect), direction, speed, at)
-    }
-
-    /// Sums the force effects: torque on motor and table and the tangent; the internal states reach their end on trial.
+    /// Sums the forces and what slides: torque on motor and table and the tangent; the internal states reach their end on
+    /// trial.
     #[inline]
     pub(crate) fn forces(
         &self,
@@ -223,23 +223,40 @@ impl<S: Scalar> Settings<S> {
         memory: &mut Internals<S>,
     ) -> Forces<S> {
         let mut sum = Forces::default();
-        for &effect in on.forces.as_slice() {
+        for &effect in on.forces() {
             let coordinate = effect.info().place.coordinate();
             sum.add(coordinate, &self.reaction(effect, base, &step.moment(coordinate), memory));
+        }
+        for &effect in on.dry() {
+            let coordinate = effect.info().place.coordinate();
+            let moment = step.moment(coordinate);
+            if moment.slides != 0.0 {
+                sum.add(coordinate, &self.reaction(effect, base, &moment, memory));
+            }
         }
         sum
     }
 
-    /// The torque of one force effect; its internal states reach their end on trial.
-    #[inline]
-    pub(crate) fn reaction(
+    /// The same along a motion that is known: the internal states are committed at once.
+    #[cfg(feature = "cli")]
+    pub(crate) fn forces_along(
         &self,
-        effect: Effect,
+        on: &ActiveEffects,
         base: &Base<S>,
-        moment: &Moment<S>,
-        memory: &mut Internals<S>,
-    ) -> Reaction<S> {
-        effect.torque(self.of(effect), base, moment, &mut memory[memory_of(effect)])
+        step: &StepMotion<S>,
+        memory: &mut Memory<S>,
+    ) -> Forces<S> {
+        let mut internals = memory.map(Internal::at);
+        let forces = self.forces(on, base, step, &mut internals);
+        *memory = internals.map(|state| state.end);
+        forces
+    }
+
+    /// The torque of one effect on the motion; its internal states reach their end on trial.
+    #[inline]
+    fn reaction(&self, effect: Effect, base: &Base<S>, moment: &Moment<S>, memory: &mut Internals<S>) -> Reaction<S> {
+        let memory = &mut memory[memory_of(effect)];
+        effect.with_law(React { p: self.of(effect), base, moment, memory })
     }
 
     /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
@@ -277,6 +294,23 @@ impl<S: Scalar> Settings<S> {
     }
 }
 
+/// A law's torque.
+struct React<'a, S> {
+    p: &'a [S],
+    base: &'a Base<S>,
+    moment: &'a Moment<S>,
+    memory: &'a mut [Internal<S>],
+}
+
+impl<S: Scalar> WithLaw for React<'_, S> {
+    type Output = Reaction<S>;
+
+    #[inline]
+    fn with<L: Law>(self) -> Reaction<S> {
+        L::react(self.p, self.base, self.moment, self.memory)
+    }
+}
+
 /// Hands the effects that are marked, one flag an effect of the list, to `f` as a slice; without heap.
 pub(crate) fn effect_scope<R>(marked: &[bool; COUNT], f: impl FnOnce(&[Effect]) -> R) -> R {
     let mut few = Few::default();
@@ -291,18 +325,20 @@ pub(crate) struct StepMotion<S> {
     pub end: [Motion<S>; 3],
     pub time: f64,
     pub h: S,
-    pub contact: i8,
+    pub modes: Modes,
 }
 
 impl<S: Scalar> StepMotion<S> {
+    #[inline]
     fn moment(&self, coordinate: Coordinate) -> Moment<S> {
-        let coordinate = coordinate as usize;
+        let i = coordinate as usize;
         Moment {
-            start: self.start[coordinate],
-            end: self.end[coordinate],
+            start: self.start[i],
+            end: self.end[i],
             time: self.time,
             h: self.h,
-            contact: self.contact,
+            contact: self.modes.contact,
+            slides: self.modes.slides(coordinate),
         }
     }
 }
@@ -424,7 +460,7 @@ mod tests {
             for (x, v, contact) in [(0.3, 1.7, 0), (-0.2, -0.6, 1), (2.0, 0.4, -1)] {
                 let reaction = |dx: f64, dv: f64| {
                     let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
-                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact };
+                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact, slides: 0.0 };
                     settings.reaction(effect, &base, &moment, &mut [Internal::at(0.1); MEMORY])
                 };
                 let at = reaction(0.0, 0.0);
@@ -437,6 +473,41 @@ mod tests {
         }
         // Loads, play, drift of stiffness, third inertia and disturbance, at each of the three.
         assert!(straight >= 6 * 3, "{straight}");
+    }
+
+    /// Newton's method takes the internal states along by their tangents.
+    #[test]
+    fn internal_states_have_their_tangents() {
+        let base = Base { k: 1.76e-2, b: 5.4e-4 };
+        let mut states = 0;
+        for &effect in EFFECTS.iter().filter(|e| e.info().memory > 0) {
+            let settings = shown(effect);
+            for (x, v) in [(0.3, 1.7), (-0.2, -0.6), (2.0, 0.4)] {
+                let end = |dx: f64, dv: f64| {
+                    let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
+                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact: 0, slides: 0.0 };
+                    let mut memory = [Internal::at(0.1); MEMORY];
+                    settings.reaction(effect, &base, &moment, &mut memory);
+                    memory
+                };
+                let at = end(0.0, 0.0);
+                let d = 1e-6;
+                for i in memory_of(effect) {
+                    let difference =
+                        |a: [Internal<f64>; MEMORY], b: [Internal<f64>; MEMORY]| (a[i].end - b[i].end) / (2.0 * d);
+                    for (slope, own) in [
+                        (difference(end(d, 0.0), end(-d, 0.0)), at[i].per.x),
+                        (difference(end(0.0, d), end(0.0, -d)), at[i].per.v),
+                    ] {
+                        // The loop's is that of its equation, not of the Runge-Kutta step along it.
+                        assert!((slope - own).abs() <= 1e-4 * (1.0 + own.abs()), "{effect:?} {i}: {slope} {own}");
+                    }
+                    states += 1;
+                }
+            }
+        }
+        // Two bristles, a loop, and the third inertia's three, at each of the three motions.
+        assert_eq!(states, 6 * 3);
     }
 
     #[test]

@@ -58,6 +58,27 @@ pub struct Base<S> {
     pub b: S,
 }
 
+/// What holds over a leg of a step, until an event.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Modes {
+    /// Dry friction of motor and table: -1 or +1 sliding that way, 0 sticking.
+    pub dry: [i8; 2],
+    /// Backlash: -1 or +1 in contact at that side, 0 in the gap.
+    pub contact: i8,
+}
+
+impl Modes {
+    /// The way dry friction slides along a coordinate; none does in the coupling.
+    #[inline]
+    pub fn slides(self, along: Coordinate) -> f64 {
+        match along {
+            Coordinate::Motor => f64::from(self.dry[0]),
+            Coordinate::Table => f64::from(self.dry[1]),
+            Coordinate::Twist => 0.0,
+        }
+    }
+}
+
 /// A step as a force effect sees it: from the committed start to a trial end.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<S> {
@@ -71,6 +92,8 @@ pub struct Moment<S> {
     pub h: S,
     /// The side of contact (backlash): -1, 0 (in the gap) or +1.
     pub contact: i8,
+    /// The way dry friction slides there: -1 or +1, 0 at rest.
+    pub slides: f64,
 }
 
 /// A torque that resists the motion, with its tangent for Newton's method.
@@ -89,6 +112,7 @@ pub struct Reaction<S> {
 
 impl<S: Scalar> Reaction<S> {
     /// A torque that does not hang on the end of the step.
+    #[inline]
     pub fn given(torque: S) -> Self {
         Self { torque, stiffness: 0.0, damping: 0.0, bend: 0.0 }
     }
@@ -107,17 +131,20 @@ pub struct Internal<S> {
 
 impl<S: Scalar> Internal<S> {
     /// A state that stays as it is.
+    #[inline]
     pub fn at(start: S) -> Self {
         Self { start, end: start, per: Motion::default() }
     }
 
     /// The end on trial, and its derivative to position and velocity there.
+    #[inline]
     pub fn reach(&mut self, end: S, x: f64, v: f64) {
         self.end = end;
         self.per = Motion { x, v };
     }
 
     /// The end after the end of the motion `moved`.
+    #[inline]
     pub(crate) fn after(&self, moved: &Motion<S>) -> S {
         self.end + moved.x * self.per.x + moved.v * self.per.v
     }

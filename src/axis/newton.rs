@@ -1,0 +1,81 @@
+//! Torques that balance: Newton's method finds them on plain numbers, and one pass over numbers with derivatives gives these
+//! what is theirs (implicit function theorem).
+
+use crate::effects::Memory;
+use crate::scalar::Scalar;
+
+/// Most Newton iterations of a step.
+const NEWTON: usize = 30;
+/// Newton ends when the torques repeat to this share of their size.
+const NEWTON_TOLERANCE: f64 = 1e-13;
+
+/// Newton's method from `torque`, with `input` on the motor to measure by: the torques that led to the end, and those that
+/// the laws give there; `memory` goes along.
+#[inline]
+pub(super) fn newton<const N: usize>(
+    balance: &impl Balance<f64, N>,
+    mut torque: [f64; N],
+    input: f64,
+    memory: &mut Memory<f64>,
+) -> [[f64; N]; 2] {
+    let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let mut internals = balance.internals();
+    let mut previous = f64::INFINITY;
+    for iteration in 1.. {
+        let pass = balance.pass(torque, &mut internals);
+        let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
+        let scale = largest(&pass.found) + input.abs();
+        if size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
+            balance.remember(&internals, torque, [0.0; N], memory);
+            return [torque, pass.found];
+        }
+        // A residual that grows means a kink was crossed: half the step.
+        let kink = size > previous * 2.0;
+        previous = size;
+        let less = if kink { pass.correction.map(|c| c * 0.5) } else { pass.correction };
+        // Newton squares the share that is missing.
+        if size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && !kink) {
+            balance.remember(&internals, torque, less, memory);
+            torque = std::array::from_fn(|i| torque[i] - less[i]);
+            break;
+        }
+        torque = std::array::from_fn(|i| torque[i] - less[i]);
+    }
+    [torque, torque]
+}
+
+/// The derivatives of torques whose values balance; `memory` goes along.
+pub(super) fn derive<S: Scalar, const N: usize>(
+    balance: &impl Balance<S, N>,
+    torque: [S; N],
+    memory: &mut Memory<S>,
+) -> [S; N] {
+    let mut internals = balance.internals();
+    let pass = balance.pass(torque, &mut internals);
+    balance.remember(&internals, torque, pass.correction, memory);
+    std::array::from_fn(|i| torque[i] - pass.correction[i])
+}
+
+/// An equation of `N` torques at the end of a leg.
+pub(super) trait Balance<S, const N: usize> {
+    /// Internal states of its laws over the leg.
+    type Internals;
+
+    /// They as they are committed.
+    fn internals(&self) -> Self::Internals;
+
+    /// What the laws give for the motion under `torque`; the internal states reach their end there.
+    fn pass(&self, torque: [S; N], internals: &mut Self::Internals) -> Pass<S, N>;
+
+    /// Leaves in `memory` the internal states for `less` than the `torque` of the last pass, by their tangents there.
+    fn remember(&self, internals: &Self::Internals, torque: [S; N], less: [S; N], memory: &mut Memory<S>);
+}
+
+pub(super) struct Pass<S, const N: usize> {
+    /// Torques of the laws.
+    pub found: [S; N],
+    /// What is to be taken from the torques for them to agree with the laws, to first order.
+    pub correction: [S; N],
+    /// What is then still missing, at most.
+    pub left: f64,
+}

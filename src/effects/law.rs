@@ -1,0 +1,69 @@
+//! The law of an effect on the motion as the step solves for it: one torque along one coordinate, whatever the shape.
+
+use std::marker::PhantomData;
+
+use super::shapes::{Base, Coordinate, DryFriction, Force, Internal, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// A torque along the coordinate of its effect.
+pub(crate) trait Law {
+    /// What it sees and acts on.
+    const COORDINATE: Coordinate;
+    /// Number of internal states.
+    const MEMORY: usize;
+
+    /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
+    fn react<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
+}
+
+/// Something to be done with the law of an effect, compiled for each law.
+pub(crate) trait WithLaw {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn with<L: Law>(self) -> Self::Output;
+}
+
+/// No torque: of an effect that does not act on the motion.
+pub(super) struct Absent;
+
+impl Law for Absent {
+    const COORDINATE: Coordinate = Coordinate::Motor;
+    const MEMORY: usize = 0;
+
+    fn react<S: Scalar>(_p: &[S], _base: &Base<S>, _moment: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
+        Reaction::given(S::default())
+    }
+}
+
+/// A force from the motion.
+pub(super) struct Forced<F>(PhantomData<F>);
+
+impl<F: Force> Law for Forced<F> {
+    const COORDINATE: Coordinate = F::INFO.place.coordinate();
+    const MEMORY: usize = F::INFO.memory;
+
+    #[inline]
+    fn react<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
+        F::torque(p, base, moment, memory)
+    }
+}
+
+/// Dry friction while it slides.
+pub(super) struct Sliding<D>(PhantomData<D>);
+
+impl<D: DryFriction> Law for Sliding<D> {
+    const COORDINATE: Coordinate = D::INFO.place.coordinate();
+    const MEMORY: usize = D::INFO.memory;
+
+    #[inline]
+    fn react<S: Scalar>(p: &[S], _base: &Base<S>, moment: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
+        // On trial the velocity may have passed zero: the sliding law continues there until the event is found.
+        let slides = moment.slides;
+        let (level, damping) = D::level(p, slides, moment.end.v * slides, moment.time);
+        // A level that hangs on the speed may do so in any way.
+        let bend = if damping == 0.0 { 0.0 } else { f64::INFINITY };
+        Reaction { torque: level * slides, stiffness: 0.0, damping, bend }
+    }
+}
