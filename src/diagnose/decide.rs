@@ -251,10 +251,11 @@ fn further(
     if suffices(&chosen, gap, values) {
         return chosen;
     }
-    // Where the first is all but everything, a partner may sharpen it; another first would not come near it.
+    // Where the first is all but everything, a partner may sharpen it; without it no two would come near it.
     let first_is_most = chosen.fitted.chi2 - values < FURTHER_OF_ALL * gap;
     let beam = if first_is_most { 1 } else { BEAM };
-    let mut pair: Option<Tested> = search.two(parameters, progress).into_iter().min_by(closer);
+    let mut pair: Option<Tested> =
+        if first_is_most { None } else { search.two(parameters, progress).into_iter().min_by(closer) };
     for single in singles.iter().take(beam) {
         if pair.as_ref().is_some_and(|p| !material(p)) {
             break;
@@ -262,7 +263,8 @@ fn further(
         let partnered = best_partner(single, left(&pair));
         pair = pair.into_iter().chain(partnered).min_by(closer);
     }
-    if let Some(found) = pair.as_ref().filter(|p| material(p)) {
+    let half_way = |p: &Tested| chosen.fitted.chi2 - p.fitted.chi2 >= FURTHER * (chosen.fitted.chi2 - values);
+    if let Some(found) = pair.as_ref().filter(|p| material(p) && (!first_is_most || half_way(p))) {
         // With the partner in, was the first the right one? And with the first where it is then, the partner?
         let found = found.clone();
         for &(kept, variant) in found.effects.iter().rev() {

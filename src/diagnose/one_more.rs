@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::fit::{Effort, Fitted};
 use super::model::Model;
 use super::screen::{Candidate, Screen};
-use super::search::{NO_RIVAL, Search, Tested, WAY, inherited, simplest_of};
+use super::search::{COMPARED, NO_RIVAL, Search, Tested, WAY, inherited, simplest_of};
 use super::states;
 use super::trials::tone;
 use crate::axis::Structure;
@@ -50,6 +50,9 @@ const FINALISTS: [usize; 2] = [6, 3];
 const NEAR: f64 = 10.0;
 /// or within this one when the best has reached the floor.
 const NEAR_THE_FLOOR: f64 = 3.0;
+/// Near the floor what is missing is small and acts as the regression has it: only those that at first look take this share
+/// of what is left above the floor.
+const SEEN: f64 = 0.1;
 
 impl Search<'_> {
     /// Every effect of the library beside those of `beside`, best first: one [`Tested`] per effect, its best variant
@@ -68,11 +71,13 @@ impl Search<'_> {
         if let Some(motion) = &own_motion {
             screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, motion, &beside.effects));
         }
+        let (left, values) = (beside.fitted.chi2, self.data.values() as f64);
+        let worth = if stage > 0 && left < COMPARED * values { left - SEEN * (left - values) } else { f64::INFINITY };
         let screened = self.screened(beside, &screens, progress);
         let glances = self.glances(beside, rival, &screened, progress);
         let finalist = |rank: usize, chi2: f64| {
             let best = glances.first().map_or(rival, |(best, _)| best.fitted.chi2.min(rival));
-            rank < FINALISTS[stage] && ((rank == 0 && stage == 0) || chi2 < self.near(best))
+            rank < FINALISTS[stage] && ((rank == 0 && stage == 0) || chi2 < self.near(best)) && chi2 < worth
         };
         let firsts: Vec<Tested> = glances
             .par_iter()

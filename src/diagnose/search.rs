@@ -11,7 +11,7 @@ const FULL: usize = 40;
 /// Linearisations of the fit that every other is measured against.
 const LONG: usize = 120;
 /// Squared residual per value up to which likelihoods are compared, not only ranked.
-const COMPARED: f64 = 3.0;
+pub const COMPARED: f64 = 3.0;
 /// A rival start or form that after so many steps
 pub const WAY: usize = 8;
 /// leaves this many times the first is given up.
