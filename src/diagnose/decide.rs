@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::gap::{Gap, Levels};
+use super::one_more::takes;
 use super::search::{Search, Tested};
 use crate::effects::Effect;
 
@@ -263,8 +264,10 @@ fn further(
         let partnered = best_partner(single, left(&pair));
         pair = pair.into_iter().chain(partnered).min_by(closer);
     }
+    // A partner of what is all but everything must close nearly all that is left: half of it, when it is found.
     let half_way = |p: &Tested| chosen.fitted.chi2 - p.fitted.chi2 >= FURTHER * (chosen.fitted.chi2 - values);
-    if let Some(found) = pair.as_ref().filter(|p| material(p) && (!first_is_most || half_way(p))) {
+    let promises = |p: &Tested| if first_is_most { half_way(p) } else { takes(&chosen, p, values) };
+    if let Some(found) = pair.as_ref().filter(|p| material(p) && promises(p)) {
         // With the partner in, was the first the right one? And with the first where it is then, the partner?
         let found = found.clone();
         for &(kept, variant) in found.effects.iter().rev() {
@@ -272,7 +275,7 @@ fn further(
             pair = pair.into_iter().chain(turned).min_by(closer);
         }
     }
-    let Some(pair) = pair.map(|p| search.among_kin(p)) else { return chosen };
+    let Some(pair) = pair.filter(|p| promises(p)).map(|p| search.among_kin(p)) else { return chosen };
     let third = if suffices(&pair, gap, values) || chosen.fitted.chi2 < WORTH_A_THIRD * pair.fitted.chi2 {
         None
     } else {

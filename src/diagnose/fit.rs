@@ -289,14 +289,14 @@ pub struct Effort {
     /// Share of the cost below which steps are no longer worth taking.
     pub tolerance: f64,
     /// Given up when after so many steps the sum of squares, in units of the noise, is above this.
-    pub hopeless: (usize, f64),
+    pub hopeless: [(usize, f64); 2],
 }
 
 impl Effort {
     /// To where likelihoods can be compared.
     #[must_use]
     pub const fn to_the_end(iterations: usize, misfit: f64) -> Self {
-        Self { iterations, misfit, tolerance: CLOSE, hopeless: (0, f64::INFINITY) }
+        Self { iterations, misfit, tolerance: CLOSE, hopeless: [(0, f64::INFINITY); 2] }
     }
 
     /// To where it crawls: a fit slower than that does not reach the floor in the linearisations it has.
@@ -305,10 +305,10 @@ impl Effort {
         Self { tolerance: CRAWL, ..Self::to_the_end(iterations, misfit) }
     }
 
-    /// The same, given up when after so many steps the sum of squares is above a bar.
+    /// The same, given up when after so many steps the sum of squares is above a bar; the last two such bars count.
     #[must_use]
     pub const fn unless(self, steps: usize, bar: f64) -> Self {
-        Self { hopeless: (steps, bar), ..self }
+        Self { hopeless: [self.hopeless[1], (steps, bar)], ..self }
     }
 }
 
@@ -368,7 +368,7 @@ pub fn fit(
     let options = Options {
         iterations: effort.iterations,
         cost: effort.tolerance,
-        hopeless: (effort.hopeless.0, 0.5 * effort.hopeless.1),
+        hopeless: effort.hopeless.iter().map(|(steps, bar)| (*steps, 0.5 * bar)).collect(),
         step: 1e-9,
         gradient: 1e-9,
         stride: coordinates.iter().map(|c| if c.log { STRIDE } else { f64::INFINITY }).collect(),

@@ -50,9 +50,13 @@ const FINALISTS: [usize; 2] = [6, 3];
 const NEAR: f64 = 10.0;
 /// or within this one when the best has reached the floor.
 const NEAR_THE_FLOOR: f64 = 3.0;
-/// Near the floor what is missing is small and acts as the regression has it: only those that at first look take this share
-/// of what is left above the floor.
+/// Share of what is left above the floor that a further effect must take for anything more to be tried with it.
 const SEEN: f64 = 0.1;
+
+/// Whether a further effect takes a share of what is left above the floor without it.
+pub fn takes(without: &Tested, with: &Tested, values: f64) -> bool {
+    without.fitted.chi2 - with.fitted.chi2 >= SEEN * (without.fitted.chi2 - values)
+}
 
 impl Search<'_> {
     /// Every effect of the library beside those of `beside`, best first: one [`Tested`] per effect, its best variant
@@ -71,20 +75,23 @@ impl Search<'_> {
         if let Some(motion) = &own_motion {
             screens.push(Screen::new(&leaning, self.data, &beside.fitted.initial, motion, &beside.effects));
         }
-        let (left, values) = (beside.fitted.chi2, self.data.values() as f64);
-        let worth = if stage > 0 && left < COMPARED * values { left - SEEN * (left - values) } else { f64::INFINITY };
+        let values = self.data.values() as f64;
+        // Near the floor what is missing is small, and a first look sees it.
+        let small = stage > 0 && beside.fitted.chi2 < COMPARED * values;
         let screened = self.screened(beside, &screens, progress);
         let glances = self.glances(beside, rival, &screened, progress);
-        let finalist = |rank: usize, chi2: f64| {
+        let finalist = |rank: usize, glance: &Tested| {
             let best = glances.first().map_or(rival, |(best, _)| best.fitted.chi2.min(rival));
-            rank < FINALISTS[stage] && ((rank == 0 && stage == 0) || chi2 < self.near(best)) && chi2 < worth
+            rank < FINALISTS[stage]
+                && ((rank == 0 && stage == 0) || glance.fitted.chi2 < self.near(best))
+                && (!small || takes(beside, glance, values))
         };
         let firsts: Vec<Tested> = glances
             .par_iter()
             .enumerate()
             .map(|(rank, (glance, candidate))| {
                 progress(candidate.effect.info().id);
-                if finalist(rank, glance.fitted.chi2) {
+                if finalist(rank, glance) {
                     let effects = beside.with(candidate.effect, candidate.variant);
                     let first = self.refit(&glance.fitted, effects, self.exploring(&glance.fitted));
                     if first.fitted.chi2.is_finite() { first } else { glance.clone() }
@@ -99,9 +106,9 @@ impl Search<'_> {
             .zip(&glances)
             .enumerate()
             .map(|(rank, (first, (glance, candidate)))| {
-                // Beside another, the other forms of the best alone.
-                let worth = stage == 0 || first.fitted.chi2 <= best;
-                if worth && finalist(rank, glance.fitted.chi2) {
+                // Beside another, the other forms of the best alone, if it takes anything.
+                let tried = stage == 0 || (first.fitted.chi2 <= best && takes(beside, &first, values));
+                if tried && finalist(rank, glance) {
                     self.best_variant(beside, first, candidate, &screens[0])
                 } else {
                     first

@@ -1,5 +1,7 @@
 //! What is searched through, and the fits of given hypotheses: no gap, parameters only, combinations of effects.
 
+use rayon::prelude::*;
+
 use super::fit::{Data, Effort, Fitted, fit};
 use super::model::{BaseParameter, Free, Model};
 use super::response::States;
@@ -16,8 +18,10 @@ pub const COMPARED: f64 = 3.0;
 pub const WAY: usize = 8;
 /// leaves this many times the first is given up.
 pub const NO_RIVAL: f64 = 1.5;
-/// Another law of the same thing starts beside its minimum, in a valley that events make rough: it has longer.
+/// Another law of the same thing starts beside its minimum, in a valley that events make rough: it has longer,
 const WAY_OF_KIN: usize = 3 * WAY;
+/// but not where it is still this many times as far off.
+const ASTRAY: f64 = 1e3;
 
 /// A hypothesis that was fitted.
 #[derive(Debug, Clone)]
@@ -158,12 +162,14 @@ impl Search<'_> {
         let (effect, _) = combination.effects[at];
         let known = combination.ids();
         let kin = self.suspects.iter().copied().filter(|k| effect.is_kin_of(*k) && !known.contains(&k.info().id));
-        kin.filter_map(|kin| {
-            let forms =
-                (0..kin.info().variants.len()).map(|form| self.replaced(combination, at, (kin, form), WAY_OF_KIN));
-            simplest_of(forms.collect(), self.data.values() as f64)
-        })
-        .collect()
+        let kin: Vec<Effect> = kin.collect();
+        kin.into_par_iter()
+            .filter_map(|kin| {
+                let forms = (0..kin.info().variants.len()).into_par_iter();
+                let forms = forms.map(|form| self.replaced(combination, at, (kin, form), WAY_OF_KIN)).collect();
+                simplest_of(forms, self.data.values() as f64)
+            })
+            .collect()
     }
 
     /// The combination with each of its effects in turn in the form that suits it best, from where it stands.
@@ -189,7 +195,8 @@ impl Search<'_> {
         let mut effects = combination.effects.clone();
         effects[at] = (kin, form);
         let from = Fitted { model, ..combination.fitted.clone() };
-        self.refit(&from, effects, self.exploring(&from).unless(way, NO_RIVAL * from.chi2))
+        let effort = self.exploring(&from).unless(WAY, ASTRAY * from.chi2).unless(way, NO_RIVAL * from.chi2);
+        self.refit(&from, effects, effort)
     }
 
     /// What is free when these effects are on.

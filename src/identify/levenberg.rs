@@ -95,7 +95,7 @@ pub struct Options {
     /// Stop when no parameter's gradient is larger than this times `|r|*|J_j|`: the cosine of their angle.
     pub gradient: f64,
     /// Give up when the cost is above this after so many steps.
-    pub hopeless: (usize, f64),
+    pub hopeless: Vec<(usize, f64)>,
     /// First damping, relative to the scaled curvature.
     pub damping: f64,
     /// Longest step of each parameter, n; empty: none.
@@ -113,7 +113,7 @@ impl Default for Options {
             cost: 1e-12,
             step: 1e-10,
             gradient: 1e-10,
-            hopeless: (0, f64::INFINITY),
+            hopeless: Vec::new(),
             damping: 1e-3,
             stride: Vec::new(),
             lower: Vec::new(),
@@ -310,7 +310,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 normal = next;
                 iterations += 1;
                 problem.progress(iterations, normal.cost, &p);
-                if iterations == options.hopeless.0 && normal.cost > options.hopeless.1 {
+                if options.hopeless.iter().any(|(steps, bar)| iterations == *steps && normal.cost > *bar) {
                     break Termination::Hopeless;
                 }
                 // A step that the damping holds short promises little wherever it stands.
@@ -383,7 +383,7 @@ mod tests {
     fn a_fit_that_stays_above_its_bar_is_given_up_and_one_below_it_goes_on() {
         let start = DVector::from_vec(vec![-1.2, 1.0]);
         let after_two =
-            |bar: f64| minimise(&rosenbrock(), &start, &Options { hopeless: (2, bar), ..Options::default() });
+            |bar: f64| minimise(&rosenbrock(), &start, &Options { hopeless: vec![(2, bar)], ..Options::default() });
         // Rosenbrock's cost at the start is 12.1; the valley is reached in a step, its end in some fifteen.
         let given_up = after_two(1e-3);
         assert_eq!((given_up.termination, given_up.iterations), (Termination::Hopeless, 2));
