@@ -94,7 +94,7 @@ pub struct Options {
     pub step: f64,
     /// Stop when no parameter's gradient is larger than this times `|r|*|J_j|`: the cosine of their angle.
     pub gradient: f64,
-    /// Give up when the cost is above this after so many steps.
+    /// Give up when after so many steps the cost is above a bar: pairs of both.
     pub hopeless: Vec<(usize, f64)>,
     /// First damping, relative to the scaled curvature.
     pub damping: f64,
@@ -382,8 +382,13 @@ mod tests {
     #[test]
     fn a_fit_that_stays_above_its_bar_is_given_up_and_one_below_it_goes_on() {
         let start = DVector::from_vec(vec![-1.2, 1.0]);
-        let after_two =
-            |bar: f64| minimise(&rosenbrock(), &start, &Options { hopeless: vec![(2, bar)], ..Options::default() });
+        let after_two = |bar: f64| {
+            minimise(
+                &rosenbrock(),
+                &start,
+                &Options { hopeless: vec![(1, f64::INFINITY), (2, bar)], ..Options::default() },
+            )
+        };
         // Rosenbrock's cost at the start is 12.1; the valley is reached in a step, its end in some fifteen.
         let given_up = after_two(1e-3);
         assert_eq!((given_up.termination, given_up.iterations), (Termination::Hopeless, 2));
