@@ -83,13 +83,19 @@ pub fn table(t: &Table, layout: Layout) -> String {
         let cells = r.cells.iter().map(|c| printable(&format::cell(c, Medium::Terminal)).into_owned());
         out.add_row(lead(if r.strong { ">" } else { "" }).into_iter().chain(cells));
     }
+    // A name or a number is not broken, unless a line has no room for them all.
+    let unbroken: Vec<usize> = (0..t.columns.len())
+        .map(|i| {
+            let cells = t.rows.iter().filter_map(|r| r.cells.get(i)).map(|c| format::cell(c, Medium::Terminal));
+            2 + cells.flat_map(|c| longest_word(&c)).chain(longest_word(&t.columns[i])).max().unwrap_or(0)
+        })
+        .collect();
+    let room = usize::from(layout.width).saturating_sub(2 * usize::from(marked));
+    let most = if unbroken.iter().sum::<usize>() <= room { room } else { room / unbroken.len().max(1) };
     for (i, column) in out.column_iter_mut().enumerate() {
         column.set_padding((0, if marked && i == 0 { 1 } else { 2 }));
         let Some(i) = i.checked_sub(usize::from(marked)) else { continue };
-        // A name or a number is not broken, unless a line has no room for it beside others.
-        let cells = t.rows.iter().filter_map(|r| r.cells.get(i)).map(|c| format::cell(c, Medium::Terminal));
-        let widest = cells.flat_map(|c| longest_word(&c)).chain(longest_word(&t.columns[i])).max().unwrap_or(0);
-        let least = u16::try_from(widest + 2).map_or(layout.width / 3, |w| w.min(layout.width / 3));
+        let least = u16::try_from(unbroken[i].min(most)).unwrap_or(layout.width);
         column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(least)));
         let mut cells = t.rows.iter().filter_map(|r| r.cells.get(i)).filter(|c| **c != Cell::Empty).peekable();
         if cells.peek().is_some() && cells.all(Cell::is_numeric) {
@@ -195,7 +201,7 @@ mod tests {
         let cause = "friction of motor and screw that yields before it breaks away, as ever";
         let cells = [cause, "presliding_motor.damping", "6.391058e-4 ± 2.5e-9 N.m.s/rad"];
         long.row(cells.map(|c| Cell::Text(c.to_owned())).to_vec());
-        let shown = table(&long, Layout { width: 80, colour: false });
+        let shown = table(&long, Layout { width: 70, colour: false });
         assert!(shown.contains("presliding_motor.damping"), "{shown}");
     }
 }
