@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 #[path = "../tests/program/memory.rs"]
 mod memory;
 
-/// Hidden effects of the paper's axis, one at a time, of every family.
-const HIDDEN: [&[&str]; 14] = [
+/// Hidden effects of the paper's axis, one at a time, of every family; a gain of the torque is one of the parameters.
+const HIDDEN: [&[&str]; 17] = [
     &["coulomb_motor.level=0.004"],
     &["coulomb_table.level=0.001", "coulomb_table.peak=0.5", "coulomb_table.speed=2"],
     &["presliding_motor.level=0.006", "presliding_motor.reach=0.012"],
@@ -23,7 +23,10 @@ const HIDDEN: [&[&str]; 14] = [
     &["flexible_mode.inertia=2e-6", "flexible_mode.stiffness=0.02", "flexible_mode.damping=1e-5"],
     &["friction_drift.level_rate=4e-3"],
     &["end_stop.stiffness=0.5", "end_stop.upper=0.3"],
+    &["saturation.limit=0.04"],
     &["actuator_lag.time_constant=0.002"],
+    &["delay.time=0.002"],
+    &["lead_error.scale=0.01"],
     &["disturbance.amplitude=0.002"],
 ];
 
