@@ -46,6 +46,14 @@ const ROUGH: &[(&str, f64)] = &[
     ("actuator_lag.time_constant", 1e-3),
     ("sensor_delay.time", 1.5 * DT),
     ("lead_error.amplitude", 0.01),
+    ("coulomb_motor.load", 0.2),
+    ("gravity.sine", 0.002),
+    ("external_spring.stiffness", 0.001),
+    ("dead_zone.width", 0.002),
+    ("position_friction.level", 0.001),
+    ("motor_mode.inertia", 2e-5),
+    ("latch.delay", 0.7 * DT),
+    ("latch.filter", 1e-3),
 ];
 
 fn started(settings: &[(&str, f64)]) -> Instance {
@@ -201,6 +209,22 @@ fn steps_of_changing_length_end_where_equal_steps_do() {
 }
 
 #[test]
+fn readings_older_than_what_is_remembered_are_refused_by_name() {
+    for (settings, name) in [
+        (&[("latch.delay", 0.1)][..], "latch.delay"),
+        (&[("sensor_delay.time", 0.1)][..], "sensor_delay.time"),
+        (&[("sensor_delay.time", 0.02), ("latch.delay", 0.08)][..], "latch.delay"),
+    ] {
+        let mut i = started(settings);
+        assert!(i.do_step(0.0, DT).is_err());
+        assert!(log(&i).contains(name), "{}", log(&i));
+    }
+    // Early readings need no past.
+    let mut early = started(&[("latch.delay", -0.1)]);
+    early.do_step(0.0, DT).unwrap();
+}
+
+#[test]
 fn a_torque_with_a_slope_is_integrated_exactly() {
     // A free rigid body under T = s*t: theta1 = s*t^3/(6*I), omega1 = s*t^2/(2*I), alpha1 = s*t/I.
     let mut i = instance();
@@ -231,7 +255,10 @@ fn output_derivatives_are_the_slopes_of_the_outputs() {
     // Coulomb friction slides here; the sensors' delay makes omega2 something other than the table's speed.
     let friction: &[_] = &[("dt_internal", 1e-5), ("coulomb_motor.level", 0.004), ("viscous_table.coefficient", 1e-4)];
     let sensors: &[_] = &[("dt_internal", 1e-5), ("lead_error.amplitude", 0.01), ("lead_error.order", 3.0)];
-    for settings in [&[("dt_internal", 1e-5)], friction, sensors] {
+    let late: &[_] = &[("dt_internal", 1e-5), ("latch.delay", 6e-4), ("latch.filter", 1e-3), ("gravity.sine", 3e-3)];
+    let early: &[_] = &[("dt_internal", 1e-5), ("latch.delay", -6e-4), ("latch.filter", 1e-3)];
+    let load: &[_] = &[("dt_internal", 1e-5), ("coulomb_motor.level", 1e-3), ("coulomb_motor.load", 0.3)];
+    for settings in [&[("dt_internal", 1e-5)], friction, sensors, late, early, load] {
         let mut i = started(settings);
         i.set_real(&[T], &[0.02]).unwrap();
         i.set_input_derivatives(&[T], &[1], &[0.3]).unwrap();

@@ -1,5 +1,6 @@
 //! Every effect of the crate against an independent plant: explicit Runge-Kutta with fine sub-steps, bristle friction, flank
-//! contact and continuous-time delays. The oracle and its script: `tests/plant/oracle.txt`, `scripts/blind/oracle.py`.
+//! contact and continuous-time delays. The oracle and its script: `tests/plant/oracle.txt`, `scripts/blind/oracle.py`. Beside it
+//! scipy's integrator with events, from the effects' equations: `scripts/oracles/further_effects.txt` and `.py`.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot read its oracle has failed")]
 
@@ -23,8 +24,8 @@ struct Case {
 }
 
 fn cases() -> Vec<Case> {
-    let text = include_str!("plant/oracle.txt");
-    let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+    let texts = [include_str!("plant/oracle.txt"), include_str!("../scripts/oracles/further_effects.txt")];
+    let mut lines = texts.iter().flat_map(|text| text.lines()).filter(|l| !l.starts_with('#'));
     let mut out = Vec::new();
     while let Some(head) = lines.next() {
         let f: Vec<&str> = head.split(' ').collect();

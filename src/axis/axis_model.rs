@@ -99,7 +99,7 @@ impl<S: Scalar> Axis<S> {
             let mut sum = push[0] + push[1];
             if sticks[0] || sticks[1] {
                 let level = |i: usize| {
-                    if sticks[i] { self.rest_level(i, sum, time) } else { S::default() }
+                    if sticks[i] { self.rest_level(i, sum, s, time) } else { S::default() }
                 };
                 sum = beyond(sum, level(0) + level(1));
             }
@@ -108,15 +108,15 @@ impl<S: Scalar> Axis<S> {
         }
         for i in 0..2 {
             if sticks[i] {
-                push[i] = beyond(push[i], self.rest_level(i, push[i], time));
+                push[i] = beyond(push[i], self.rest_level(i, push[i], s, time));
             }
         }
         [push[0] / self.full.parameters.i1, push[1] / self.full.parameters.i2]
     }
 
     /// Level of dry friction of inertia `i` at rest, against `push`, N.m.
-    fn rest_level(&self, i: usize, push: S, time: f64) -> S {
-        self.full.rest_level(i, push.re().signum(), time)
+    fn rest_level(&self, i: usize, push: S, s: &State<S>, time: f64) -> S {
+        self.full.rest_level(i, push.re().signum(), s, self.full.load(s, time), time)
     }
 }
 

@@ -109,6 +109,13 @@ impl<S: Scalar, L: Law> Balance<S, 1> for Lone<'_, S, L> {
     #[inline]
     fn pass(&self, [torque]: [S; 1], internals: &mut Self::Internals) -> Pass<S, 1> {
         let Self { mechanics, from, leg, end, per_torque: per, .. } = self;
+        // A friction alone does not grow with its load, or it were not alone; but it may have the derivative to that.
+        let load = if L::LOADED && S::HAS_DERIVATIVES && !mechanics.base.rigid {
+            let twist = |i: usize| self.free[i] - leg.length.answer[i] * torque;
+            (mechanics.base.k * twist(2) + mechanics.base.b * twist(3)).abs()
+        } else {
+            S::default()
+        };
         let moment = Moment {
             start: motion(&from.linear, L::COORDINATE),
             end: Motion { x: end.x - per.x * torque, v: end.v - per.v * torque },
@@ -116,6 +123,7 @@ impl<S: Scalar, L: Law> Balance<S, 1> for Lone<'_, S, L> {
             h: leg.length.step.h(),
             contact: from.modes.contact,
             slides: from.modes.slides(L::COORDINATE),
+            load,
         };
         let p = mechanics.effects.of(self.effect);
         let found = L::react(p, &mechanics.base, &moment, &mut internals[..L::MEMORY]);

@@ -4,7 +4,7 @@ use super::axis_model::State;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
 use super::propagator::{Compliance, Linear, Propagator};
-use crate::effects::{ActiveEffects, Base, Coordinate, Effect, Internal, Motion, Place, Settings, StepMotion};
+use crate::effects::{ActiveEffects, Base, Coordinate, Effect, Internal, Motion, Place, Settings, Slip, StepMotion};
 use crate::scalar::Scalar;
 
 /// Motion of motor, table and twist.
@@ -51,9 +51,9 @@ impl<S: Scalar> Mechanics<S> {
         h: f64,
     ) -> Self {
         let base = match structure {
-            Structure::TwoInertia => Base { k: parameters.k, b: parameters.b },
+            Structure::TwoInertia => Base { k: parameters.k, b: parameters.b, rigid: false },
             // A rigid axis has no coupling for an effect to act on.
-            Structure::Rigid => Base { k: S::default(), b: S::default() },
+            Structure::Rigid => Base { k: S::default(), b: S::default(), rigid: true },
         };
         let dry = PLACES.map(|place| on.dry().iter().any(|e| e.info().place == place));
         let backlash = on.forces().contains(&Effect::Backlash) && effects.of(Effect::Backlash)[0].re() > 0.0;
@@ -61,6 +61,8 @@ impl<S: Scalar> Mechanics<S> {
             (&[one], []) | ([], &[one]) => Some(one),
             _ => None,
         };
+        // A friction that grows with the torque transmitted hangs on the motion of both inertias.
+        let lone = lone.filter(|&one| base.rigid || !effects.is_loaded(one));
         let step = Propagator::new(&parameters, structure, scheme, h.into());
         let whole = Length { compliance: Some(step.compliance()), ..Length::new(step, lone) };
         Self { parameters, structure, scheme, effects, on, base, lone, dry, backlash, whole }
@@ -77,9 +79,25 @@ impl<S: Scalar> Mechanics<S> {
         Mechanics::new(self.parameters.plain(), self.structure, self.effects.plain(), self.on, self.scheme, h)
     }
 
-    /// Level up to which dry friction holds inertia `i` against a push that way, N.m.
-    pub fn rest_level(&self, i: usize, direction: f64, at: f64) -> S {
-        self.effects.dry_level(&self.on, PLACES[i], direction, S::default(), at)
+    /// Level up to which dry friction holds inertia `i` of a state against a push that way under a `load`, N.m.
+    pub fn rest_level(&self, i: usize, direction: f64, s: &State<S>, load: S, time: f64) -> S {
+        let position = motion(&s.linear, PLACES[i].coordinate()).x;
+        let slip = Slip { direction, speed: S::default(), position, load, time };
+        self.effects.dry_level(&self.on, PLACES[i], &slip)
+    }
+
+    /// The torque transmitted at a state, as an absolute value, N.m; zero where nothing grows with it.
+    pub fn load(&self, s: &State<S>, time: f64) -> S {
+        if !self.effects.counts_load(&self.on) {
+            return S::default();
+        }
+        self.effects.transmitted(&self.on, &self.base, &self.instant(s, time)).torque[0].abs()
+    }
+
+    /// A step of no length.
+    fn instant(&self, s: &State<S>, time: f64) -> StepMotion<S> {
+        let motions = motions(&s.linear);
+        StepMotion { start: motions, end: motions, time, h: S::default(), modes: s.modes }
     }
 
     /// Which inertias dry friction holds at rest.
@@ -121,10 +139,8 @@ impl<S: Scalar> Mechanics<S> {
 
     /// Recomputes the effects' torques at the state, as its modes are.
     pub fn refresh_force(&self, s: &mut State<S>, time: f64) {
-        let motions = motions(&s.linear);
-        let step = StepMotion { start: motions, end: motions, time, h: S::default(), modes: s.modes };
         let mut memory = s.memory.map(Internal::at);
-        s.force = self.effects.forces(&self.on, &self.base, &step, &mut memory).torque;
+        s.force = self.effects.forces(&self.on, &self.base, &self.instant(s, time), &mut memory).torque;
         for i in (0..2).filter(|i| s.modes.dry[*i] != 0 && self.dry[*i]) {
             s.friction[i] = S::default();
         }

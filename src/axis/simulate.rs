@@ -3,7 +3,7 @@
 use super::axis_model::{Axis, State};
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
-use crate::effects::{Effect, Ramp, Reading, SensorHistory, Settings, TorqueHistory};
+use crate::effects::{Place, Ramp, Reading, Settings, TorqueHistory};
 use crate::scalar::Scalar;
 
 /// What the torque does between two samples.
@@ -62,18 +62,18 @@ pub fn substeps(p: &Parameters<f64>, structure: Structure, effects: &Settings<f6
         return 1;
     }
     let mut rate: f64 = 0.0;
-    let inertia = if structure == Structure::TwoInertia { p.i2 } else { p.i1 + p.i2 };
     if structure == Structure::TwoInertia {
-        rate = rate.max((p.k * p.twist_mobility()).sqrt());
+        // The absolute value of what swings, which a friction that grows with its load sees, swings twice as fast.
+        let times = if on.dry().iter().any(|e| effects.is_loaded(*e)) { 2.0 } else { 1.0 };
+        rate = rate.max(times * (p.k * p.twist_mobility()).sqrt());
     }
     for &effect in on.forces() {
-        let p = effects.of(effect);
-        if effect == Effect::FlexibleMode && p[0] > 0.0 {
-            rate = rate.max((p[1] / p[0]).sqrt());
-        }
-        if effect == Effect::EndStop && inertia > 0.0 {
-            rate = rate.max((p[0] / inertia).sqrt());
-        }
+        let inertia = match (structure, effect.info().place) {
+            (Structure::Rigid, _) => p.i1 + p.i2,
+            (Structure::TwoInertia, Place::Table) => p.i2,
+            (Structure::TwoInertia, _) => p.i1,
+        };
+        rate = rate.max(effect.rate(effects.of(effect), inertia));
     }
     ((rate * dt / 0.25).ceil() as usize).clamp(1, 16)
 }
@@ -96,7 +96,7 @@ pub fn simulate<S: Scalar>(
     let axis = Axis::new(*parameters, structure, *effects, options.scheme, h);
     let mut state: State<S> = axis.state(initial[0], initial[1], initial[2], initial[3], options.start);
     let mut history = TorqueHistory::default();
-    let mut seen = SensorHistory::settled(state.reading(), options.dt);
+    let mut seen = effects.settle_sensors(axis.on(), state.reading(), options.dt);
     let mut response = Response { readings: Vec::with_capacity(n), accelerations: Vec::with_capacity(n) };
     for k in 0..n {
         let sample: Ramp<S> = options.hold.ramp(torque, k);
@@ -123,7 +123,7 @@ pub fn simulate<S: Scalar>(
             effects.transform_sensor(axis.on(), &seen, options.dt)
         });
         state = after;
-        seen.push(state.reading());
+        effects.push_sensors(axis.on(), &mut seen, state.reading());
     }
     response
 }

@@ -105,9 +105,11 @@ impl<S: Scalar> Axis<S> {
         for _ in 0..3 {
             let sticks = plain.sticks(from);
             let mut worst = (0.0, 0, 0);
+            // The friction that holds is one over the leg, so its level is that of the mean load.
+            let load = 0.5 * (plain.load(from, time) + plain.load(solved, leg.end));
             for i in (0..2).filter(|i| sticks[*i]) {
                 let hold = solved.friction[i];
-                let level = plain.rest_level(i, hold.signum(), time);
+                let level = plain.rest_level(i, hold.signum(), from, load, time);
                 let excess = hold.abs() - level;
                 if excess > 1e-12 * level.abs() && excess > worst.0 {
                     worst = (excess, i, hold.signum() as i8);

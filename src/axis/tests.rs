@@ -219,8 +219,8 @@ fn a_contact_that_lets_go_while_compressed_closes_again_only_when_it_pushes() {
 pub(crate) fn shown(effect: Effect) -> Settings {
     let mut s = Settings::default();
     let values: &[f64] = match effect {
-        Effect::CoulombMotor => &[0.006, 0.4, 2.0, 0.1],
-        Effect::CoulombTable => &[0.001, 0.4, 2.0, 0.1],
+        Effect::CoulombMotor => &[0.006, 0.4, 2.0, 0.1, 0.2],
+        Effect::CoulombTable => &[0.001, 0.4, 2.0, 0.1, 0.2],
         Effect::PreslidingMotor => &[0.006, 0.012, 1e-4],
         Effect::PreslidingTable => &[0.001, 0.01, 1e-5],
         Effect::ViscousMotor => &[1e-3, 0.2],
@@ -233,6 +233,7 @@ pub(crate) fn shown(effect: Effect) -> Settings {
         Effect::StiffnessDrift => &[0.3, 0.5],
         Effect::FrictionDrift => &[4e-3, 1e-4, 0.5],
         Effect::FlexibleMode => &[2e-6, 0.02, 1e-5],
+        Effect::MotorMode => &[5e-5, 0.2, 1e-4],
         Effect::Disturbance => &[1e-3, 7.0, 0.4],
         Effect::Unbalance => &[1e-3, 0.2],
         Effect::QuadraticDrag => &[1e-5],
@@ -244,6 +245,11 @@ pub(crate) fn shown(effect: Effect) -> Settings {
         Effect::SensorDelay => &[2.3e-3],
         Effect::LeadError => &[0.01, 0.02, 2.0, 0.5],
         Effect::EncoderQuantisation => &[0.01],
+        Effect::Gravity => &[2e-3, 1e-3, 1.5],
+        Effect::ExternalSpring => &[5e-3, 0.2],
+        Effect::DeadZone => &[5e-3],
+        Effect::PositionFriction => &[6e-3, 0.2, 0.3],
+        Effect::Latch => &[2.3e-3, 1.5e-3],
     };
     s.of_mut(effect).copy_from_slice(values);
     s

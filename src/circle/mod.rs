@@ -192,7 +192,7 @@ impl<'a> Loop<'a> {
         let axis = Axis::new(*p, set.structure, set.effects, Scheme::Exact, dt / per as f64);
         let theta = at / p.rho;
         let state = axis.state(theta, 0.0, theta, 0.0, 0.0);
-        let seen = SensorHistory::settled(state.reading(), dt);
+        let seen = set.effects.settle_sensors(axis.on(), state.reading(), dt);
         Self {
             axis,
             set,
@@ -235,7 +235,7 @@ impl<'a> Loop<'a> {
             };
             self.state = self.axis.advance(&self.state, ramp, time + j as f64 * h);
         }
-        self.seen.push(self.state.reading());
+        self.set.effects.push_sensors(self.axis.on(), &mut self.seen, self.state.reading());
     }
 }
 

@@ -11,7 +11,7 @@ use super::model::Model;
 use super::record::Record;
 use super::search::Tested;
 use crate::axis::{Axis, Scheme, substeps};
-use crate::effects::{Ramp, Reading, SensorHistory, TorqueHistory};
+use crate::effects::{Ramp, Reading, TorqueHistory};
 use crate::trace::Controller;
 
 /// A hypothesis closes as much as another when their closures differ by less than this.
@@ -128,7 +128,7 @@ impl UnderControl<'_> {
         let (on, effects) = (axis.on(), &model.effects);
         let [theta, omega] = self.start();
         let mut state = axis.state(theta, omega, theta, omega, record.start);
-        let mut seen = SensorHistory::settled(state.reading(), dt);
+        let mut seen = effects.settle_sensors(on, state.reading(), dt);
         let mut torques = TorqueHistory::default();
         let mut drive = crate::drive::Drive::default();
         let mut before = theta - omega * dt;
@@ -149,7 +149,7 @@ impl UnderControl<'_> {
                     if on.inputs().is_empty() { held } else { effects.transform_input(on, held, h, &mut torques) };
                 state = axis.advance(&state, ramp, record.time(k) + j as f64 * h);
             }
-            seen.push(state.reading());
+            effects.push_sensors(on, &mut seen, state.reading());
         }
     }
 

@@ -5,8 +5,7 @@ use super::record::Record;
 use super::response::{Column, Responder, States, Torques};
 use crate::axis::Structure;
 use crate::effects::{
-    ActiveEffects, Base, Effect, MEMORY, Modes, Motion, Place, Ramp, Reading, SensorHistory, Settings, StepMotion,
-    TorqueHistory,
+    ActiveEffects, Base, Effect, MEMORY, Modes, Motion, Place, Ramp, Reading, Settings, Slip, StepMotion, TorqueHistory,
 };
 
 /// The regression's column of one effect as set in `settings` (every other effect off).
@@ -46,7 +45,7 @@ pub fn free_decay(settings: &Settings, record: &Record, responder: &Responder<'_
                     let h = if k == 0 { 0.0 } else { record.dt };
                     let step =
                         StepMotion { start: still, end: still, time: record.time(k), h, modes: Modes::default() };
-                    let forces = settings.forces_along(&on, &Base { k: 0.0, b: 0.0 }, &step, &mut memory);
+                    let forces = settings.forces_along(&on, &Base { k: 0.0, b: 0.0, rigid: true }, &step, &mut memory);
                     [-forces.torque[0], -forces.torque[1]]
                 })
                 .collect();
@@ -71,14 +70,14 @@ fn sensor_change(settings: &Settings, on: &ActiveEffects, record: &Record, state
         let [theta1, omega1, theta2, omega2] = states.motion[k];
         Reading { theta1, omega1, theta2, omega2 }
     };
-    let mut history = SensorHistory::settled(reading(0), record.dt);
+    let mut history = settings.settle_sensors(on, reading(0), record.dt);
     (0..record.len())
         .map(|k| {
             if k > 0 {
-                history.push(reading(k));
+                settings.push_sensors(on, &mut history, reading(k));
             }
             let got = settings.transform_sensor(on, &history, record.dt);
-            let was = history.now();
+            let was = reading(k);
             [got.theta1 - was.theta1, got.omega1 - was.omega1, got.theta2 - was.theta2, got.omega2 - was.omega2]
         })
         .collect()
@@ -103,8 +102,8 @@ fn force_torques(
     states: &States,
 ) -> Torques {
     let base = match model.structure {
-        Structure::TwoInertia => Base { k: model.parameters.k, b: model.parameters.b },
-        Structure::Rigid => Base { k: 0.0, b: 0.0 },
+        Structure::TwoInertia => Base { k: model.parameters.k, b: model.parameters.b, rigid: false },
+        Structure::Rigid => Base { k: 0.0, b: 0.0, rigid: true },
     };
     let mut memory = [0.0; MEMORY];
     let place = effect.info().place;
@@ -116,7 +115,10 @@ fn force_torques(
                 let coordinate = usize::from(place == Place::Table);
                 let v = end[coordinate].v;
                 let direction = v.signum();
-                let level = settings.dry_level(on, place, direction, v.abs(), time);
+                let instant = StepMotion { start: end, end, time, h: 0.0, modes: Modes::default() };
+                let load = model.effects.transmitted(&model.effects.active(), &base, &instant).torque[0].abs();
+                let slip = Slip { direction, speed: v.abs(), position: end[coordinate].x, load, time };
+                let level = settings.dry_level(on, place, &slip);
                 let mut torque = [0.0; 2];
                 torque[coordinate] = -level * direction;
                 return torque;

@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::model::{LOOPS, Model};
 use super::record::Record;
 use crate::axis::{Axis, Hold, Scheme, Structure, substeps};
-use crate::effects::{Effect, MEMORY, Memory, Ramp, Reading, SensorHistory, Settings, TorqueHistory};
+use crate::effects::{Effect, MEMORY, Memory, Ramp, Reading, Settings, TorqueHistory};
 use crate::scalar::Scalar;
 
 /// Samples in a window that are compared.
@@ -87,7 +87,7 @@ pub fn run<S: Scalar>(
             model.effects.set_mode(&mut memory, twist, rate);
         }
         let mut state = axis.resume([theta1, omega1, theta2, omega2], &memory, time(window.begin));
-        let mut history = sensed.then(|| SensorHistory::settled(state.reading(), record.dt));
+        let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), record.dt));
         for k in window.begin..window.compared.end {
             if k == next {
                 memory = state.memory().map(&forget);
@@ -107,7 +107,7 @@ pub fn run<S: Scalar>(
                 state = axis.advance(&state, torque.at(k, j), time(k) + j as f64 * h);
             }
             if let Some(history) = &mut history {
-                history.push(state.reading());
+                model.effects.push_sensors(axis.on(), history, state.reading());
             }
         }
         if next >= window.compared.end {

@@ -1,10 +1,14 @@
 //! Coulomb friction with exact stick, a Stribeck peak and a direction asymmetry.
 //!
-//! `f = sgn(v)*level*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2))`; at rest any torque up to the level at zero
-//! speed. Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, eq. 3 and 6.
+//! `f = sgn(v)*(level + load*|t|)*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2))`; at rest any torque up to the level
+//! at zero speed. Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, eq. 3 and 6.
+//!
+//! `t` is the torque that the axis transmits: `K*(theta1 - theta2) + B*(omega1 - omega2)`; on a rigid axis, which transmits
+//! none, what its guides carry: the sum of the weights and springs on it (gravity, external spring, unbalance, loads). It
+//! is that of the same instant, solved with the step; at rest the level is that of the mean load over the step.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::DryFriction;
+use super::shapes::{DryFriction, Level, Slip};
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
@@ -22,26 +26,40 @@ const PARAMETERS: &[ParameterInfo] = &[
         "Direction asymmetry: level is level*(1 + asymmetry) forwards and level*(1 - asymmetry) backwards",
     )
     .start(Start::Share),
+    ParameterInfo::size("load", "1", 0.0, 10.0, "Growth of the level with the torque transmitted, per torque")
+        .nominal(0.1),
 ];
 const VARIANTS: &[Variant] = &[
     Variant { name: "", free: &[0] },
     Variant { name: "asymmetric", free: &[0, 3] },
     Variant { name: "Stribeck", free: &[0, 1, 2] },
+    Variant { name: "load-dependent", free: &[0, 4] },
 ];
-const EQUATION: &str =
-    "f = sgn(v)*level*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2)); |f| <= level*... at v = 0";
+/// The parameter `load`.
+const LOAD: usize = 4;
+const EQUATION: &str = "f = sgn(v)*(level + load*|t|)*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2)), t = \
+                        K*(theta1 - theta2) + B*(w1 - w2), rigid: weights and springs; |f| <= level*... at v = 0";
 const REFERENCE: &str = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994";
 
 #[inline]
-fn level<S: Scalar>(p: &[S], direction: f64, speed: S) -> (S, f64) {
-    let level = p[0] * (p[3] * direction + 1.0);
+fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
+    let factor = p[3] * slip.direction + 1.0;
+    let loaded = p[LOAD].re() != 0.0;
+    let level = if loaded || S::HAS_DERIVATIVES { p[0] + p[LOAD] * slip.load } else { p[0] } * factor;
+    let per_load = if loaded { p[LOAD].re() * factor.re() } else { 0.0 };
     if p[1].re() == 0.0 && (level.re() == 0.0 || !S::HAS_DERIVATIVES) {
-        return (level, 0.0);
+        return Level { per_load, constant: !loaded, ..Level::constant(level) };
     }
-    let ratio = speed / p[2];
+    let ratio = slip.speed / p[2];
     let peak = p[1] * (-ratio.squared()).exp();
-    let slope = -2.0 * ratio.re() / p[2].re() * peak.re() * level.re();
-    (level * (peak + 1.0), slope)
+    let per_speed = -2.0 * ratio.re() / p[2].re() * peak.re() * level.re();
+    Level {
+        level: level * (peak + 1.0),
+        per_speed,
+        per_position: 0.0,
+        per_load: per_load * (peak.re() + 1.0),
+        constant: !loaded && p[1].re() == 0.0,
+    }
 }
 
 /// Coulomb friction on the motor side.
@@ -61,8 +79,10 @@ impl DryFriction for CoulombMotor {
         variants: VARIANTS,
     };
 
-    fn level<S: Scalar>(p: &[S], direction: f64, speed: S, _at: f64) -> (S, f64) {
-        level(p, direction, speed)
+    const LOAD: Option<usize> = Some(LOAD);
+
+    fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
+        level(p, slip)
     }
 }
 
@@ -83,7 +103,9 @@ impl DryFriction for CoulombTable {
         variants: VARIANTS,
     };
 
-    fn level<S: Scalar>(p: &[S], direction: f64, speed: S, _at: f64) -> (S, f64) {
-        level(p, direction, speed)
+    const LOAD: Option<usize> = Some(LOAD);
+
+    fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
+        level(p, slip)
     }
 }

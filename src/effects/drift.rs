@@ -4,7 +4,7 @@
 //! `fade` it has changed by `rate*s`, `s = (1 - exp(-fade*t))/fade`; `fade = 0` is the straight line `s = t`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
-use super::shapes::{Base, DryFriction, Force, Internal, Moment, Reaction, mean_decay};
+use super::shapes::{Base, DryFriction, Force, Internal, Level, Moment, Reaction, Slip, mean_decay};
 use crate::scalar::Scalar;
 
 /// How fast a drift comes to rest.
@@ -72,8 +72,9 @@ impl DryFriction for FrictionDrift {
         ],
     };
 
-    fn level<S: Scalar>(p: &[S], _direction: f64, speed: S, at: f64) -> (S, f64) {
-        let s = drifted(p[2], at);
-        ((p[0] + p[1] * speed) * s, p[1].re() * s.re())
+    fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
+        let s = drifted(p[2], slip.time);
+        let per_speed = p[1].re() * s.re();
+        Level { per_speed, constant: per_speed == 0.0, ..Level::constant((p[0] + p[1] * slip.speed) * s) }
     }
 }

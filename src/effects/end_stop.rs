@@ -46,6 +46,10 @@ impl Force for EndStop {
         ],
     };
 
+    fn rate(p: &[f64], inertia: f64) -> f64 {
+        if inertia > 0.0 { (p[0] / inertia).sqrt() } else { 0.0 }
+    }
+
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let free = Reaction { bend: f64::INFINITY, ..Reaction::given(S::default()) };

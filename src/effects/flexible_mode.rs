@@ -1,15 +1,67 @@
-//! A third inertia on a spring and a damper behind the table.
+//! A third inertia on a spring and a damper, behind the table or on the motor's side: one law at two places.
 //!
-//! `I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0`; the table feels the spring. The third inertia is condensed
-//! out of the step: trapezoidal rule for it alone, driven by the trial motion of the table.
+//! `I3*a3 + damping*(w3 - w) + stiffness*(th3 - th) = 0`; the axis feels the spring. The third inertia is condensed out of
+//! the step: trapezoidal rule for it alone, driven by the trial motion of its place.
+//!
+//! Memory: twist `th - th3` and its rate, relative so that a turning axis loses no digits, and the acceleration `a3`.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia that swings")
+        .nominal(1e-6)
+        .start(Start::Grid(Scale::Inertia, &[0.03, 0.3])),
+    ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the axis and it").start(
+        Start::Grid(
+            Scale::Mode,
+            &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0],
+        ),
+    ),
+    ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the axis and it")
+        .start(Start::Grid(Scale::One, &[0.05])),
+];
+const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0, 1, 2] }];
+const REFERENCE: &str = "Den Hartog, Mechanical Vibrations, 1956, chapter 3";
+
+fn rate(p: &[f64]) -> f64 {
+    if p[0] > 0.0 { (p[1] / p[0]).sqrt() } else { 0.0 }
+}
+
+#[inline]
+fn torque<S: Scalar>(p: &[S], m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
+    let (inertia, k, b) = (p[0], p[1], p[2]);
+    if inertia.re() <= 0.0 && m.h.re() == 0.0 {
+        return Reaction::given(S::default());
+    }
+    // Absolute motion of the third inertia, from the relative memory.
+    let (e, rate) = (memory[0].start, memory[1].start);
+    if m.h.re() == 0.0 {
+        return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re(), bend: 0.0 };
+    }
+    let half = m.h * 0.5;
+    let w3 = m.start.v - rate;
+    // Trapezoid: w3+ = w3 + h/2*(a3 + a3+), e+ = e + (x2+ - x2) - h/2*(w3 + w3+), I3*a3 = b*(w2 - w3) + k*(th2 - th3).
+    let a3 = memory[2].start;
+    let free = w3 + half * a3;
+    let dx = m.end.x - m.start.x;
+    // I3*a3+ = b*(v2+ - w3+) + k*(e + dx - half*(w3 + w3+)), w3+ = free + half*a3+.
+    let rhs = b * (m.end.v - free) + k * (e + dx - half * (w3 + free));
+    let effective = inertia + half * b + half * half * k;
+    let a = rhs / effective;
+    let w = free + half * a;
+    let torque = inertia * a;
+    let [per_x, per_v] = [k, b].map(|c| c.re() / effective.re());
+    let h2 = half.re();
+    memory[0].reach(e + dx - half * (w3 + w), 1.0 - h2 * h2 * per_x, -h2 * h2 * per_v);
+    memory[1].reach(m.end.v - w, -h2 * per_x, 1.0 - h2 * per_v);
+    memory[2].reach(a, per_x, per_v);
+    let inertia = inertia.re();
+    Reaction { torque, stiffness: inertia * per_x, damping: inertia * per_v, bend: 0.0 }
+}
+
 /// A flexible mode behind the table.
-///
-/// Memory: twist `th2 - th3` and its rate, relative so that a turning axis loses no digits.
 pub struct FlexibleMode;
 
 impl Force for FlexibleMode {
@@ -20,53 +72,45 @@ impl Force for FlexibleMode {
         title: "A third inertia on a spring behind the table",
         equation: "I3*a3 + damping*(w3 - w2) + stiffness*(th3 - th2) = 0; f = damping*(w2 - w3) + stiffness*(th2 - th3)",
         signature: "r2 linear, a peak in one band of frequencies",
-        reference: "Den Hartog, Mechanical Vibrations, 1956, chapter 3",
-        parameters: &[
-            ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia behind the table")
-                .nominal(1e-6)
-                .start(Start::Grid(Scale::Inertia, &[0.03, 0.3])),
-            ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the table and it").start(
-                Start::Grid(
-                    Scale::Mode,
-                    &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0],
-                ),
-            ),
-            ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the table and it")
-                .start(Start::Grid(Scale::One, &[0.05])),
-        ],
+        reference: REFERENCE,
+        parameters: PARAMETERS,
         memory: 3,
-        variants: &[Variant { name: "", free: &[0, 1, 2] }],
+        variants: VARIANTS,
     };
+
+    fn rate(p: &[f64], _inertia: f64) -> f64 {
+        rate(p)
+    }
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
-        let (inertia, k, b) = (p[0], p[1], p[2]);
-        if inertia.re() <= 0.0 && m.h.re() == 0.0 {
-            return Reaction::given(S::default());
-        }
-        // Absolute motion of the third inertia, from the relative memory.
-        let (e, rate) = (memory[0].start, memory[1].start);
-        if m.h.re() == 0.0 {
-            return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re(), bend: 0.0 };
-        }
-        let half = m.h * 0.5;
-        let w3 = m.start.v - rate;
-        // Trapezoid: w3+ = w3 + h/2*(a3 + a3+), e+ = e + (x2+ - x2) - h/2*(w3 + w3+), I3*a3 = b*(w2 - w3) + k*(th2 - th3).
-        let a3 = memory[2].start;
-        let free = w3 + half * a3;
-        let dx = m.end.x - m.start.x;
-        // I3*a3+ = b*(v2+ - w3+) + k*(e + dx - half*(w3 + w3+)), w3+ = free + half*a3+.
-        let rhs = b * (m.end.v - free) + k * (e + dx - half * (w3 + free));
-        let effective = inertia + half * b + half * half * k;
-        let a = rhs / effective;
-        let w = free + half * a;
-        let torque = inertia * a;
-        let [per_x, per_v] = [k, b].map(|c| c.re() / effective.re());
-        let h2 = half.re();
-        memory[0].reach(e + dx - half * (w3 + w), 1.0 - h2 * h2 * per_x, -h2 * h2 * per_v);
-        memory[1].reach(m.end.v - w, -h2 * per_x, 1.0 - h2 * per_v);
-        memory[2].reach(a, per_x, per_v);
-        let inertia = inertia.re();
-        Reaction { torque, stiffness: inertia * per_x, damping: inertia * per_v, bend: 0.0 }
+        torque(p, m, memory)
+    }
+}
+
+/// A flexible mode on the motor's side.
+pub struct MotorMode;
+
+impl Force for MotorMode {
+    const INFO: EffectInfo = EffectInfo {
+        id: "motor_mode",
+        place: Place::Motor,
+        family: Family::FlexibleMode,
+        title: "A third inertia on a spring on the motor's side",
+        equation: "I3*a3 + damping*(w3 - w1) + stiffness*(th3 - th1) = 0; f = damping*(w1 - w3) + stiffness*(th1 - th3)",
+        signature: "r1 linear, a peak in one band of frequencies",
+        reference: REFERENCE,
+        parameters: PARAMETERS,
+        memory: 3,
+        variants: VARIANTS,
+    };
+
+    fn rate(p: &[f64], _inertia: f64) -> f64 {
+        rate(p)
+    }
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
+        torque(p, m, memory)
     }
 }

@@ -56,6 +56,11 @@ pub enum Family {
     Delay,
     Parameters,
     Sensor,
+    Gravity,
+    ExternalSpring,
+    DeadZone,
+    PositionFriction,
+    Latch,
 }
 
 impl Family {
@@ -79,6 +84,11 @@ impl Family {
             Self::Delay => "delay",
             Self::Parameters => "parameters",
             Self::Sensor => "sensor",
+            Self::Gravity => "gravity",
+            Self::ExternalSpring => "external_spring",
+            Self::DeadZone => "dead_zone",
+            Self::PositionFriction => "position_friction",
+            Self::Latch => "latch",
         }
     }
 }
@@ -130,7 +140,7 @@ pub enum Scale {
     Order,
     /// Frequencies in Hz, as the record lets them be seen.
     Frequency,
-    /// The table's travel: a share of it below the upper end, or (negative) above the lower end.
+    /// The travel: a share of it below the upper end, or (negative) above the lower end; 0.5 is its middle.
     Travel,
 }
 

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use super::shapes::{Base, Coordinate, DryFriction, Force, Internal, Moment, Reaction};
+use super::shapes::{Base, Coordinate, DryFriction, Force, Internal, Moment, Reaction, Slip};
 use crate::scalar::Scalar;
 
 /// A torque along the coordinate of its effect.
@@ -11,6 +11,8 @@ pub(crate) trait Law {
     const COORDINATE: Coordinate;
     /// Number of internal states.
     const MEMORY: usize;
+    /// Whether it may hang on the torque transmitted.
+    const LOADED: bool = false;
 
     /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
     fn react<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
@@ -56,14 +58,32 @@ pub(super) struct Sliding<D>(PhantomData<D>);
 impl<D: DryFriction> Law for Sliding<D> {
     const COORDINATE: Coordinate = D::INFO.place.coordinate();
     const MEMORY: usize = D::INFO.memory;
+    const LOADED: bool = D::LOAD.is_some();
 
     #[inline]
     fn react<S: Scalar>(p: &[S], _base: &Base<S>, moment: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         // On trial the velocity may have passed zero: the sliding law continues there until the event is found.
         let slides = moment.slides;
-        let (level, damping) = D::level(p, slides, moment.end.v * slides, moment.time);
-        // A level that hangs on the speed may do so in any way.
-        let bend = if damping == 0.0 { 0.0 } else { f64::INFINITY };
-        Reaction { torque: level * slides, stiffness: 0.0, damping, bend }
+        let found = D::level(p, &slip(moment));
+        // A level that hangs on the slip may do so in any way.
+        let bend = if found.constant { 0.0 } else { f64::INFINITY };
+        Reaction {
+            torque: found.level * slides,
+            stiffness: found.per_position * slides,
+            damping: found.per_speed,
+            bend,
+        }
+    }
+}
+
+/// The slip at the end of a step over which dry friction slides.
+#[inline]
+pub(super) fn slip<S: Scalar>(moment: &Moment<S>) -> Slip<S> {
+    Slip {
+        direction: moment.slides,
+        speed: moment.end.v * moment.slides,
+        position: moment.end.x,
+        load: moment.load,
+        time: moment.time,
     }
 }

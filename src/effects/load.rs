@@ -27,6 +27,8 @@ impl Force for LoadMotor {
         variants: VARIANTS,
     };
 
+    const CARRIED: bool = true;
+
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         Reaction::given(p[0])
@@ -49,6 +51,8 @@ impl Force for LoadTable {
         memory: 0,
         variants: VARIANTS,
     };
+
+    const CARRIED: bool = true;
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {

@@ -10,30 +10,37 @@ mod backlash;
 mod coulomb;
 mod coupling_hysteresis;
 mod cubic_stiffness;
+mod dead_zone;
 mod disturbance;
 mod drift;
+mod encoders;
 mod end_stop;
+mod external_spring;
 mod flexible_mode;
+mod gravity;
 mod info;
 mod input;
+mod latch;
 mod law;
 mod load;
+mod position_friction;
 mod presliding;
 mod quadratic_drag;
 mod ripple;
 mod sensor;
 mod settings;
 mod shapes;
+mod transmitted;
 mod viscous;
 
 pub use info::{EffectInfo, Family, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 use law::{Absent, Forced, Sliding};
 pub(crate) use law::{Law, WithLaw};
-pub use sensor::{Reading, SensorHistory};
+pub use sensor::{Reading, Seen, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
 pub(crate) use settings::{Forces, Internals, MEMORY, MEMORY_OF_ONE, PARAMETERS, StepMotion, effect_scope, memory_of};
-pub use shapes::{Base, DryFriction, Force, Input, Internal, Moment, Motion, Reaction, Sensor};
+pub use shapes::{Base, DryFriction, Force, Input, Internal, Level, Moment, Motion, Reaction, Sensor, Slip};
 pub(crate) use shapes::{Coordinate, Modes};
 
 use crate::scalar::Scalar;
@@ -102,10 +109,41 @@ macro_rules! effects {
                 match self { $(Self::$name => when!(sensor, $shape, true, false),)* }
             }
 
-            #[inline]
-            fn level<S: Scalar>(self, p: &[S], direction: f64, speed: S, at: f64) -> S {
+            /// The parameter of a dry friction that is its level's share of the torque transmitted.
+            #[must_use]
+            pub const fn load_parameter(self) -> Option<usize> {
                 match self {
-                    $(Self::$name => when!(dry, $shape, <$law>::level(p, direction, speed, at).0, S::default()),)*
+                    $(Self::$name => when!(dry, $shape, <$law as DryFriction>::LOAD, None),)*
+                }
+            }
+
+            /// True for a force that is constant or given by the position alone: see [`Force::CARRIED`].
+            #[must_use]
+            pub const fn is_carried(self) -> bool {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law as Force>::CARRIED, false),)*
+                }
+            }
+
+            /// True for a sensor effect that changes what the motor's encoder reads.
+            #[must_use]
+            pub const fn reads_motor(self) -> bool {
+                match self {
+                    $(Self::$name => when!(sensor, $shape, <$law as Sensor>::MOTOR, false),)*
+                }
+            }
+
+            /// Fastest vibration that it adds to an inertia of `inertia` kg.m2 at its place, rad/s.
+            pub(crate) fn rate(self, p: &[f64], inertia: f64) -> f64 {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law>::rate(p, inertia), { let _ = (p, inertia); 0.0 }),)*
+                }
+            }
+
+            #[inline]
+            fn level<S: Scalar>(self, p: &[S], slip: &Slip<S>) -> Level<S> {
+                match self {
+                    $(Self::$name => when!(dry, $shape, <$law>::level(p, slip), Level::constant(S::default())),)*
                 }
             }
 
@@ -134,15 +172,28 @@ macro_rules! effects {
                 }
             }
 
-            fn transform_sensor<S: Scalar>(
-                self,
-                p: &[S],
-                reading: Reading<S>,
-                history: &SensorHistory<S>,
-                dt: f64,
-            ) -> Reading<S> {
+            fn transform_sensor<S: Scalar>(self, p: &[S], reading: Reading<S>, seen: &Seen<'_, S>) -> Reading<S> {
                 match self {
-                    $(Self::$name => when!(sensor, $shape, <$law>::transform(p, reading, history, dt), reading),)*
+                    $(Self::$name => when!(sensor, $shape, <$law>::transform(p, reading, seen), reading),)*
+                }
+            }
+
+            fn late<S: Scalar>(self, p: &[S]) -> S {
+                match self {
+                    $(Self::$name => when!(sensor, $shape, <$law>::late(p), S::default()),)*
+                }
+            }
+
+            /// How far back a sensor effect reads, s.
+            pub(crate) fn reach(self, p: &[f64]) -> f64 {
+                match self {
+                    $(Self::$name => when!(sensor, $shape, <$law>::reach(p), 0.0),)*
+                }
+            }
+
+            fn filter<S: Scalar>(self, p: &[S]) -> S {
+                match self {
+                    $(Self::$name => when!(sensor, $shape, <$law>::filter(p), S::default()),)*
                 }
             }
         }
@@ -176,4 +227,10 @@ effects! {
     sensor SensorDelay = sensor::SensorDelay;
     sensor LeadError = sensor::LeadError;
     sensor EncoderQuantisation = sensor::EncoderQuantisation;
+    force Gravity = gravity::Gravity;
+    force ExternalSpring = external_spring::ExternalSpring;
+    input DeadZone = dead_zone::DeadZone;
+    dry PositionFriction = position_friction::PositionFriction;
+    force MotorMode = flexible_mode::MotorMode;
+    sensor Latch = latch::Latch;
 }

@@ -69,6 +69,8 @@ impl Force for Unbalance {
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
 
+    const CARRIED: bool = true;
+
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         torque(p[0], S::from(1.0), p[1], m.end.x)

@@ -1,7 +1,7 @@
 //! Effects on the positions' way out: what the measurement does, not the machine.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::Sensor;
+use super::shapes::{Sensor, mean_decay};
 use crate::scalar::Scalar;
 
 /// What the encoders read.
@@ -20,7 +20,7 @@ pub struct Reading<S> {
 /// Longest look back, in samples.
 const LONGEST: usize = 128;
 
-/// The motion of the last samples, newest last.
+/// The motion of the last samples, newest last, behind the filter of the encoders if there is one.
 #[derive(Debug, Clone, Copy)]
 pub struct SensorHistory<S> {
     past: [Reading<S>; LONGEST],
@@ -29,36 +29,50 @@ pub struct SensorHistory<S> {
     newest: usize,
     /// Newest samples that share one gap.
     uniform: usize,
+    /// The motion at the newest sample, before the filter.
+    motion: Reading<S>,
 }
 
 impl<S: Scalar> SensorHistory<S> {
-    /// A history in which the axis has coasted up to `reading` at its present speed, sampled every `dt` seconds.
+    /// A history in which the axis has coasted up to `motion` at its present speed, sampled every `dt` seconds; `filter` is
+    /// the encoders' time constant, s.
     #[must_use]
-    pub fn settled(reading: Reading<S>, dt: f64) -> Self {
-        let mut past = [reading; LONGEST];
+    pub(super) fn settled(motion: Reading<S>, dt: f64, filter: S) -> Self {
+        let mut past = [motion; LONGEST];
         for (k, slot) in past.iter_mut().enumerate() {
-            let ago = (LONGEST - 1 - k) as f64 * dt;
-            slot.theta1 = reading.theta1 - reading.omega1 * ago;
-            slot.theta2 = reading.theta2 - reading.omega2 * ago;
+            let ago = filter + (LONGEST - 1 - k) as f64 * dt;
+            slot.theta1 = motion.theta1 - motion.omega1 * ago;
+            slot.theta2 = motion.theta2 - motion.omega2 * ago;
         }
-        Self { past, gaps: [dt; LONGEST], newest: LONGEST - 1, uniform: LONGEST }
+        Self { past, gaps: [dt; LONGEST], newest: LONGEST - 1, uniform: LONGEST, motion }
     }
 
-    /// Appends the motion of the next sample, as long after the last one as that after its own.
-    pub fn push(&mut self, reading: Reading<S>) {
-        self.push_after(reading, self.gaps[self.newest]);
+    /// Time from the sample before to the newest, s.
+    pub(super) fn gap(&self) -> f64 {
+        self.gaps[self.newest]
     }
 
-    /// Appends the motion `gap` seconds after the last sample.
+    /// Appends the motion `gap` seconds after the last sample, through a filter of that time constant.
     #[allow(clippy::float_cmp, reason = "equal gaps are the same number, not a measurement")]
-    pub fn push_after(&mut self, reading: Reading<S>, gap: f64) {
+    pub(super) fn push(&mut self, motion: Reading<S>, gap: f64, filter: S) {
+        let reading = if filter.re() == 0.0 && !S::HAS_DERIVATIVES {
+            motion
+        } else {
+            let (was, last) = (self.motion, self.past[self.newest]);
+            let (theta1, omega1) =
+                filtered(filter, gap, [(was.theta1, was.omega1), (motion.theta1, motion.omega1)], last.omega1);
+            let (theta2, omega2) =
+                filtered(filter, gap, [(was.theta2, was.omega2), (motion.theta2, motion.omega2)], last.omega2);
+            Reading { theta1, omega1, theta2, omega2 }
+        };
+        self.motion = motion;
         self.uniform = if self.gaps[self.newest] == gap { (self.uniform + 1).min(LONGEST) } else { 1 };
         self.newest = (self.newest + 1) % LONGEST;
         self.past[self.newest] = reading;
         self.gaps[self.newest] = gap;
     }
 
-    /// The motion now.
+    /// The motion at the newest sample.
     #[must_use]
     pub fn now(&self) -> Reading<S> {
         self.past[self.newest]
@@ -78,9 +92,8 @@ impl<S: Scalar> SensorHistory<S> {
         })
     }
 
-    /// Angle and speed of the table side `delay` seconds ago, by cubic Hermite interpolation between samples.
-    fn table_at(&self, delay: S, dt: f64) -> (S, S) {
-        // The samples around it, how long before the later one, and the time between them.
+    /// Where between two samples the motion `delay` seconds ago lies, `dt` the time between samples where that is one.
+    fn between(&self, delay: S, dt: f64) -> Between<'_, S> {
         let steps = delay / dt;
         let whole = steps.re().max(0.0).floor().min((LONGEST - 2) as f64);
         let (mut k, mut s, mut gap) = (whole as usize, S::from(1.0) - (steps - whole), dt);
@@ -97,27 +110,107 @@ impl<S: Scalar> SensorHistory<S> {
             }
             s = S::from(1.0) - left / gap;
         }
-        let (after, before) = (&self.past[self.index(k)], &self.past[self.index(k + 1)]);
-        // s = 0 at `before`, 1 at `after`.
-        let rise = after.theta2 - before.theta2;
-        let (v0, v1) = (before.omega2 * gap, after.omega2 * gap);
-        // before + v0*s + (3*rise - 2*v0 - v1)*s^2 + (v0 + v1 - 2*rise)*s^3
+        Between { before: &self.past[self.index(k + 1)], after: &self.past[self.index(k)], s, gap }
+    }
+}
+
+/// An instant between two samples: `s` 0 at `before`, 1 at `after`, which come `gap` seconds later.
+struct Between<'a, S> {
+    before: &'a Reading<S>,
+    after: &'a Reading<S>,
+    s: S,
+    gap: f64,
+}
+
+impl<S: Scalar> Between<'_, S> {
+    /// Angle and speed there, by cubic Hermite interpolation of one encoder.
+    fn of(&self, encoder: impl Fn(&Reading<S>) -> (S, S)) -> (S, S) {
+        let (s, gap) = (self.s, self.gap);
+        let ((x0, v0), (x1, v1)) = (encoder(self.before), encoder(self.after));
+        let (rise, v0, v1) = (x1 - x0, v0 * gap, v1 * gap);
+        // x0 + v0*s + (3*rise - 2*v0 - v1)*s^2 + (v0 + v1 - 2*rise)*s^3
         let c2 = rise * 3.0 - v0 * 2.0 - v1;
         let c3 = v0 + v1 - rise * 2.0;
-        let theta = before.theta2 + s * (v0 + s * (c2 + s * c3));
+        let theta = x0 + s * (v0 + s * (c2 + s * c3));
         let omega = (v0 + s * (c2 * 2.0 + s * c3 * 3.0)) / gap;
         (theta, omega)
+    }
+}
+
+/// The motor's encoder.
+fn motor<S: Scalar>(r: &Reading<S>) -> (S, S) {
+    (r.theta1, r.omega1)
+}
+
+/// The table's encoder.
+fn table<S: Scalar>(r: &Reading<S>) -> (S, S) {
+    (r.theta2, r.omega2)
+}
+
+/// Angle and speed behind a first-order filter of time constant `filter`, `gap` s after it gave the speed `lagged`; the
+/// motion was at the first angle and speed then, and is at the second now.
+///
+/// The filtered speed `l` obeys `filter*l' = omega - l`, and the filtered angle is `theta - filter*l`. Between the samples
+/// the speed is the quadratic of its two ends and of the mean that the angle's rise gives, and the answer to that is exact.
+fn filtered<S: Scalar>(filter: S, gap: f64, motion: [(S, S); 2], lagged: S) -> (S, S) {
+    let [(from, v0), (to, v1)] = motion;
+    let lag = if filter.re() > 0.0 {
+        let x = S::from(gap) / filter;
+        let one = S::from(1.0);
+        let (decay, mean) = ((-x).exp(), mean_decay(x));
+        // v0 + rise*s + bow*(s^2 - s): the mean of s^2 - s is -1/6.
+        let rise = v1 - v0;
+        let bow = (v0 + rise * 0.5 - (to - from) / gap) * 6.0;
+        decay * lagged + v0 * (one - decay) + rise * (one - mean) + bow * (mean - (one - mean) * 2.0 / x)
+    } else {
+        v1
+    };
+    (to - filter * lag, lag)
+}
+
+/// The motion as the encoders see it: at an instant `late` seconds before the newest sample, or after it.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a, S> {
+    pub(super) history: &'a SensorHistory<S>,
+    pub(super) dt: f64,
+    pub(super) late: S,
+}
+
+impl<S: Scalar> Seen<'_, S> {
+    /// What both encoders read.
+    pub(super) fn reading(&self) -> Reading<S> {
+        let now = self.history.now();
+        if self.late.re() < 0.0 {
+            // What is to come is not known: the axis coasts.
+            let Reading { omega1, omega2, .. } = now;
+            return Reading { theta1: now.theta1 - omega1 * self.late, theta2: now.theta2 - omega2 * self.late, ..now };
+        }
+        if self.late.re() == 0.0 && !S::HAS_DERIVATIVES {
+            return now;
+        }
+        let at = self.history.between(self.late, self.dt);
+        let ((theta1, omega1), (theta2, omega2)) = (at.of(motor), at.of(table));
+        Reading { theta1, omega1, theta2, omega2 }
+    }
+
+    /// Angle and speed of the table side `delay` seconds before that instant.
+    fn table(&self, delay: S) -> (S, S) {
+        let ago = self.late + delay;
+        if ago.re() < 0.0 {
+            let (theta, omega) = table(&self.history.now());
+            return (theta - omega * ago, omega);
+        }
+        self.history.between(ago, self.dt).of(table)
     }
 }
 
 impl SensorHistory<f64> {
     /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
     pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
-        for (r, gap) in self.past.iter_mut().zip(&mut self.gaps) {
-            for value in [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2, gap] {
-                word(value);
-            }
+        for r in self.past.iter_mut().chain([&mut self.motion]) {
+            [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2].into_iter().for_each(&mut *word);
         }
+        self.gaps.iter_mut().for_each(&mut *word);
         for (count, most) in [(&mut self.newest, LONGEST - 1), (&mut self.uniform, LONGEST)] {
             let mut value = *count as f64;
             word(&mut value);
@@ -145,9 +238,13 @@ impl Sensor for SensorDelay {
         variants: &[Variant { name: "", free: &[0] }],
     };
 
-    fn transform<S: Scalar>(p: &[S], reading: Reading<S>, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
-        let (theta2, omega2) = history.table_at(p[0], dt);
+    fn transform<S: Scalar>(p: &[S], reading: Reading<S>, seen: &Seen<'_, S>) -> Reading<S> {
+        let (theta2, omega2) = seen.table(p[0]);
         Reading { theta2, omega2, ..reading }
+    }
+
+    fn reach(p: &[f64]) -> f64 {
+        p[0]
     }
 }
 
@@ -178,7 +275,7 @@ impl Sensor for LeadError {
         ],
     };
 
-    fn transform<S: Scalar>(p: &[S], r: Reading<S>, _history: &SensorHistory<S>, _dt: f64) -> Reading<S> {
+    fn transform<S: Scalar>(p: &[S], r: Reading<S>, _seen: &Seen<'_, S>) -> Reading<S> {
         let angle = p[2] * r.theta2 + p[3];
         let theta2 = r.theta2 * (p[0] + 1.0) + p[1] * angle.sin();
         let omega2 = r.omega2 * (p[0] + 1.0 + p[1] * p[2] * angle.cos());
@@ -203,7 +300,9 @@ impl Sensor for EncoderQuantisation {
         variants: &[Variant { name: "", free: &[0] }],
     };
 
-    fn transform<S: Scalar>(p: &[S], r: Reading<S>, _history: &SensorHistory<S>, _dt: f64) -> Reading<S> {
+    const MOTOR: bool = true;
+
+    fn transform<S: Scalar>(p: &[S], r: Reading<S>, _seen: &Seen<'_, S>) -> Reading<S> {
         let step = p[0].re();
         if step <= 0.0 {
             return r;
@@ -222,15 +321,15 @@ mod tests {
     fn a_cubic_motion_is_read_back_exactly_over_samples_of_many_lengths() {
         // Hermite interpolation is exact for cubics.
         let at = |t: f64| Reading { theta2: t * t * t - 2.0 * t, omega2: 3.0 * t * t - 2.0, ..Reading::default() };
-        let mut history = SensorHistory::settled(at(0.0), 0.1);
+        let mut history = SensorHistory::settled(at(0.0), 0.1, 0.0);
         let mut t = 0.0;
         for k in 0..30 {
             let gap = [0.1, 0.03, 0.07][k % 3];
             t += gap;
-            history.push_after(at(t), gap);
+            history.push(at(t), gap, 0.0);
         }
         for delay in [0.0, 0.05, 0.1, 0.234, 1.0] {
-            let (theta, omega) = history.table_at(delay, 0.1);
+            let (theta, omega) = history.between(delay, 0.1).of(table);
             let want = at(t - delay);
             assert!((theta - want.theta2).abs() < 1e-12 && (omega - want.omega2).abs() < 1e-11, "{delay}");
         }

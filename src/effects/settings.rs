@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use super::info::{Place, Role};
 use super::input::{Ramp, TorqueHistory};
-use super::sensor::{Reading, SensorHistory};
-use super::shapes::{Base, Coordinate, Internal, Modes, Moment, Motion, Reaction};
+use super::law::slip;
+use super::shapes::{Base, Coordinate, Internal, Modes, Moment, Motion, Reaction, Slip};
 use super::{EFFECTS, Effect, Law, WithLaw};
 use crate::scalar::Scalar;
 
@@ -203,11 +203,11 @@ impl<S: Scalar> Settings<S> {
         active
     }
 
-    /// Level of dry friction at a place, for motion in `direction` at `speed`, N.m.
-    pub(crate) fn dry_level(&self, on: &ActiveEffects, place: Place, direction: f64, speed: S, at: f64) -> S {
+    /// Level of dry friction at a place against a slip, N.m.
+    pub(crate) fn dry_level(&self, on: &ActiveEffects, place: Place, slip: &Slip<S>) -> S {
         let mut sum = S::default();
         for effect in on.dry().iter().filter(|e| e.info().place == place) {
-            sum += effect.level(self.of(*effect), direction, speed, at);
+            sum += effect.level(self.of(*effect), slip).level;
         }
         sum
     }
@@ -223,15 +223,27 @@ impl<S: Scalar> Settings<S> {
         memory: &mut Internals<S>,
     ) -> Forces<S> {
         let mut sum = Forces::default();
+        let none = S::default();
         for &effect in on.forces() {
             let coordinate = effect.info().place.coordinate();
-            sum.add(coordinate, &self.reaction(effect, base, &step.moment(coordinate), memory));
+            sum.add(coordinate, &self.reaction(effect, base, &step.moment(coordinate, none), memory));
         }
+        let load = if self.counts_load(on) { self.transmitted(on, base, step) } else { Forces::default() };
         for &effect in on.dry() {
             let coordinate = effect.info().place.coordinate();
-            let moment = step.moment(coordinate);
+            let moment = step.moment(coordinate, load.torque[0].abs());
             if moment.slides != 0.0 {
                 sum.add(coordinate, &self.reaction(effect, base, &moment, memory));
+                if self.is_loaded(effect) {
+                    // The level hangs on the motion of both inertias, through the load.
+                    let towards = if load.torque[0].re() < 0.0 { -moment.slides } else { moment.slides };
+                    let per = effect.level(self.of(effect), &slip(&moment)).per_load * towards;
+                    let row = usize::from(coordinate == Coordinate::Table);
+                    for column in 0..2 {
+                        sum.stiffness[row][column] += per * load.stiffness[0][column];
+                        sum.damping[row][column] += per * load.damping[0][column];
+                    }
+                }
             }
         }
         sum
@@ -284,22 +296,14 @@ impl<S: Scalar> Settings<S> {
     pub fn input_now(&self, on: &ActiveEffects, torque: S, history: &TorqueHistory<f64>) -> S {
         on.inputs.as_slice().iter().fold(torque, |torque, &e| e.input_now(self.of(e), torque, history))
     }
-
-    /// What the encoders read, from the motion up to now, sampled `dt` seconds apart.
-    pub fn transform_sensor(&self, on: &ActiveEffects, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
-        on.sensors
-            .as_slice()
-            .iter()
-            .fold(history.now(), |reading, &e| e.transform_sensor(self.of(e), reading, history, dt))
-    }
 }
 
 /// A law's torque.
-struct React<'a, S> {
-    p: &'a [S],
-    base: &'a Base<S>,
-    moment: &'a Moment<S>,
-    memory: &'a mut [Internal<S>],
+pub(super) struct React<'a, S> {
+    pub p: &'a [S],
+    pub base: &'a Base<S>,
+    pub moment: &'a Moment<S>,
+    pub memory: &'a mut [Internal<S>],
 }
 
 impl<S: Scalar> WithLaw for React<'_, S> {
@@ -330,7 +334,7 @@ pub(crate) struct StepMotion<S> {
 
 impl<S: Scalar> StepMotion<S> {
     #[inline]
-    fn moment(&self, coordinate: Coordinate) -> Moment<S> {
+    pub(super) fn moment(&self, coordinate: Coordinate, load: S) -> Moment<S> {
         let i = coordinate as usize;
         Moment {
             start: self.start[i],
@@ -339,6 +343,7 @@ impl<S: Scalar> StepMotion<S> {
             h: self.h,
             contact: self.modes.contact,
             slides: self.modes.slides(coordinate),
+            load,
         }
     }
 }
@@ -453,14 +458,14 @@ mod tests {
     /// Newton's method ends where the bend says that its step has left nothing.
     #[test]
     fn no_law_leaves_its_tangent_by_more_than_its_bend() {
-        let base = Base { k: 1.76e-2, b: 5.4e-4 };
+        let base = Base { k: 1.76e-2, b: 5.4e-4, rigid: false };
         let mut straight = 0;
         for &effect in EFFECTS.iter().filter(|e| e.is_force()) {
             let settings = shown(effect);
             for (x, v, contact) in [(0.3, 1.7, 0), (-0.2, -0.6, 1), (2.0, 0.4, -1)] {
                 let reaction = |dx: f64, dv: f64| {
                     let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
-                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact, slides: 0.0 };
+                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact, slides: 0.0, load: 0.0 };
                     settings.reaction(effect, &base, &moment, &mut [Internal::at(0.1); MEMORY])
                 };
                 let at = reaction(0.0, 0.0);
@@ -471,21 +476,21 @@ mod tests {
                 straight += usize::from(at.bend == 0.0);
             }
         }
-        // Loads, play, drift of stiffness, third inertia and disturbance, at each of the three.
-        assert!(straight >= 6 * 3, "{straight}");
+        // Loads, play, drift of stiffness, third inertias, spring to the frame and disturbance, at each of the three.
+        assert!(straight >= 8 * 3, "{straight}");
     }
 
     /// Newton's method takes the internal states along by their tangents.
     #[test]
     fn internal_states_have_their_tangents() {
-        let base = Base { k: 1.76e-2, b: 5.4e-4 };
+        let base = Base { k: 1.76e-2, b: 5.4e-4, rigid: false };
         let mut states = 0;
         for &effect in EFFECTS.iter().filter(|e| e.info().memory > 0) {
             let settings = shown(effect);
             for (x, v) in [(0.3, 1.7), (-0.2, -0.6), (2.0, 0.4)] {
                 let end = |dx: f64, dv: f64| {
                     let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
-                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact: 0, slides: 0.0 };
+                    let moment = Moment { start, end, time: 0.7, h: 1e-3, contact: 0, slides: 0.0, load: 0.0 };
                     let mut memory = [Internal::at(0.1); MEMORY];
                     settings.reaction(effect, &base, &moment, &mut memory);
                     memory
@@ -506,8 +511,8 @@ mod tests {
                 }
             }
         }
-        // Two bristles, a loop, and the third inertia's three, at each of the three motions.
-        assert_eq!(states, 6 * 3);
+        // Two bristles, a loop, and the third inertias' three, at each of the three motions.
+        assert_eq!(states, 9 * 3);
     }
 
     #[test]
@@ -518,10 +523,11 @@ mod tests {
             .filter(|(a, b)| a.is_kin_of(**b) && a.info().id < b.info().id)
             .map(|(a, b)| [a.info().id, b.info().id])
             .collect();
-        // Of DESIGN's table: dry friction by its level, viscous friction and loads in their two places; a drag's coefficient
-        // has another unit than a viscous one.
+        // Of DESIGN's table: dry friction by its level, viscous friction, loads and third inertias in their two places; a
+        // drag's coefficient has another unit than a viscous one.
         let dry = ["coulomb_motor", "coulomb_table", "presliding_motor", "presliding_table"];
-        let mut expected = vec![["viscous_motor", "viscous_table"], ["load_motor", "load_table"]];
+        let mut expected =
+            vec![["viscous_motor", "viscous_table"], ["load_motor", "load_table"], ["flexible_mode", "motor_mode"]];
         expected.extend((0..4).flat_map(|i| (i + 1..4).map(move |j| [dry[i], dry[j]])));
         found.sort_unstable();
         expected.sort_unstable();

@@ -2,7 +2,7 @@
 
 use super::info::{EffectInfo, Place};
 use super::input::{Ramp, TorqueHistory};
-use super::sensor::{Reading, SensorHistory};
+use super::sensor::{Reading, Seen};
 use crate::scalar::Scalar;
 
 /// What a torque from the motion sees and acts on.
@@ -56,6 +56,8 @@ pub struct Base<S> {
     pub k: S,
     /// Damping of the coupling, N.m.s/rad.
     pub b: S,
+    /// One inertia: there is no coupling that transmits a torque.
+    pub rigid: bool,
 }
 
 /// What holds over a leg of a step, until an event.
@@ -94,6 +96,8 @@ pub struct Moment<S> {
     pub contact: i8,
     /// The way dry friction slides there: -1 or +1, 0 at rest.
     pub slides: f64,
+    /// Torque that the axis transmits at the end, as an absolute value, N.m: what a friction that grows with its load sees.
+    pub load: S,
 }
 
 /// A torque that resists the motion, with its tangent for Newton's method.
@@ -150,13 +154,53 @@ impl<S: Scalar> Internal<S> {
     }
 }
 
+/// A slip under dry friction, or one that a push tries at rest.
+#[derive(Debug, Clone, Copy)]
+pub struct Slip<S> {
+    /// The way of it: -1 or +1.
+    pub direction: f64,
+    /// How fast, not negative, rad/s.
+    pub speed: S,
+    /// Where, rad.
+    pub position: S,
+    /// Torque that the axis transmits, as an absolute value, N.m.
+    pub load: S,
+    /// When, s.
+    pub time: f64,
+}
+
+/// The level of a dry friction, with its derivatives.
+#[derive(Debug, Clone, Copy)]
+pub struct Level<S> {
+    /// Torque against the slip, N.m.
+    pub level: S,
+    /// Its derivative to the speed, N.m.s/rad.
+    pub per_speed: f64,
+    /// Its derivative to the position, N.m/rad.
+    pub per_position: f64,
+    /// Its derivative to the load, 1.
+    pub per_load: f64,
+    /// Whether it is the same wherever and however fast the slip is.
+    pub constant: bool,
+}
+
+impl<S: Scalar> Level<S> {
+    /// A level that does not hang on the slip.
+    #[inline]
+    pub fn constant(level: S) -> Self {
+        Self { level, per_speed: 0.0, per_position: 0.0, per_load: 0.0, constant: true }
+    }
+}
+
 /// A set-valued friction: `torque = level*sgn(v)`, anything between while at rest.
 pub trait DryFriction {
     /// What the effect is.
     const INFO: EffectInfo;
+    /// The parameter that is the level's share of the load, if it has one.
+    const LOAD: Option<usize> = None;
 
-    /// The level for motion in `direction` (+1 or -1) at `speed >= 0` and time `at` s, and its derivative to the speed.
-    fn level<S: Scalar>(p: &[S], direction: f64, speed: S, at: f64) -> (S, f64);
+    /// The level for a slip.
+    fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S>;
 }
 
 /// A torque from the motion.
@@ -166,6 +210,13 @@ pub trait DryFriction {
 pub trait Force {
     /// What the effect is.
     const INFO: EffectInfo;
+    /// Whether the torque is constant or given by the position alone, as a weight's is: on a rigid axis the guides carry it.
+    const CARRIED: bool = false;
+
+    /// Fastest vibration that the effect adds to an inertia of `inertia` kg.m2 at its place, rad/s.
+    fn rate(_p: &[f64], _inertia: f64) -> f64 {
+        0.0
+    }
 
     /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
@@ -188,8 +239,26 @@ pub trait Sensor {
     /// What the effect is.
     const INFO: EffectInfo;
 
-    /// What is read now: `reading` as changed by the effects before, `history` the motion up to now, `dt` s apart.
-    fn transform<S: Scalar>(p: &[S], reading: Reading<S>, history: &SensorHistory<S>, dt: f64) -> Reading<S>;
+    /// Whether it changes what the motor's encoder reads, too.
+    const MOTOR: bool = false;
+
+    /// What is read at an instant: `reading` as changed by the effects before, `seen` the motion up to then.
+    fn transform<S: Scalar>(p: &[S], reading: Reading<S>, seen: &Seen<'_, S>) -> Reading<S>;
+
+    /// How long before the log's stamp both encoders are read, s; negative after it.
+    fn late<S: Scalar>(_p: &[S]) -> S {
+        S::default()
+    }
+
+    /// How far back it reads, s.
+    fn reach(_p: &[f64]) -> f64 {
+        0.0
+    }
+
+    /// Time constant of a first-order filter before both encoders are read, s.
+    fn filter<S: Scalar>(_p: &[S]) -> S {
+        S::default()
+    }
 }
 
 /// `(1 - exp(-a))/a`, with its limit at zero.

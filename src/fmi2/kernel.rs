@@ -122,7 +122,7 @@ impl Kernel {
             axis,
             state,
             torques: TorqueHistory::default(),
-            readings: SensorHistory::settled(state.reading(), h),
+            readings: axis.effects().settle_sensors(axis.on(), state.reading(), h),
         }
     }
 
@@ -180,13 +180,13 @@ impl Kernel {
                 self.torques = TorqueHistory::settled(values.of(Slot::Torque));
             }
             if axis.on().sensors() != self.axis.on().sensors() {
-                self.readings = SensorHistory::settled(self.state.reading(), h);
+                self.readings = axis.effects().settle_sensors(axis.on(), self.state.reading(), h);
             }
         } else {
             let [x1, v1, x2, v2] = values.initial();
             self.state = axis.state(x1, v1, x2, v2, self.time);
             self.torques = TorqueHistory::default();
-            self.readings = SensorHistory::settled(self.state.reading(), h);
+            self.readings = axis.effects().settle_sensors(axis.on(), self.state.reading(), h);
         }
         self.axis = axis;
         self.stale = false;
@@ -256,22 +256,25 @@ impl Kernel {
     fn run_with_histories(&mut self, from: f64, torque: f64, count: u32, h: f64) -> Result<(), StepError> {
         let (axis, effects) = (&self.axis, self.axis.effects());
         let too_long = |name, delay| StepError::Delay { name, delay, internal: h };
-        for &effect in axis.on().inputs().iter().chain(axis.on().sensors()) {
+        for &effect in axis.on().inputs() {
             let delay = effects.of(effect)[0];
-            match effect {
-                Effect::Delay if !self.torques.covers(delay, h) => return Err(too_long("delay.time", delay)),
-                Effect::SensorDelay if !self.readings.covers(delay) => {
-                    return Err(too_long("sensor_delay.time", delay));
-                }
-                _ => {}
+            if effect == Effect::Delay && !self.torques.covers(delay, h) {
+                return Err(too_long("delay.time", delay));
             }
+        }
+        let reach = |effect: Effect| effect.reach(effects.of(effect));
+        let all: f64 = axis.on().sensors().iter().map(|&e| reach(e)).sum();
+        if all > 0.0 && !self.readings.covers(all) {
+            let of_table =
+                axis.on().sensors().contains(&Effect::SensorDelay) && reach(Effect::SensorDelay) >= 0.5 * all;
+            return Err(too_long(if of_table { "sensor_delay.time" } else { "latch.delay" }, all));
         }
         for j in 0..count {
             let at = f64::from(j) * h;
             let ramp = Ramp { start: torque + self.rate * at, end: torque + self.rate * (at + h) };
             let ramp = effects.transform_input(axis.on(), ramp, h, &mut self.torques);
             self.state = axis.advance(&self.state, ramp, from + at);
-            self.readings.push_after(self.state.reading(), h);
+            effects.push_sensors_after(axis.on(), &mut self.readings, self.state.reading(), h);
         }
         Ok(())
     }
@@ -321,9 +324,12 @@ impl Kernel {
         self.prepare()?;
         let on = self.axis.on();
         let same = |slot: Slot| self.output(slot as usize);
+        let (late, filter) = (self.axis.effects().late(on), self.axis.effects().filter(on));
         Ok(match index {
+            // Angles read early are not the integral of the speeds.
+            THETA1 | THETA2 | X2 if late < 0.0 => self.difference(index),
             THETA1 => same(Slot::Omega1),
-            OMEGA1 => same(Slot::Alpha1),
+            OMEGA1 if late == 0.0 && filter == 0.0 => same(Slot::Alpha1),
             THETA2 => same(Slot::Omega2),
             X2 => same(Slot::Omega2) * self.values.of(Slot::Rho),
             OMEGA2 if on.sensors().is_empty() => same(Slot::Alpha2),
@@ -389,11 +395,11 @@ impl Kernel {
         let (state, readings);
         if self.live {
             state = State::lift(&self.state);
-            readings = SensorHistory::settled(state.reading(), h);
+            readings = axis.effects().settle_sensors(axis.on(), state.reading(), h);
         } else {
             let [x1, v1, x2, v2] = values.initial();
             state = axis.state(x1, v1, x2, v2, self.time);
-            readings = SensorHistory::settled(state.reading(), h);
+            readings = axis.effects().settle_sensors(axis.on(), state.reading(), h);
         }
         let scene = Scene { axis: &axis, state: &state, readings: &readings, rho, torque, time: self.time };
         unknown(&mut |index| scene.output(index, &self.torques).eps[0]);

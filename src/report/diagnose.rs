@@ -286,6 +286,13 @@ fn meaning(family: Family) -> &'static str {
         Family::Disturbance => {
             "On a machine: chatter, a pump, a neighbouring machine; look for what turns at this frequency."
         }
+        Family::Gravity => "On a machine: a weight on a hinge, an arm, or a counterweight that is not in balance.",
+        Family::ExternalSpring => "On a machine: a way cover, hoses or cables, a gas spring.",
+        Family::DeadZone => "On a machine: an amplifier or a valve that does not answer to small commands.",
+        Family::PositionFriction => "On a machine: a tight spot of the screw, a damaged rail, a bent shaft.",
+        Family::Latch => {
+            "On a machine: torque and encoders logged at different instants of the cycle, or behind different filters."
+        }
         Family::EndStop => "On a machine: the travel limit or a bellows that touches; move the test away from it.",
         Family::Saturation => "On a machine: the torque limit of the drive; drive less, or raise the limit.",
         Family::ActuatorLag => "On a machine: the bandwidth of the current loop.",

@@ -221,8 +221,9 @@ pub fn depends_at_start(output: usize, known: usize) -> bool {
     // The table's motion: its own start values, the motor's on a rigid axis, and what the encoder makes of both.
     let table = is(&[Slot::Structure, Slot::Theta1Start, Slot::Omega1Start, Slot::Theta2Start, Slot::Omega2Start]);
     match (output, effect_of(known)) {
-        (THETA1, Some((effect, _))) => effect == Effect::EncoderQuantisation,
-        (THETA1, None) => is(&[Slot::Theta1Start]),
+        (THETA1, Some((effect, _))) => effect.reads_motor(),
+        // The speed, where the encoders are read late or early.
+        (THETA1, None) => is(&[Slot::Theta1Start, Slot::Omega1Start]),
         (OMEGA1, effect) => effect.is_none() && is(&[Slot::Omega1Start]),
         (THETA2 | OMEGA2 | X2, Some((effect, _))) => effect.info().place == Place::Sensor,
         (THETA2 | OMEGA2, None) => table,

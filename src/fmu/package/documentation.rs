@@ -133,6 +133,8 @@ fn stepping() -> Markup {
              where its first derivative is set (fmi2SetRealInputDerivatives), for that step. When T jumps, the accelerations \
              are evaluated anew before the step. Delays remember the last 255 internal steps ("
             code { "sensor_delay" }
+            " and "
+            code { "latch" }
             ": 127); a step that would need more is refused."
         }
     }

@@ -1,0 +1,39 @@
+//! What the encoders read of a motion, under all effects on its way out.
+
+use super::sensor::{Reading, Seen, SensorHistory};
+use super::settings::{ActiveEffects, Settings};
+use crate::scalar::Scalar;
+
+impl<S: Scalar> Settings<S> {
+    /// A history of the encoders in which the axis has coasted up to `motion`, sampled every `dt` seconds.
+    #[must_use]
+    pub fn settle_sensors(&self, on: &ActiveEffects, motion: Reading<S>, dt: f64) -> SensorHistory<S> {
+        SensorHistory::settled(motion, dt, self.filter(on))
+    }
+
+    /// Appends the motion of the next sample, as long after the last one as that after its own.
+    pub fn push_sensors(&self, on: &ActiveEffects, history: &mut SensorHistory<S>, motion: Reading<S>) {
+        self.push_sensors_after(on, history, motion, history.gap());
+    }
+
+    /// Appends the motion `gap` seconds after the last sample.
+    pub fn push_sensors_after(&self, on: &ActiveEffects, history: &mut SensorHistory<S>, motion: Reading<S>, gap: f64) {
+        history.push(motion, gap, self.filter(on));
+    }
+
+    /// What the encoders read, from the motion up to now, sampled `dt` seconds apart.
+    pub fn transform_sensor(&self, on: &ActiveEffects, history: &SensorHistory<S>, dt: f64) -> Reading<S> {
+        let seen = Seen { history, dt, late: self.late(on) };
+        on.sensors().iter().fold(seen.reading(), |reading, &e| e.transform_sensor(self.of(e), reading, &seen))
+    }
+
+    /// How long before the log's stamp both encoders are read, s; negative after it.
+    pub(crate) fn late(&self, on: &ActiveEffects) -> S {
+        on.sensors().iter().fold(S::default(), |sum, &e| sum + e.late(self.of(e)))
+    }
+
+    /// Time constant of the filter before both encoders are read, s.
+    pub(crate) fn filter(&self, on: &ActiveEffects) -> S {
+        on.sensors().iter().fold(S::default(), |sum, &e| sum + e.filter(self.of(e)))
+    }
+}

@@ -1,0 +1,38 @@
+//! A spring from the table to the frame: way cover, hose, gas spring. `f = stiffness*(theta2 - rest)`.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// A spring to the frame.
+pub struct ExternalSpring;
+
+impl Force for ExternalSpring {
+    const INFO: EffectInfo = EffectInfo {
+        id: "external_spring",
+        place: Place::Table,
+        family: Family::ExternalSpring,
+        title: "A spring from the table to the frame: way cover, hose, gas spring",
+        equation: "f = stiffness*(theta2 - rest)",
+        signature: "r2 a straight line over theta2, with or without motion",
+        reference: "Hooke, De Potentia Restitutiva, 1678",
+        parameters: &[
+            ParameterInfo::size("stiffness", "N.m/rad", 0.0, 1e9, "Stiffness of the spring").nominal(1e-2),
+            // The middle of the travel.
+            ParameterInfo::shape("rest", "rad", 0.0, -1e6, 1e6, "Angle of the table where it has no tension")
+                .start(Start::Grid(Scale::Travel, &[0.5])),
+        ],
+        memory: 0,
+        variants: &[Variant { name: "", free: &[0, 1] }],
+    };
+    const CARRIED: bool = true;
+
+    fn rate(p: &[f64], inertia: f64) -> f64 {
+        if inertia > 0.0 { (p[0] / inertia).sqrt() } else { 0.0 }
+    }
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
+        Reaction { torque: p[0] * (m.end.x - p[1]), stiffness: p[0].re(), damping: 0.0, bend: 0.0 }
+    }
+}

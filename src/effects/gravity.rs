@@ -1,0 +1,50 @@
+//! A weight on a hinge, or a counterweight: `f = sine*sin(ratio*theta2) + cosine*cos(ratio*theta2)`.
+//!
+//! A mass `m` at the distance `l` and the angle `a` of its hinge gives `m*g*l*sin(ratio*theta2 + a)`: `sine` is that of
+//! `a = 0`, hanging straight down at `theta2 = 0`, `cosine` that of a horizontal arm there.
+
+use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use crate::scalar::Scalar;
+
+/// Gravity on a hinge.
+pub struct Gravity;
+
+impl Force for Gravity {
+    const INFO: EffectInfo = EffectInfo {
+        id: "gravity",
+        place: Place::Table,
+        family: Family::Gravity,
+        title: "A weight on a hinge, or a counterweight",
+        equation: "f = sine*sin(ratio*theta2) + cosine*cos(ratio*theta2)",
+        signature: "r2 one slow sine of theta2, with or without motion",
+        reference: "Craig, Introduction to Robotics, 2005, section 6.8: G(theta)",
+        parameters: &[
+            ParameterInfo::size("sine", "N.m", -1e6, 1e6, "Mass times gravity times lever, hanging at theta2 = 0")
+                .nominal(1e-2),
+            ParameterInfo::size("cosine", "N.m", -1e6, 1e6, "The same of a lever that is horizontal at theta2 = 0")
+                .nominal(1e-2),
+            ParameterInfo::shape("ratio", "1/rad", 1.0, 1e-6, 1e6, "Angle of the hinge per angle of the table side"),
+        ],
+        memory: 0,
+        variants: &[Variant { name: "", free: &[0, 1] }],
+    };
+    const CARRIED: bool = true;
+
+    fn rate(p: &[f64], inertia: f64) -> f64 {
+        if inertia > 0.0 { (p[0].hypot(p[1]) * p[2] / inertia).sqrt() } else { 0.0 }
+    }
+
+    #[inline]
+    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
+        let angle = p[2] * m.end.x;
+        let (sine, cosine) = angle.sin_cos();
+        let (a, b, ratio) = (p[0].re(), p[1].re(), p[2].re());
+        Reaction {
+            torque: p[0] * sine + p[1] * angle.cos(),
+            stiffness: ratio * (a * cosine - b * sine.re()),
+            damping: 0.0,
+            bend: ratio * ratio * a.hypot(b),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The torque that the axis transmits: what a friction that grows with its load sees.
+
+use super::Effect;
+use super::settings::{ActiveEffects, Forces, React, Settings, StepMotion};
+use super::shapes::{Base, Coordinate, Reaction};
+use crate::scalar::Scalar;
+
+impl<S: Scalar> Settings<S> {
+    /// Whether the level of an effect grows with the torque transmitted.
+    pub(crate) fn is_loaded(&self, effect: Effect) -> bool {
+        effect.load_parameter().is_some_and(|i| self.of(effect)[i].re() != 0.0)
+    }
+
+    /// Whether the torque transmitted counts: a dry friction grows with it, or would by a derivative.
+    pub(crate) fn counts_load(&self, on: &ActiveEffects) -> bool {
+        on.dry().iter().any(|e| e.load_parameter().is_some() && (S::HAS_DERIVATIVES || self.is_loaded(*e)))
+    }
+
+    /// The torque that the axis transmits at the end of a step: through its coupling, or on a rigid axis what the guides
+    /// carry, of torques that are constant or given by the position.
+    pub(crate) fn transmitted(&self, on: &ActiveEffects, base: &Base<S>, step: &StepMotion<S>) -> Forces<S> {
+        let mut sum = Forces::default();
+        if !base.rigid {
+            let twist = &step.end[Coordinate::Twist as usize];
+            let (stiffness, damping) = (base.k.re(), base.b.re());
+            let torque = base.k * twist.x + base.b * twist.v;
+            // Its row is that of the motor; the table's is the same turned round.
+            sum.add(Coordinate::Twist, &Reaction { torque, stiffness, damping, bend: f64::INFINITY });
+            return sum;
+        }
+        for &effect in on.forces().iter().filter(|e| e.is_carried()) {
+            let moment = step.moment(effect.info().place.coordinate(), S::default());
+            let found = effect.with_law(React { p: self.of(effect), base, moment: &moment, memory: &mut [] });
+            // One body: what acts anywhere acts on the row of the motor.
+            sum.torque[0] += found.torque;
+            sum.stiffness[0][0] += found.stiffness;
+            sum.damping[0][0] += found.damping;
+        }
+        sum
+    }
+}
