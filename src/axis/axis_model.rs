@@ -114,6 +114,41 @@ impl<S: Scalar> Axis<S> {
         [push[0] / self.full.parameters.i1, push[1] / self.full.parameters.i2]
     }
 
+    /// Gives each inertia an impulse at the state, N.m.s, and returns what took effect: an inertia that dry friction holds
+    /// takes none of an impulse that, spread over `span` s, stays below what its friction can still hold.
+    ///
+    /// A correction of the motion enters here as the torque that it is, so that friction at rest meets it as it meets any
+    /// torque (a rigid axis takes both on its one inertia).
+    pub fn kick(&self, s: &mut State<S>, impulse: [S; 2], span: f64, time: f64) -> [S; 2] {
+        let mut taken = impulse;
+        let sticks = self.full.sticks(s);
+        for i in 0..2 {
+            let push = impulse[i].re() / span + s.friction[i].re();
+            if sticks[i] && push.abs() <= self.rest_level(i, S::from(push), s, time).re() {
+                taken[i] = S::default();
+            }
+        }
+        let p = &self.full.parameters;
+        match self.full.structure {
+            Structure::Rigid => s.linear[1] += (taken[0] + taken[1]) / (p.i1 + p.i2),
+            Structure::TwoInertia => {
+                let (motor, table) = (taken[0] / p.i1, taken[1] / p.i2);
+                s.linear[1] += motor;
+                s.linear[3] += motor - table;
+            }
+        }
+        let moves = [mode(s.omega1()), mode(s.omega2())];
+        for i in 0..2 {
+            if !sticks[i] || taken[i].re() != 0.0 {
+                s.modes.dry[i] = moves[i];
+            }
+        }
+        if !self.full.on.motion_is_linear() {
+            self.full.refresh_force(s, time);
+        }
+        taken
+    }
+
     /// Level of dry friction of inertia `i` at rest, against `push`, N.m.
     fn rest_level(&self, i: usize, push: S, s: &State<S>, time: f64) -> S {
         self.full.rest_level(i, push.re().signum(), s, self.full.load(s, time), time)

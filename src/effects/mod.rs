@@ -39,7 +39,8 @@ use law::{Absent, Forced, Sliding};
 pub(crate) use law::{Law, WithLaw};
 pub use sensor::{Reading, Seen, SensorHistory};
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
-pub(crate) use settings::{Forces, Internals, MEMORY, MEMORY_OF_ONE, PARAMETERS, StepMotion, effect_scope, memory_of};
+pub use settings::MEMORY;
+pub(crate) use settings::{Forces, Internals, MEMORY_OF_ONE, PARAMETERS, StepMotion, effect_scope, memory_of};
 pub use shapes::{Base, DryFriction, Force, Input, Internal, Level, Moment, Motion, Reaction, Sensor, Slip};
 pub(crate) use shapes::{Coordinate, Modes};
 

@@ -42,7 +42,8 @@ pub(crate) fn memory_of(effect: Effect) -> Range<usize> {
 
 /// Number of effect parameters in all.
 pub(crate) const PARAMETERS: usize = OFFSETS[COUNT];
-pub(crate) const MEMORY: usize = MEMORY_OFFSETS[COUNT];
+/// Number of internal states of all effects.
+pub const MEMORY: usize = MEMORY_OFFSETS[COUNT];
 /// Most internal states of one effect.
 pub(crate) const MEMORY_OF_ONE: usize = {
     let (mut most, mut i) = (0, 0);
@@ -273,7 +274,7 @@ impl<S: Scalar> Settings<S> {
 
     /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
     #[cfg(feature = "cli")]
-    pub(crate) fn set_mode(&self, memory: &mut Memory<S>, twist: S, rate: S) {
+    pub fn set_mode(&self, memory: &mut Memory<S>, twist: S, rate: S) {
         let (p, at) = (self.of(Effect::FlexibleMode), MEMORY_OFFSETS[Effect::FlexibleMode as usize]);
         let pull = p[1] * twist + p[2] * rate;
         memory[at] = twist;
@@ -283,7 +284,7 @@ impl<S: Scalar> Settings<S> {
 
     /// Puts an effect that loops where it stands in its loop, -1 to 1.
     #[cfg(feature = "cli")]
-    pub(crate) fn set_loop(memory: &mut Memory<S>, effect: Effect, share: S) {
+    pub fn set_loop(memory: &mut Memory<S>, effect: Effect, share: S) {
         memory[MEMORY_OFFSETS[effect as usize]] = share;
     }
 
