@@ -196,6 +196,22 @@ fn an_axis_slides_down_its_slope_or_stays_by_its_coefficient_of_friction() {
 }
 
 #[test]
+fn a_rigid_axis_breaks_away_beyond_the_friction_of_both_its_sides() {
+    let effects = with(&[(Effect::CoulombMotor, &[0.02]), (Effect::CoulombTable, &[0.01])]);
+    let axis = rigid(effects, Scheme::NEWMARK, 1e-3);
+    let mut s = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    // Below the sum either way and back again nothing moves, whichever side would have slipped alone.
+    for (k, torque) in [0.015, 0.025, 0.0, -0.025, 0.029, -0.029, 0.012, -0.005].iter().cycle().take(400).enumerate() {
+        s = axis.advance(&s, Ramp::held(*torque), k as f64 * 1e-3);
+        assert!(s.theta1().abs() < 1e-15 && s.omega1().abs() < 1e-15, "{k} {torque}: {} {}", s.theta1(), s.omega1());
+    }
+    for k in 0..100 {
+        s = axis.advance(&s, Ramp::held(-0.05), 0.4 + f64::from(k) * 1e-3);
+    }
+    assert!((s.omega1() + 0.02 / INERTIA * 0.1).abs() < 1e-12, "{}", s.omega1());
+}
+
+#[test]
 fn friction_grows_with_what_the_coupling_transmits() {
     // Once the twist is still, both inertias run at a: t = I2*a at a frictionless table, so T = (I1 + I2)*a + load*I2*a;
     // with the friction on the table t*(1 - load) = I2*a and T = I1*a + t.

@@ -29,6 +29,8 @@ pub struct SensorHistory<S> {
     newest: usize,
     /// Newest samples that share one gap.
     uniform: usize,
+    /// Samples since the history began.
+    recorded: usize,
     /// The motion at the newest sample, before the filter.
     motion: Reading<S>,
 }
@@ -44,7 +46,7 @@ impl<S: Scalar> SensorHistory<S> {
             slot.theta1 = motion.theta1 - motion.omega1 * ago;
             slot.theta2 = motion.theta2 - motion.omega2 * ago;
         }
-        Self { past, gaps: [dt; LONGEST], newest: LONGEST - 1, uniform: LONGEST, motion }
+        Self { past, gaps: [dt; LONGEST], newest: LONGEST - 1, uniform: LONGEST, recorded: 0, motion }
     }
 
     /// Time from the sample before to the newest, s.
@@ -66,6 +68,7 @@ impl<S: Scalar> SensorHistory<S> {
             Reading { theta1, omega1, theta2, omega2 }
         };
         self.motion = motion;
+        self.recorded = (self.recorded + 1).min(LONGEST);
         self.uniform = if self.gaps[self.newest] == gap { (self.uniform + 1).min(LONGEST) } else { 1 };
         self.newest = (self.newest + 1) % LONGEST;
         self.past[self.newest] = reading;
@@ -92,8 +95,8 @@ impl<S: Scalar> SensorHistory<S> {
         })
     }
 
-    /// Where between two samples the motion `delay` seconds ago lies, `dt` the time between samples where that is one.
-    fn between(&self, delay: S, dt: f64) -> Between<'_, S> {
+    /// Where the motion `delay` seconds ago lies, `dt` the time between samples where that is one.
+    fn ago(&self, delay: S, dt: f64) -> Instant<'_, S> {
         let steps = delay / dt;
         let whole = steps.re().max(0.0).floor().min((LONGEST - 2) as f64);
         let (mut k, mut s, mut gap) = (whole as usize, S::from(1.0) - (steps - whole), dt);
@@ -110,23 +113,34 @@ impl<S: Scalar> SensorHistory<S> {
             }
             s = S::from(1.0) - left / gap;
         }
-        Between { before: &self.past[self.index(k + 1)], after: &self.past[self.index(k)], s, gap }
+        if k >= self.recorded {
+            // Before the history: exactly the speed at which it began.
+            let age: f64 = (0..self.recorded).map(|k| self.gaps[self.index(k)]).sum();
+            return Instant::Coasting { from: &self.past[self.index(self.recorded)], time: S::from(age) - delay };
+        }
+        Instant::Between { before: &self.past[self.index(k + 1)], after: &self.past[self.index(k)], s, gap }
     }
 }
 
-/// An instant between two samples: `s` 0 at `before`, 1 at `after`, which come `gap` seconds later.
-struct Between<'a, S> {
-    before: &'a Reading<S>,
-    after: &'a Reading<S>,
-    s: S,
-    gap: f64,
+/// An instant of a motion known at samples.
+enum Instant<'a, S> {
+    /// Between two samples: `s` 0 at `before`, 1 at `after`, which comes `gap` seconds later.
+    Between { before: &'a Reading<S>, after: &'a Reading<S>, s: S, gap: f64 },
+    /// `time` seconds after a sample, or before it, at its speed.
+    Coasting { from: &'a Reading<S>, time: S },
 }
 
-impl<S: Scalar> Between<'_, S> {
+impl<S: Scalar> Instant<'_, S> {
     /// Angle and speed there, by cubic Hermite interpolation of one encoder.
     fn of(&self, encoder: impl Fn(&Reading<S>) -> (S, S)) -> (S, S) {
-        let (s, gap) = (self.s, self.gap);
-        let ((x0, v0), (x1, v1)) = (encoder(self.before), encoder(self.after));
+        let (before, after, s, gap) = match *self {
+            Self::Between { before, after, s, gap } => (before, after, s, gap),
+            Self::Coasting { from, time } => {
+                let (theta, omega) = encoder(from);
+                return (theta + omega * time, omega);
+            }
+        };
+        let ((x0, v0), (x1, v1)) = (encoder(before), encoder(after));
         let (rise, v0, v1) = (x1 - x0, v0 * gap, v1 * gap);
         // x0 + v0*s + (3*rise - 2*v0 - v1)*s^2 + (v0 + v1 - 2*rise)*s^3
         let c2 = rise * 3.0 - v0 * 2.0 - v1;
@@ -179,28 +193,26 @@ pub struct Seen<'a, S> {
 impl<S: Scalar> Seen<'_, S> {
     /// What both encoders read.
     pub(super) fn reading(&self) -> Reading<S> {
-        let now = self.history.now();
-        if self.late.re() < 0.0 {
-            // What is to come is not known: the axis coasts.
-            let Reading { omega1, omega2, .. } = now;
-            return Reading { theta1: now.theta1 - omega1 * self.late, theta2: now.theta2 - omega2 * self.late, ..now };
-        }
         if self.late.re() == 0.0 && !S::HAS_DERIVATIVES {
-            return now;
+            return self.history.now();
         }
-        let at = self.history.between(self.late, self.dt);
+        let at = self.at(self.late);
         let ((theta1, omega1), (theta2, omega2)) = (at.of(motor), at.of(table));
         Reading { theta1, omega1, theta2, omega2 }
     }
 
     /// Angle and speed of the table side `delay` seconds before that instant.
     fn table(&self, delay: S) -> (S, S) {
-        let ago = self.late + delay;
+        self.at(self.late + delay).of(table)
+    }
+
+    /// The instant `ago` seconds before the newest sample; after it nothing is known, and the axis coasts.
+    fn at(&self, ago: S) -> Instant<'_, S> {
+        let history = self.history;
         if ago.re() < 0.0 {
-            let (theta, omega) = table(&self.history.now());
-            return (theta - omega * ago, omega);
+            return Instant::Coasting { from: &history.past[history.newest], time: -ago };
         }
-        self.history.between(ago, self.dt).of(table)
+        history.ago(ago, self.dt)
     }
 }
 
@@ -211,7 +223,8 @@ impl SensorHistory<f64> {
             [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2].into_iter().for_each(&mut *word);
         }
         self.gaps.iter_mut().for_each(&mut *word);
-        for (count, most) in [(&mut self.newest, LONGEST - 1), (&mut self.uniform, LONGEST)] {
+        let counts = [(&mut self.newest, LONGEST - 1), (&mut self.uniform, LONGEST), (&mut self.recorded, LONGEST)];
+        for (count, most) in counts {
             let mut value = *count as f64;
             word(&mut value);
             *count = (value.max(0.0) as usize).min(most);
@@ -329,7 +342,7 @@ mod tests {
             history.push(at(t), gap, 0.0);
         }
         for delay in [0.0, 0.05, 0.1, 0.234, 1.0] {
-            let (theta, omega) = history.between(delay, 0.1).of(table);
+            let (theta, omega) = history.ago(delay, 0.1).of(table);
             let want = at(t - delay);
             assert!((theta - want.theta2).abs() < 1e-12 && (omega - want.omega2).abs() < 1e-11, "{delay}");
         }

@@ -335,7 +335,8 @@ impl Kernel {
             OMEGA2 if on.sensors().is_empty() => same(Slot::Alpha2),
             ALPHA1 | ALPHA2 if on.motion_is_linear() && on.inputs().is_empty() => {
                 let p = self.values.parameters();
-                let (w, a) = (same(Slot::Omega1) - self.state.omega2(), same(Slot::Alpha1) - same(Slot::Alpha2));
+                let w = self.state.omega1() - self.state.omega2();
+                let a = same(Slot::Alpha1) - same(Slot::Alpha2);
                 match self.values.structure() {
                     Structure::Rigid => self.last_rate / (p.i1 + p.i2),
                     // Eq. 2 of the paper, differentiated.
