@@ -4,7 +4,9 @@
 use std::path::PathBuf;
 
 use eixo::axis::{Motion, Parameters, Structure};
-use eixo::diagnose::{Case, LinearCause, Model, NoiseEstimate, Record, estimate_noise, linear_cause, speed_warnings};
+use eixo::diagnose::{
+    Case, LinearCause, Model, NoiseEstimate, Record, diagnose, estimate_noise, linear_cause, speed_warnings,
+};
 use eixo::effects::{EFFECTS, Effect, Settings};
 use eixo::trace::{Hold, Table};
 
@@ -122,5 +124,52 @@ fn the_benchs_logged_speeds_are_told_to_be_filtered() {
     assert_eq!(said.len(), 2, "{said:?}");
     for (text, name) in said.iter().zip(["omega1", "omega2"]) {
         assert!(text.starts_with(name) && text.contains("low pass of 7.8"), "{text}");
+    }
+}
+
+/// EMPS, a ball-screw axis, diagnosed from the published inertia alone. What is known of it: Coulomb friction of 20.4 N (a presliding
+/// reach below 20 um at most), viscous friction of 203 N.s/m that is less forwards than backwards, or a bias (Janot, Gautier, Brunot, 2019;
+/// an inverse dynamic identification outside this project: 20 to 22 N, 193 to 208 N.s/m, asymmetry -0.18).
+#[test]
+fn on_emps_and_on_its_parts_friction_and_viscosity_are_named_with_their_published_sizes() {
+    let Some((whole, _)) = record("emps/train.csv", "force_cmd_N", [Some("q_meas_m"), None, None, None]) else {
+        return;
+    };
+    let n = whole.len();
+    for part in [0..n, 0..n / 2, n / 2..n, 0..8000] {
+        let record = whole.part(part.clone());
+        let noise = estimate_noise(&record.torque, &[record.channels[0].as_deref(), None, None, None], None);
+        let case = Case {
+            machine: "EMPS".to_owned(),
+            nominal: Model::new(
+                Parameters { i1: 95.1, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 },
+                Structure::Rigid,
+                Settings::default(),
+            ),
+            motion: Motion::Linear,
+            train: &record,
+            noise: &noise,
+            holdout: None,
+            suspects: EFFECTS.to_vec(),
+        };
+        let found = diagnose(&case, &|_| ());
+        let causes = &found.diagnosis.causes;
+        let value = |family: &str, name: &str| {
+            let cause = causes.iter().find(|c| c.family == family)?;
+            cause.parameters.get(name)?.get("value")?.as_f64()
+        };
+        let told = || format!("{part:?}: {causes:?}");
+        let level = value("dry_friction", "level").unwrap_or_else(|| panic!("{}", told()));
+        assert!((level / 20.4 - 1.0).abs() < 0.07, "{}", told());
+        assert!(value("dry_friction", "reach").is_none_or(|r| r < 2e-5), "{}", told());
+        let viscous = value("viscous_friction", "coefficient").unwrap_or_else(|| panic!("{}", told()));
+        assert!((viscous / 203.0 - 1.0).abs() < 0.08, "{}", told());
+        assert!(causes.iter().all(|c| c.place == "axis" || c.place == "input"), "{}", told());
+        let inertia = found.improved.parameters.i1;
+        assert!((inertia / 95.1 - 1.0).abs() < 0.02, "{inertia}");
+        // Friction is the half of it; what is named beside must be small.
+        let others =
+            causes.iter().filter(|c| !["dry_friction", "viscous_friction", "load_torque"].contains(&c.family.as_str()));
+        assert!(others.map(|c| c.share_of_gap).sum::<f64>() < 0.02, "{}", told());
     }
 }

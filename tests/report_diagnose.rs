@@ -2,8 +2,8 @@
 
 use eixo::diagnose::location::{Bin, FrequencyPart, Residual, Spread, StateCurve, TimeSlot};
 use eixo::diagnose::{
-    Cause, ClosedLoop, Commands, Diagnosis, Evidence, Figures, GapReport, Levels, Location, LoopErrors, LoopRanked,
-    Overlay, Ranked, SCHEMA, Verdict, Where,
+    Cause, ClosedLoop, ClosureOf, Commands, Diagnosis, Evidence, Figures, GapReport, Levels, Location, LoopErrors,
+    LoopRanked, Overlay, Ranked, SCHEMA, Verdict, Where,
 };
 use eixo::effects::Place;
 use eixo::report::diagnose::{Findings, report, short};
@@ -69,7 +69,9 @@ fn friction(machine: &str) -> Diagnosis {
             by_state: json!([]),
             summary: format!("The residual torque of {machine} acts on the motor."),
         },
+        remainder: None,
         gap: GapReport {
+            closure_of: ClosureOf::Windows,
             train: figures(0.182, 0.094, 0.0081),
             holdout: figures(0.184, 0.097, 0.0084),
             closure: 0.991,

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::decide::{Decision, Verdict, decide};
-use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, SCHEMA, Where};
+use super::diagnosis::{Cause, ClosureOf, Diagnosis, GapReport, Ranked, SCHEMA, Where};
 use super::evidence::{self, Evidence};
 use super::fit::Data;
 use super::gap::{self, Gap};
@@ -19,7 +19,7 @@ use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
 
 /// Share of a single record that is held out.
-const HELD_OUT: f64 = 1.0 / 3.0;
+pub(super) const HELD_OUT: f64 = 1.0 / 3.0;
 
 /// Samples of a record that are worked on at most: what a longer one adds to the naming of a cause is time.
 const LONGEST: usize = 16_384;
@@ -73,6 +73,9 @@ pub struct Replay {
 /// Diagnoses a record.
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
+    if case.nominal.structure == Structure::Rigid {
+        return super::torque::diagnose(case, progress);
+    }
     let (all, all_held) = split(case);
     let (record, other) = (&first(&all), &first(&all_held));
     let train = cut(0..record.len());
@@ -82,7 +85,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         data,
         nominal: case.nominal,
         coarse: lattice::dominates(case.noise),
-        suspects: case.suspects.clone(),
+        suspects: case.suspects.iter().copied().filter(|e| e.has_windows()).collect(),
         states: states::along(record, &case.nominal),
     };
     progress("the model as given");
@@ -116,6 +119,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     if let Some(linear) = &linear {
         linear.tell(&mut diagnosis, case.motion);
     }
+    diagnosis.remainder = super::torque::remainder(record, &models[2]);
     diagnosis.warnings.extend(lines::warnings(case.train, case.noise));
     let evidence = evidence::gather(located, held.record, held.windows, &initial(&held.states, held.windows), &models);
     let replay = held.replay(&models[2]);
@@ -211,6 +215,7 @@ fn build(
         verdict,
         sentence: String::new(),
         location: location(&causes, verdict, located),
+        remainder: None,
         causes,
         ranking,
         confusable: Vec::new(),
@@ -219,6 +224,7 @@ fn build(
             closure: holdout.closure,
             closure_of_effect: holdout.closure_of_effect,
             interval: holdout.interval,
+            closure_of: ClosureOf::Windows,
             train: train.figures,
             holdout: holdout.figures,
             holdout_is: if case.holdout.is_some() { "a second record" } else { "the last third of the record" }

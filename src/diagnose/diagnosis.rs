@@ -32,6 +32,9 @@ pub struct Diagnosis {
     /// Where the gap lies.
     #[serde(rename = "where")]
     pub location: Where,
+    /// What stays unexplained beside the causes; absent where the record cannot be compared in torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remainder: Option<Remainder>,
     /// How large it is, and how far it shrinks.
     pub gap: GapReport,
     /// The nominal parameters as given and as fitted.
@@ -60,6 +63,31 @@ pub struct Cause {
     pub share_of_gap: f64,
     /// Its parameters by name.
     pub parameters: Map<String, Value>,
+}
+
+/// How a closure was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClosureOf {
+    /// The model's own run through the whole record from one initial state.
+    FreeRun,
+    /// Runs of half a thousand samples, their initial states fitted.
+    Windows,
+}
+
+/// What no cause explains.
+#[derive(Debug, Clone, Serialize)]
+pub struct Remainder {
+    /// Its torque, rms in the band of the motion, N.m.
+    pub torque_rms: f64,
+    /// The same over the torque's rms.
+    pub share: f64,
+    /// As a multiple of what the encoders' noise makes.
+    pub noise_multiple: f64,
+    /// Where it shows.
+    pub place: String,
+    /// What it looks like.
+    pub summary: String,
 }
 
 /// A hypothesis in the ranking.
@@ -111,6 +139,8 @@ pub struct GapReport {
     pub closure_of_effect: f64,
     /// 95 % interval of `closure`.
     pub interval: [f64; 2],
+    /// What `closure` and the levels are measured on.
+    pub closure_of: ClosureOf,
     /// What the held-out data are.
     pub holdout_is: String,
 }

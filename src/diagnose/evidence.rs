@@ -73,7 +73,7 @@ pub fn gather(
 }
 
 impl Overlay {
-    fn push(&mut self, [time, measured, before, after]: [f64; 4]) {
+    pub(super) fn push(&mut self, [time, measured, before, after]: [f64; 4]) {
         self.time.push(time);
         self.measured.push(measured);
         self.before.push(before);

@@ -25,6 +25,9 @@ impl Force for Backlash {
             .nominal(1e-3)
             .start(Start::Grid(Scale::Twist, &[0.03, 0.1, 0.2, 0.4, 0.7, 1.2]))],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= 4.0 * x.twist,
         variants: &[Variant { name: "", free: &[0] }],
     };
 

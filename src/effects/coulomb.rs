@@ -76,6 +76,9 @@ impl DryFriction for CoulombMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        named: true,
+        textbook: true,
+        bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
         variants: VARIANTS,
     };
 
@@ -100,6 +103,9 @@ impl DryFriction for CoulombTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
         variants: VARIANTS,
     };
 

@@ -55,6 +55,9 @@ impl Force for CouplingHysteresis {
             ParameterInfo::shape("sharpness", "1", 1.0, 0.2, 20.0, "How abruptly the loop yields"),
         ],
         memory: 1,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[1] <= 6.0 * x.twist,
         variants: &[Variant { name: "", free: &[0, 1] }, Variant { name: "sharp", free: &[0, 1, 2] }],
     };
 

@@ -18,6 +18,9 @@ impl Force for CubicStiffness {
         reference: "Kovacic, Brennan, The Duffing Equation, Wiley 2011",
         parameters: &[ParameterInfo::size("k3", "1/rad2", -1e9, 1e9, "Cubic term as a share of K").nominal(1.0)],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };
 

@@ -48,6 +48,9 @@ impl Input for DeadZone {
             .nominal(1e-3)
             .start(Start::Grid(Scale::Torque, &[0.01, 0.03, 0.1, 0.3]))],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= 0.3 * x.torque,
         variants: &[Variant { name: "", free: &[0] }],
     };
 

@@ -25,6 +25,9 @@ impl Force for Disturbance {
             ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at time zero").start(Start::Phase),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0].abs() <= x.torque && x.holds(std::f64::consts::TAU * p[1]),
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 

@@ -33,6 +33,9 @@ impl Force for StiffnessDrift {
             FADE,
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| (p[0] * x.length).abs() <= 0.95,
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "that comes to rest", free: &[0, 1] }],
     };
 
@@ -63,6 +66,9 @@ impl DryFriction for FrictionDrift {
             FADE,
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0].abs() * x.length <= x.torque,
         variants: &[
             Variant { name: "dry", free: &[0] },
             Variant { name: "viscous", free: &[1] },

@@ -36,6 +36,16 @@ impl Force for EndStop {
             .nominal(1e-2),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| {
+            let touched = x.beyond(p[2], p[1]);
+            // Harder than the coupling; on a rigid axis, than what holds the axis in place over the record.
+            p[0] >= x.stiffness
+                && p[0] >= 600.0 * x.inertia[1] / (x.length * x.length)
+                && touched > 0.0
+                && touched < 0.3
+        },
         variants: &[
             Variant { name: "upper", free: &[0, 1] },
             Variant { name: "lower", free: &[0, 2] },

@@ -23,6 +23,9 @@ impl Force for ExternalSpring {
                 .start(Start::Grid(Scale::Travel, &[0.5])),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] * x.travel() <= 4.0 * x.torque,
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
     const CARRIED: bool = true;

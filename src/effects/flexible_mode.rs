@@ -5,9 +5,21 @@
 //!
 //! Memory: twist `th - th3` and its rate, relative so that a turning axis loses no digits, and the acceleration `a3`.
 
+use super::extent::Extent;
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
+
+/// A mode swings in the band, against the inertia that it hangs on, and is not damped to death.
+fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
+    let (inertia, stiffness, damping) = (p[0], p[1], p[2]);
+    let coupled = (stiffness * (1.0 / inertia + 1.0 / x.inertia[0])).sqrt();
+    inertia > 0.0
+        && inertia <= 4.0 * x.inertia[1]
+        && x.holds((stiffness / inertia).sqrt())
+        && coupled <= 2.0 * x.band
+        && damping <= 0.5 * (inertia * stiffness).sqrt()
+}
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia that swings")
@@ -75,6 +87,9 @@ impl Force for FlexibleMode {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 3,
+        named: true,
+        textbook: false,
+        bounds: is_a_mode,
         variants: VARIANTS,
     };
 
@@ -102,6 +117,9 @@ impl Force for MotorMode {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 3,
+        named: true,
+        textbook: false,
+        bounds: is_a_mode,
         variants: VARIANTS,
     };
 

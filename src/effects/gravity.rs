@@ -27,6 +27,13 @@ impl Force for Gravity {
             ParameterInfo::shape("ratio", "1/rad", 1.0, 1e-6, 1e6, "Angle of the hinge per angle of the table side"),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| {
+            p[0].hypot(p[1]) * (0.25 * p[2] * x.travel()).min(1.0) <= x.torque
+                && p[2] * x.travel() >= 0.5
+                && p[2] * x.travel() <= 0.75 * std::f64::consts::TAU
+        },
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
     const CARRIED: bool = true;

@@ -1,5 +1,7 @@
 //! What is known of an effect without running it.
 
+use super::extent::Extent;
+
 /// The place in the chain where an effect acts.
 ///
 /// ```text
@@ -210,7 +212,7 @@ impl ParameterInfo {
 }
 
 /// What an effect is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct EffectInfo {
     /// Name used in files and on the command line.
     pub id: &'static str,
@@ -231,6 +233,12 @@ pub struct EffectInfo {
     pub parameters: &'static [ParameterInfo],
     /// Number of internal states (force effects).
     pub memory: usize,
+    /// Whether a diagnosis may name it; what another verdict covers or what is read off the log's resolution is not fitted.
+    pub named: bool,
+    /// Whether it belongs to the textbook's friction model, whose combinations a diagnosis always compares.
+    pub textbook: bool,
+    /// Whether parameters are what physics lets the effect be on a record.
+    pub bounds: fn(&[f64], &Extent<'_>) -> bool,
     /// The forms a diagnosis fits, the simplest first.
     pub variants: &'static [Variant],
 }

@@ -197,6 +197,9 @@ impl Input for TorqueGain {
             ..ParameterInfo::size("gain", "1", -1e3, 1e3, "Torque per torque commanded")
         }],
         memory: 0,
+        named: false,
+        textbook: false,
+        bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };
 
@@ -237,6 +240,9 @@ impl Input for Saturation {
             ..ParameterInfo::size("limit", "N.m", 0.0, 1e9, "Largest torque; 1e9 means none")
         }],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] >= 0.3 * x.torque && p[0] < x.torque,
         variants: &[Variant { name: "", free: &[0] }],
     };
 
@@ -265,6 +271,9 @@ impl Input for Delay {
             .nominal(1e-3)
             .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0, 10.0]))],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= 12.0 * x.dt,
         variants: &[Variant { name: "", free: &[0] }],
     };
 
@@ -310,6 +319,9 @@ impl Input for ActuatorLag {
             .nominal(1e-3)
             .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0, 10.0]))],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] * x.band <= 20.0,
         variants: &[Variant { name: "", free: &[0] }],
     };
 

@@ -31,6 +31,9 @@ impl Sensor for Latch {
                 .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0, 10.0])),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= 0.0 && p[0] >= -12.0 * x.dt && p[1] * x.band <= 5.0,
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "filtered", free: &[1] }],
     };
     const MOTOR: bool = true;

@@ -24,6 +24,9 @@ impl Force for LoadMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        named: true,
+        textbook: true,
+        bounds: |_, _| true,
         variants: VARIANTS,
     };
 
@@ -49,6 +52,9 @@ impl Force for LoadTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |_, _| true,
         variants: VARIANTS,
     };
 

@@ -26,6 +26,14 @@ impl DryFriction for PositionFriction {
                 .start(Start::Grid(Scale::Rotation, &[0.1, 0.3, 1.0])),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| {
+            p[0] <= x.torque
+                && p[2] <= 0.25 * x.travel()
+                && p[1] >= x.positions[0]
+                && p[1] <= x.positions[x.positions.len() - 1]
+        },
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 

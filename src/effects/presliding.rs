@@ -50,6 +50,9 @@ impl Force for PreslidingMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 1,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
         variants: VARIANTS,
     };
 
@@ -73,6 +76,9 @@ impl Force for PreslidingTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 1,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
         variants: VARIANTS,
     };
 

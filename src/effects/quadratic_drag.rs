@@ -20,6 +20,9 @@ impl Force for QuadraticDrag {
             ParameterInfo::size("coefficient", "N.m.s2/rad2", 0.0, 1e6, "Drag torque per speed squared").nominal(1e-4)
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };
 

@@ -39,6 +39,9 @@ impl Force for TorqueRipple {
             ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta1 = 0").start(Start::Phase),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0].abs() <= x.torque && x.turns(p[1]),
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 
@@ -66,6 +69,9 @@ impl Force for Unbalance {
             ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0").start(Start::Phase),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0].abs() <= x.torque && x.turns(1.0),
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
 

@@ -248,6 +248,9 @@ impl Sensor for SensorDelay {
             .nominal(1e-3)
             .start(Start::Grid(Scale::Sample, &[0.3, 1.0, 3.0]))],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, x| p[0] <= 12.0 * x.dt,
         variants: &[Variant { name: "", free: &[0] }],
     };
 
@@ -281,6 +284,9 @@ impl Sensor for LeadError {
             ParameterInfo::shape("phase", "rad", 0.0, -1e3, 1e3, "Phase at theta2 = 0").start(Start::Phase),
         ],
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |_, _| true,
         variants: &[
             Variant { name: "scale", free: &[0] },
             Variant { name: "periodic", free: &[1, 2, 3] },
@@ -310,6 +316,9 @@ impl Sensor for EncoderQuantisation {
         reference: "Widrow, Kollar, Quantization Noise, Cambridge 2008",
         parameters: &[ParameterInfo::size("step", "rad", 0.0, 1e3, "Angle of one count").nominal(1e-3)],
         memory: 0,
+        named: false,
+        textbook: false,
+        bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };
 

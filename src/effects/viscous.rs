@@ -35,6 +35,9 @@ impl Force for ViscousMotor {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        named: true,
+        textbook: true,
+        bounds: |p, _| p[1].abs() <= 0.95,
         variants: VARIANTS,
     };
 
@@ -58,6 +61,9 @@ impl Force for ViscousTable {
         reference: REFERENCE,
         parameters: PARAMETERS,
         memory: 0,
+        named: true,
+        textbook: false,
+        bounds: |p, _| p[1].abs() <= 0.95,
         variants: VARIANTS,
     };
 

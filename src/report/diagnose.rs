@@ -136,7 +136,7 @@ fn verdict(f: &Findings) -> Verdict {
                 .causes
                 .iter()
                 .map(|c| match info(&c.id) {
-                    Some(i) => format!("{} (at the {})", lower(short_title(i)), i.place.as_str()),
+                    Some(i) => format!("{} (at the {})", lower(short_title(i)), c.place),
                     None => c.id.clone(),
                 })
                 .collect();

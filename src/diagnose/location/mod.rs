@@ -18,7 +18,7 @@ mod words;
 use serde::Serialize;
 
 pub use by_frequency::FrequencyPart;
-pub use by_state::{Bin, StateCurve};
+pub use by_state::{Bin, Shape, StateCurve, shape};
 pub use by_time::{Spread, TimeSlot};
 pub use fit::{Fitted, Motion};
 pub use places::PlaceEvidence;
@@ -127,6 +127,26 @@ pub fn locate(record: &Record, parameters: &Parameters, structure: Structure) ->
         state: &by_state,
     });
     Location { place, by_place, weak, coarse, spread, by_time: slots, by_frequency, by_state, summary, residual }
+}
+
+/// Where a residual torque on the one inertia of a rigid axis shows: in time, frequency and state.
+#[must_use]
+pub fn along(record: &Record, residual: Residual) -> Location {
+    let by_state = state_curves(record, &residual, None, false);
+    let by_frequency = frequency_parts(record, &residual, None);
+    let slots = by_time::by_time(record.start, record.dt, &residual.r1, None, &residual.r1);
+    Location {
+        place: None,
+        by_place: Vec::new(),
+        weak: None,
+        coarse: [None; 4],
+        spread: by_time::spread(&slots),
+        by_time: slots,
+        by_frequency,
+        by_state,
+        summary: String::new(),
+        residual,
+    }
 }
 
 /// States of the axis given the record, unknown torques on both inertias allowed, with their standard deviations.

@@ -1,0 +1,191 @@
+//! The band of the motion, and the samples that count.
+
+use super::super::record::Record;
+use crate::axis::Structure;
+use rustfft::{FftPlanner, num_complex::Complex};
+
+/// Share of the acceleration's power that the band holds, and how far beyond it goes.
+const POWER: f64 = 0.995;
+const BEYOND: f64 = 1.5;
+
+/// Power of the acceleration over that of the encoders' noise up to which the band goes: under control, where feedback ties torque and
+/// noise together, as far as the motion rules (Gautier & Khalil's practice), which a rigid axis is taken to be; else as far as it shows.
+const STANDS_RIGID: f64 = 400.0;
+const STANDS: f64 = 4.0;
+/// Samples from which a record of two inertias is brought to the rate of its band, too.
+pub const LONG: usize = 20_000;
+
+/// Window with soft ends.
+pub fn mask(n: usize) -> Vec<f64> {
+    let edge = (n as f64 * 0.05).max(8.0);
+    (0..n)
+        .map(|k| {
+            let d = (k.min(n - 1 - k)) as f64;
+            if d >= edge { 1.0 } else { 0.5 * (1.0 - (std::f64::consts::PI * (d + 0.5) / edge).cos()) }
+        })
+        .collect()
+}
+
+/// Smoothed spectra of the acceleration of a side and of its noise.
+fn acceleration(record: &Record, side: usize, mask: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    let n = record.len();
+    let dt = record.dt;
+    let (series, kind): (Vec<f64>, usize) = if let Some(y) = &record.channels[2 * side] {
+        (
+            (0..n)
+                .map(|k| if k == 0 || k + 1 == n { 0.0 } else { (y[k + 1] - 2.0 * y[k] + y[k - 1]) / (dt * dt) })
+                .collect(),
+            2,
+        )
+    } else {
+        let v = record.channels[2 * side + 1].as_ref()?;
+        ((0..n).map(|k| if k + 1 == n { 0.0 } else { (v[k + 1] - v[k]) / dt }).collect(), 1)
+    };
+    let mut z: Vec<Complex<f64>> = series.iter().zip(mask).map(|(a, w)| Complex::new(a * w, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut z);
+    let power = mask.iter().map(|w| w * w).sum::<f64>();
+    let p: Vec<f64> = z[..n / 2].iter().map(|z| z.norm_sqr() / power).collect();
+    let noise = (0..n / 2)
+        .map(|m| {
+            let w = std::f64::consts::TAU * m as f64 / n as f64;
+            let c = 2.0 * (1.0 - w.cos()) / (dt * dt);
+            if kind == 2 { record.noise[2 * side].powi(2) * c * c } else { record.noise[2 * side + 1].powi(2) * c }
+        })
+        .collect();
+    let half = (n / 400).max(2);
+    let mut sum = vec![0.0; p.len() + 1];
+    for (i, v) in p.iter().enumerate() {
+        sum[i + 1] = sum[i] + v;
+    }
+    let smooth = (0..p.len())
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(half), (i + half + 1).min(p.len()));
+            (sum[b] - sum[a]) / (b - a) as f64
+        })
+        .collect();
+    Some((smooth, noise))
+}
+
+/// Upper end of the band, Hz.
+pub fn limit(record: &Record, mask: &[f64], structure: Structure) -> f64 {
+    let snr = if structure == Structure::Rigid { STANDS_RIGID } else { STANDS };
+    let n = record.len();
+    let step = 1.0 / (n as f64 * record.dt);
+    let mut best = 0.0_f64;
+    for side in 0..2 {
+        let Some((p, noise)) = acceleration(record, side, mask) else { continue };
+        let stands = |m: usize| p[m] > snr * noise[m];
+        let top = (0..p.len()).rev().find(|m| stands(*m)).unwrap_or(p.len() / 10);
+        let signal: Vec<f64> = (0..=top).map(|m| (p[m] - noise[m]).max(0.0)).collect();
+        let all: f64 = signal.iter().sum();
+        let mut sum = 0.0;
+        let at = signal
+            .iter()
+            .position(|s| {
+                sum += s;
+                sum >= POWER * all
+            })
+            .unwrap_or(top);
+        let f = ((BEYOND * at as f64) as usize).min(top.max(8)) as f64 * step;
+        best = best.max(f);
+    }
+    best.min(0.4 / record.dt)
+}
+
+/// The largest number up to `n` of factors 2, 3 and 5 alone.
+pub fn smooth(n: usize) -> usize {
+    (1..=n)
+        .rev()
+        .find(|&m| {
+            let mut m = m;
+            for f in [2, 3, 5] {
+                while m % f == 0 {
+                    m /= f;
+                }
+            }
+            m == 1
+        })
+        .unwrap_or(n)
+}
+
+/// Samples a period of the band's upper end that are kept.
+const KEPT: f64 = 8.0;
+
+/// The record at the lower rate that its band needs; its torque then runs straight from sample to sample, raised so that within
+/// the band it is the one that acted.
+pub fn decimate(record: &Record, limit: f64) -> Record {
+    use crate::axis::Hold;
+    let every = (1.0 / (record.dt * KEPT * limit)).floor() as usize;
+    let n = record.len();
+    if every < 2 || n < 64 {
+        return record.clone();
+    }
+    let dt = record.dt;
+    let slow = dt * every as f64;
+    let pad = n.min(4096).max(every * 8).min(n - 1);
+    let total = smooth_up(n + 2 * pad);
+    let mut planner = FftPlanner::new();
+    let (forward, inverse) = (planner.plan_fft_forward(total), planner.plan_fft_inverse(total));
+    let filter = |y: &[f64], odd: bool, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
+        let at = |i: isize| -> f64 {
+            let last = n as isize - 1;
+            if i < 0 {
+                let r = y[(-i).min(last) as usize];
+                if odd { 2.0 * y[0] - r } else { r }
+            } else if i > last {
+                let r = y[(2 * last - i).max(0) as usize];
+                if odd { 2.0 * y[n - 1] - r } else { r }
+            } else {
+                y[i as usize]
+            }
+        };
+        // A straight line through the ends keeps the circle closed.
+        let (first, end) = (at(-(pad as isize)), at((total - pad) as isize - 1));
+        let line = |k: usize| first + (end - first) * k as f64 / (total as f64 - 1.0);
+        let mut z: Vec<Complex<f64>> =
+            (0..total).map(|k| Complex::new(at(k as isize - pad as isize) - line(k), 0.0)).collect();
+        forward.process(&mut z);
+        for (m, v) in z.iter_mut().enumerate() {
+            let f = if 2 * m <= total { m as f64 } else { m as f64 - total as f64 } / (total as f64 * dt);
+            *v *= response(f) / total as f64;
+        }
+        inverse.process(&mut z);
+        (0..n).step_by(every).map(|k| z[k + pad].re + line(k + pad)).collect()
+    };
+    let low = |f: f64| {
+        let x = (f.abs() / limit - 1.3) / 0.9;
+        if x <= 0.0 {
+            1.0
+        } else if x >= 1.0 {
+            0.0
+        } else {
+            0.5 * (1.0 + (std::f64::consts::PI * x).cos())
+        }
+    };
+    let sinc =
+        |x: f64| if x.abs() < 1e-9 { 1.0 } else { (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x) };
+    let zoh = record.hold == Hold::Zoh;
+    let shape = |f: f64| {
+        if low(f) == 0.0 {
+            return Complex::default();
+        }
+        let held = if zoh {
+            Complex::from_polar(sinc(f * dt), -std::f64::consts::PI * f * dt)
+        } else {
+            Complex::new(sinc(f * dt).powi(2), 0.0)
+        };
+        held * (low(f) / sinc(f * slow).powi(2))
+    };
+    let torque = filter(&record.torque, false, &shape);
+    let channels = [0, 1, 2, 3].map(|c: usize| {
+        record.channels[c].as_ref().map(|y| filter(y, c.is_multiple_of(2), &|f| Complex::new(low(f), 0.0)))
+    });
+    let noise = record.noise.map(|s| s / (every as f64).sqrt());
+    let out = Record { start: record.start, dt: slow, hold: Hold::Linear, torque, channels, noise };
+    let m = smooth(out.len());
+    out.part(0..m)
+}
+
+fn smooth_up(n: usize) -> usize {
+    (n..).find(|&m| smooth(m) == m).unwrap_or(n)
+}

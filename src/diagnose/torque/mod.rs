@@ -1,0 +1,373 @@
+//! A rigid axis diagnosed by the torque that its model lacks to follow the record.
+//!
+//! [`search`] is the procedure, top to bottom; [`likelihood`] the one evidence, with sensor noise and model discrepancy in it;
+//! [`tracking`] what a model lacks; [`fit`] a hypothesis fitted; [`gap`] how far the gap shrinks on data that no fit has seen. A
+//! machine's log is made under control, its model never complete: its verdict must not be sought at the noise floor of a simulation
+//! (Gautier, Khalil, and the inverse dynamics of robot identification; Kennedy, O'Hagan, JRSS B 63(3), 2001, for the discrepancy).
+//!
+//! On a rigid axis motor, coupling and table are one place, called `axis`.
+
+mod band;
+mod fit;
+mod gap;
+mod likelihood;
+mod scales;
+mod search;
+mod starts;
+#[cfg(test)]
+mod tests;
+mod tracking;
+mod words;
+
+use serde_json::{Map, Value, json};
+
+use super::assess::{Case, HELD_OUT, Outcome, Replay};
+use super::decide::{self, Verdict};
+use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, Remainder, SCHEMA, Where};
+use super::evidence::{Evidence, Overlay};
+use super::location::{Location, Residual, along};
+use super::model::{BaseParameter, Free, Model};
+use super::record::{CHANNELS, Record};
+use super::search::Tested;
+use super::{fit as shooting, lattice};
+use crate::axis::{Motion, Structure};
+use crate::effects::Place;
+use crate::identify::levenberg::Termination;
+use fit::{Fit, Problem};
+use gap::Gap;
+use likelihood::Band;
+use search::{Decision, Search, decide};
+use tracking::{Tracked, track};
+
+/// Samples that a search works on at most, spread over the record: the hypotheses are told apart long before that.
+const SEARCHED: usize = 32_768;
+
+/// A record ready for the search: in the band of its motion, with that band.
+struct Prepared {
+    record: Record,
+    band: Band,
+}
+
+/// Diagnoses a record of a rigid axis.
+#[must_use]
+pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
+    let (train, held) = split(case);
+    let searched = prepared(&train, &case.nominal);
+    let may = |e: &crate::effects::Effect| e.may_be_named(case.nominal.structure) && !case.nominal.effects.is_on(*e);
+    let suspects = case.suspects.iter().copied().filter(may).collect();
+    let problem = Problem::new(&searched.record, &searched.band, case.nominal);
+    let decision = decide(Search { problem, suspects, progress });
+    progress("held-out data");
+    let models = [decision.given.model, decision.parameters.model, decision.chosen.model];
+    let on_train = gap::measure(&searched.record, &models);
+    let on_held = gap::measure(&held, &models);
+    progress("where");
+    let located = located(&searched, &models[1], decision.parameters.bandwidth);
+    let mut diagnosis = build(case, &decision, &searched, on_train, &on_held, &located);
+    let told = told(&decision, &searched.band);
+    lattice::judge(case, &told, &mut diagnosis);
+    super::words::fill(&mut diagnosis, &told);
+    let evidence = Evidence { held: overlays(&held, &on_held), located };
+    let replay = Replay { initial: on_held.initial, record: held };
+    Outcome { diagnosis, improved: models[2], models, decision: told, evidence, replay }
+}
+
+/// What a model lacks in torque to follow a record, as a remainder; `None` where it cannot be run along it.
+#[must_use]
+pub fn remainder(record: &Record, model: &Model) -> Option<Remainder> {
+    let p = prepared(record, model);
+    let fit = Problem::new(&p.record, &p.band, *model).given(model)?;
+    Some(remains(&p, &fit))
+}
+
+fn remains(p: &Prepared, fit: &Fit) -> Remainder {
+    let rigid = fit.model.structure == Structure::Rigid;
+    let tracked = track(&fit.model, &p.record, fit.bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
+    let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
+    let place = where_by_torque(&series, rigid);
+    let shown = along(&p.record, residual(&series[usize::from(place == "table")], &tracked));
+    Remainder {
+        torque_rms: p.band.torque_rms(&fit.rows),
+        share: p.band.torque_share(&fit.rows, &p.record),
+        noise_multiple: p.band.noise_multiple(&fit.rows),
+        place: place.to_owned(),
+        summary: words::shows(&shown),
+    }
+}
+
+fn residual(series: &[f64], tracked: &Tracked) -> Residual {
+    Residual { r1: series.to_vec(), at_place: series.to_vec(), states: tracked.motion.clone(), ..Residual::default() }
+}
+
+/// The decision in the terms of the drive's loop, the lattice and the words.
+fn told(d: &Decision, band: &Band) -> decide::Decision {
+    let values = band.values();
+    let tested = |f: &Fit| Tested {
+        effects: f.terms.clone(),
+        freedom: f.coordinates.len(),
+        fitted: shooting::Fitted {
+            model: f.model,
+            coordinates: f.coordinates.clone(),
+            std: f.std.iter().map(|s| s / d.independent.sqrt()).collect(),
+            initial: Vec::new(),
+            chi2: band.noise_multiple(&f.rows).powi(2) * values,
+            squares: [0.0; 4],
+            termination: Termination::Cost,
+            iterations: f.iterations,
+        },
+    };
+    decide::Decision {
+        verdict: d.verdict,
+        given: tested(&d.given),
+        parameters: tested(&d.parameters),
+        chosen: tested(&d.chosen),
+        ranking: d
+            .ranking
+            .iter()
+            .map(|w| decide::Weighed { tested: tested(&w.fit), bic: -2.0 * w.evidence, probability: w.probability })
+            .collect(),
+        shares: d.shares.clone(),
+        values,
+        confusable: d
+            .confusable
+            .iter()
+            .map(|c| decide::Confusable { named: c.named, other: c.other, delta_bic: 2.0 * c.difference })
+            .collect(),
+    }
+}
+
+/// The record that the fits see, and the one that they do not.
+fn split(case: &Case<'_>) -> (Record, Record) {
+    let n = case.train.len();
+    match case.holdout {
+        Some(other) => (case.train.clone(), other.clone()),
+        None => {
+            let split = n - (n as f64 * HELD_OUT) as usize;
+            (case.train.part(0..split), case.train.part(split..n))
+        }
+    }
+}
+
+/// The record in the band of its motion.
+fn prepared(record: &Record, nominal: &Model) -> Prepared {
+    let whole = record.part(0..band::smooth(record.len()));
+    let mask = band::mask(whole.len());
+    let limit = band::limit(&whole, &mask, nominal.structure);
+    let record = if whole.len() > band::LONG || nominal.structure == Structure::Rigid {
+        band::decimate(&whole, limit)
+    } else {
+        whole
+    };
+    let record = if record.len() > SEARCHED { record.part(0..band::smooth(SEARCHED)) } else { record };
+    let mask = band::mask(record.len());
+    let plain = Band::new(&record, nominal, limit, &mask);
+    // The noise is seen through the axis as it is, not as its data sheet has it.
+    let reference =
+        Problem::new(&record, &plain, *nominal).fit(nominal, &[], [f64::MAX; 2], 24).map_or(*nominal, |f| f.model);
+    let band = Band::new(&record, &reference, limit, &mask);
+    Prepared { record, band }
+}
+
+/// Where the torque that a model lacks shows along the record.
+fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
+    let tracked = track(model, &p.record, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
+    let series = p.band.filtered(&tracked.torque[0]);
+    let mut located = along(&p.record, residual(&series, &tracked));
+    located.summary = words::gap_shows(&located);
+    located
+}
+
+fn build(
+    case: &Case<'_>,
+    decision: &Decision,
+    searched: &Prepared,
+    train: Gap,
+    holdout: &Gap,
+    located: &Location,
+) -> Diagnosis {
+    let best = decision.ranking.first().map_or(0.0, |w| w.evidence);
+    let ranking = decision
+        .ranking
+        .iter()
+        .take(20)
+        .map(|w| {
+            let first = w.fit.terms.first().map(|t| t.0.info());
+            Ranked {
+                id: w.fit.id(),
+                family: first.map_or("none", |i| i.family.as_str()).to_owned(),
+                place: first.map_or("none", |i| place_of(i.place)).to_owned(),
+                probability: w.probability,
+                delta_bic: 2.0 * (best - w.evidence),
+                chi2: searched.band.noise_multiple(&w.fit.rows).powi(2),
+                closure_holdout: 0.0,
+            }
+        })
+        .collect();
+    let causes = causes(decision, case.motion);
+    let verdict = decision.verdict;
+    Diagnosis {
+        schema: SCHEMA,
+        machine: case.machine.clone(),
+        verdict,
+        sentence: String::new(),
+        location: location(&causes, verdict, located),
+        causes,
+        ranking,
+        confusable: Vec::new(),
+        next_experiment: String::new(),
+        remainder: Some(remains(searched, &decision.chosen)),
+        gap: GapReport {
+            closure: holdout.closure,
+            closure_of_effect: holdout.closure_of_effect,
+            interval: holdout.interval,
+            closure_of: holdout.of,
+            train: train.figures,
+            holdout: holdout.figures.clone(),
+            holdout_is: if case.holdout.is_some() { "a second record" } else { "the last third of the record" }
+                .to_owned(),
+        },
+        parameters: parameters(case, decision),
+        warnings: Vec::new(),
+        closed_loop: None,
+    }
+}
+
+/// The name of a place: a rigid axis has one for all that acts on its motion.
+fn place_of(place: Place) -> &'static str {
+    match place {
+        Place::Motor | Place::Coupling | Place::Table => "axis",
+        place => place.as_str(),
+    }
+}
+
+fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
+    let fit = &decision.chosen;
+    let mut causes: Vec<Cause> = fit
+        .terms
+        .iter()
+        .enumerate()
+        .map(|(i, (effect, form))| {
+            let info = effect.info();
+            let parameters = info.variants[*form]
+                .free
+                .iter()
+                .map(|&p| {
+                    let at = fit.coordinates.iter().position(|c| c.free == Free::Effect(*effect, p));
+                    let std = at
+                        .and_then(|a| fit.std.get(a))
+                        .map_or(Value::Null, |s| number(s / decision.independent.sqrt()));
+                    let q = &info.parameters[p];
+                    (
+                        q.name.to_owned(),
+                        json!({ "value": fit.model.effects.of(*effect)[p], "std": std, "unit": motion.unit(q.unit) }),
+                    )
+                })
+                .collect();
+            Cause {
+                id: info.id.to_owned(),
+                family: info.family.as_str().to_owned(),
+                place: place_of(info.place).to_owned(),
+                variant: info.variants[*form].name.to_owned(),
+                probability: decision.probabilities[i],
+                share_of_gap: decision.shares[i],
+                parameters,
+            }
+        })
+        .collect();
+    causes.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap));
+    causes
+}
+
+fn number(v: f64) -> Value {
+    if v.is_finite() { json!(v) } else { Value::Null }
+}
+
+/// Correlation of the two residual torques below which they are one, equal and opposite: in the coupling.
+const OPPOSITE: f64 = -0.8;
+
+/// Where residual torques show, without knowing any cause.
+fn where_by_torque(series: &[Vec<f64>; 2], rigid: bool) -> &'static str {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let [motor, table] = [0, 1].map(|i: usize| dot(&series[i], &series[i]).sqrt());
+    if rigid {
+        "axis"
+    } else if dot(&series[0], &series[1]) < OPPOSITE * motor * table {
+        "coupling"
+    } else if table > motor {
+        "table"
+    } else {
+        "motor"
+    }
+}
+
+fn location(causes: &[Cause], verdict: Verdict, located: &Location) -> Where {
+    let by_place: Map<String, Value> = ["input", "axis", "sensor"]
+        .iter()
+        .map(|p| {
+            let named: f64 = causes.iter().filter(|c| c.place == *p).map(|c| c.share_of_gap).sum();
+            let share = if causes.is_empty() {
+                f64::from(u8::from(*p == "axis" && verdict == Verdict::Unexplained))
+            } else {
+                named
+            };
+            ((*p).to_owned(), json!(share))
+        })
+        .collect();
+    let place = match (causes.first(), verdict) {
+        (Some(c), Verdict::Effect) => c.place.clone(),
+        (_, Verdict::Unexplained) => "axis".to_owned(),
+        _ => "none".to_owned(),
+    };
+    Where {
+        summary: located.summary.clone(),
+        place,
+        by_place,
+        by_time: json!(located.by_time),
+        by_frequency: json!(located.by_frequency),
+        by_state: json!(located.by_state),
+    }
+}
+
+fn parameters(case: &Case<'_>, decision: &Decision) -> Map<String, Value> {
+    let fit = &decision.chosen;
+    BaseParameter::of(case.nominal.structure)
+        .iter()
+        .map(|p| {
+            let at = fit.coordinates.iter().position(|c| c.free == Free::Base(*p));
+            let value = json!({
+                "nominal": p.value(&case.nominal.parameters),
+                "reidentified": p.value(&decision.parameters.model.parameters),
+                "fitted": p.value(&fit.model.parameters),
+                "std": at.and_then(|i| fit.std.get(i)).map_or(Value::Null, |s| number(s / decision.independent.sqrt())),
+                "unit": case.motion.unit(p.unit()),
+            });
+            (p.name().to_owned(), value)
+        })
+        .collect()
+}
+
+fn overlays(record: &Record, gap: &Gap) -> Vec<Overlay> {
+    (0..CHANNELS.len())
+        .filter_map(|c| {
+            let channel = record.channels[c].as_deref()?;
+            let mut o = Overlay {
+                channel: CHANNELS[c],
+                time: Vec::new(),
+                measured: Vec::new(),
+                before: Vec::new(),
+                after: Vec::new(),
+                noise: record.noise[c],
+            };
+            let mut last = None;
+            let samples = gap.covered.iter().flat_map(|r| r.clone());
+            for (k, (before, after)) in samples.zip(gap.runs[0].iter().zip(&gap.runs[1])) {
+                if last.is_some_and(|l| l + 1 != k) {
+                    o.push([record.time(k), f64::NAN, f64::NAN, f64::NAN]);
+                }
+                last = Some(k);
+                o.push([record.time(k), channel[k], before[c], after[c]]);
+            }
+            Some(o)
+        })
+        .collect()
+}

@@ -1,0 +1,125 @@
+//! The scales of a record: what an effect's starts are multiples of, and what bounds it.
+
+use super::super::model::Model;
+use super::fit::{Fit, Problem};
+use super::tracking::track;
+use crate::axis::Structure;
+use crate::effects::{Effect, Extent, Family, Place, Scale, Settings};
+
+pub struct Scales {
+    pub torque: f64,
+    pub peak: f64,
+    pub speed: [f64; 2],
+    pub twist: f64,
+    pub rotation: [f64; 2],
+    pub travel: [[f64; 2]; 2],
+    pub dt: f64,
+    pub length: f64,
+    pub mode: f64,
+    pub inertia: f64,
+    pub top: f64,
+    pub fastest: [f64; 2],
+    /// Positions of motor and table, sorted.
+    positions: [Vec<f64>; 2],
+    structure: Structure,
+}
+
+impl Scales {
+    pub fn new(p: &Problem<'_>, fit: &Fit) -> Option<Self> {
+        let t = track(&fit.model, p.record, fit.bandwidth)?;
+        let n = t.motion.len() as f64;
+        let rms = |f: &dyn Fn(&[f64; 4]) -> f64| (t.motion.iter().map(|m| f(m).powi(2)).sum::<f64>() / n).sqrt();
+        let side = |i: usize| {
+            let mean = t.motion.iter().map(|m| m[i]).sum::<f64>() / n;
+            let low = t.motion.iter().map(|m| m[i]).fold(f64::INFINITY, f64::min);
+            let high = t.motion.iter().map(|m| m[i]).fold(f64::NEG_INFINITY, f64::max);
+            (rms(&|m| m[i] - mean).max(1e-12), [low, high])
+        };
+        let (r1, t1) = side(0);
+        let (r2, t2) = side(2);
+        let torque = &p.record.torque;
+        let mean = torque.iter().sum::<f64>() / n;
+        let q = &p.nominal.parameters;
+        Some(Self {
+            torque: (torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / n).sqrt(),
+            peak: torque.iter().fold(0.0, |m, t| t.abs().max(m)),
+            speed: [rms(&|m| m[1]), rms(&|m| m[3])],
+            twist: rms(&|m| m[0] - m[2]).max(1e-15),
+            rotation: [r1, r2],
+            travel: [t1, t2],
+            dt: p.record.dt,
+            length: n * p.record.dt,
+            mode: if p.nominal.structure == Structure::TwoInertia {
+                q.modal().wn
+            } else {
+                0.5 * p.band.omega.last().copied().unwrap_or(1.0)
+            },
+            inertia: q.i1 + q.i2,
+            top: p.band.omega.last().copied().unwrap_or(1.0),
+            fastest: [1, 3].map(|i| t.motion.iter().fold(0.0_f64, |m, s| m.max(s[i].abs()))),
+            positions: [0, 2].map(|i| {
+                let mut x: Vec<f64> = t.motion.iter().map(|m| m[i]).collect();
+                x.sort_by(f64::total_cmp);
+                x
+            }),
+            structure: p.nominal.structure,
+        })
+    }
+
+    /// Whether every one of these effects of the model is one that the record could show.
+    pub fn admit(&self, model: &Model, effects: impl Iterator<Item = Effect>) -> bool {
+        let rigid = self.structure == Structure::Rigid;
+        let p = &model.parameters;
+        let all = p.i1 + p.i2;
+        effects.into_iter().all(|e| {
+            let info = e.info();
+            let side = usize::from(info.place == Place::Table);
+            let extent = Extent {
+                torque: self.peak,
+                positions: &self.positions[side],
+                speed: self.speed[side],
+                fastest: self.fastest[side],
+                twist: self.twist,
+                dt: self.dt,
+                length: self.length,
+                band: self.top,
+                inertia: [
+                    if rigid {
+                        all
+                    } else if side == 1 {
+                        p.i2
+                    } else {
+                        p.i1
+                    },
+                    all,
+                ],
+                stiffness: if rigid { 0.0 } else { p.k },
+            };
+            (info.bounds)(model.effects.of(e), &extent)
+        })
+    }
+
+    /// The value that is a fraction of a scale.
+    pub fn value(&self, effect: Effect, scale: Scale, f: f64, s: &Settings) -> f64 {
+        let side = usize::from(effect.info().place == Place::Table);
+        match scale {
+            Scale::One if effect.info().family == Family::FlexibleMode => {
+                let p = s.of(effect);
+                2.0 * f * (p[0] * p[1]).sqrt()
+            }
+            Scale::One | Scale::Order | Scale::Frequency => f,
+            Scale::Speed => f * self.speed[side],
+            Scale::Twist => f * self.twist,
+            Scale::Torque => f * self.peak,
+            Scale::Rotation => f * self.rotation[side],
+            Scale::Sample => f * self.dt,
+            Scale::Mode => {
+                let w = f * self.mode;
+                s.of(effect)[0] * w * w
+            }
+            Scale::Inertia => f * self.inertia,
+            Scale::Travel if f > 0.0 => self.travel[1][1] - f * (self.travel[1][1] - self.travel[1][0]),
+            Scale::Travel => self.travel[1][0] - f * (self.travel[1][1] - self.travel[1][0]),
+        }
+    }
+}

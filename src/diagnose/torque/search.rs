@@ -1,0 +1,434 @@
+//! How a verdict is reached, top to bottom.
+//!
+//! A hypothesis is a set of effects in their forms beside the axis' own parameters. One function, [`Problem::evidence`], says how
+//! well the record speaks for it. One search raises it: from the axis alone and from the best of the textbook's combinations
+//! (bias, Coulomb, viscous and their asymmetry, all of them compared), an effect is added, dropped or exchanged as long as that
+//! helps. The verdict is the hypothesis at the end; what it leaves is the remainder.
+//!
+//! Held-out data have no part in it.
+
+use rayon::prelude::*;
+
+use super::super::decide::Verdict;
+use super::fit::{Fit, Problem, Term};
+use super::likelihood::Band;
+use super::scales::Scales;
+use super::starts::{Regression, StartPoint, starts};
+use crate::effects::Effect;
+
+/// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
+const MATERIAL: f64 = 0.25;
+/// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor, which is an estimate itself.
+const AT_FLOOR: f64 = 1.15;
+/// Starts that are fitted of those that the regression ranks first.
+const FITTED: usize = 12;
+/// Effects whose richer forms are looked at, too.
+const PROMISING: usize = 4;
+/// Most causes looked for.
+const MOST: usize = 5;
+/// Gauss-Newton steps of a fit.
+const STEPS: usize = 12;
+/// Share of the gap's power that the causes must explain together to be called its causes.
+const EXPLAINED: f64 = 0.75;
+/// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
+const WHITE: f64 = 0.6;
+/// Difference of log evidence below which two hypotheses are alike.
+const ALIKE: f64 = 3.0;
+
+/// A hypothesis with its evidence.
+#[derive(Debug, Clone)]
+pub struct Weighed {
+    /// What was fitted.
+    pub fit: Fit,
+    /// Log evidence.
+    pub evidence: f64,
+    /// Posterior probability among the hypotheses tried.
+    pub probability: f64,
+}
+
+/// An effect named, and another that explains the record as well in its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Confusable {
+    /// The one named.
+    pub named: Effect,
+    /// The other.
+    pub other: Effect,
+    /// Log evidence with the named one less that with the other.
+    pub difference: f64,
+}
+
+/// The decision.
+#[derive(Debug, Clone)]
+pub struct Decision {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Model as given.
+    pub given: Fit,
+    /// Its parameters fitted.
+    pub parameters: Fit,
+    /// The hypothesis decided for.
+    pub chosen: Fit,
+    /// Every hypothesis that was fitted, best first.
+    pub ranking: Vec<Weighed>,
+    /// Share of the gap of each effect of the chosen hypothesis.
+    pub shares: Vec<f64>,
+    /// Probability of each.
+    pub probabilities: Vec<f64>,
+    /// Share of the values that are independent.
+    pub independent: f64,
+    /// Effects that the record cannot tell from chosen ones.
+    pub confusable: Vec<Confusable>,
+}
+
+/// A search over hypotheses.
+pub struct Search<'a> {
+    /// The record and how it is compared.
+    pub problem: Problem<'a>,
+    /// Effects that may be named.
+    pub suspects: Vec<Effect>,
+    /// Told what is being done.
+    pub progress: &'a (dyn Fn(&str) + Sync),
+}
+
+/// Finds the hypothesis of largest evidence.
+#[must_use]
+pub fn decide(mut search: Search<'_>) -> Decision {
+    (search.progress)("the model as given");
+    let nominal = search.problem.nominal;
+    let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
+    let parameters = search.problem.fit(&nominal, &[], given.discrepancy, 2 * STEPS).unwrap_or_else(|| given.clone());
+    search.problem.scales = Scales::new(&search.problem, &parameters);
+    let mut pool = vec![given.clone(), parameters.clone()];
+    let mut chosen = search.climb(parameters.clone(), &mut pool);
+    if !search.at_floor(&chosen) {
+        // All of the textbook's combinations, and whatever else helps beside the best of them.
+        (search.progress)("the textbook's friction");
+        let textbook = search.textbook(&parameters);
+        pool.extend(textbook.iter().cloned());
+        let share = search.independent(&textbook);
+        if let Some(first) = search.best(&textbook, share).filter(|f| f.terms != chosen.terms).cloned() {
+            let other = search.climb(first, &mut pool);
+            let share = search.independent(&[chosen.clone(), other.clone()]);
+            if search.evidence(&other, share) > search.evidence(&chosen, share) {
+                chosen = other;
+            }
+        }
+    }
+    search.conclude(given, parameters, chosen, pool)
+}
+
+impl Search<'_> {
+    fn band(&self) -> &Band {
+        self.problem.band
+    }
+
+    fn evidence(&self, fit: &Fit, independent: f64) -> f64 {
+        self.problem.evidence(fit, independent)
+    }
+
+    /// Share of independent values of the residual of the likeliest.
+    fn independent(&self, fits: &[Fit]) -> f64 {
+        let best = fits.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+        best.map_or(1.0, |f| self.band().independent(&f.rows, f.discrepancy))
+    }
+
+    fn best<'f>(&self, fits: &'f [Fit], independent: f64) -> Option<&'f Fit> {
+        fits.iter().max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
+    }
+
+    fn at_floor(&self, fit: &Fit) -> bool {
+        self.band().noise_multiple(&fit.rows).powi(2) < AT_FLOOR
+    }
+
+    /// Every combination of the textbook's effects at the motor, each from its own regression.
+    fn textbook(&self, parameters: &Fit) -> Vec<Fit> {
+        let own: Vec<Term> = self
+            .suspects
+            .iter()
+            .filter(|e| e.info().textbook)
+            .flat_map(|e| (0..e.info().variants.len().min(2)).map(|v| (*e, v)))
+            .collect();
+        let mut sets: Vec<Vec<Term>> = vec![Vec::new()];
+        for &term in &own {
+            let more: Vec<Vec<Term>> = sets
+                .iter()
+                .filter(|s| s.iter().all(|t| t.0 != term.0))
+                .map(|s| s.iter().copied().chain([term]).collect())
+                .collect();
+            sets.extend(more);
+        }
+        sets.retain(|s| s.len() > 1);
+        sets.par_iter()
+            .filter_map(|terms| {
+                let mut fit = parameters.clone();
+                for i in 0..terms.len() {
+                    let start = self.starts_of(&fit, terms[i]).into_iter().next()?;
+                    fit = self.problem.fit(
+                        &start.model,
+                        &terms[..=i],
+                        fit.discrepancy,
+                        if i + 1 == terms.len() { STEPS } else { 3 },
+                    )?;
+                }
+                Some(fit)
+            })
+            .collect()
+    }
+
+    fn starts_of(&self, fit: &Fit, term: Term) -> Vec<StartPoint> {
+        let Some(scales) = &self.problem.scales else { return Vec::new() };
+        starts(&self.problem, fit, &Regression::new(&self.problem, fit), scales, term)
+    }
+
+    /// Whether an effect may stand beside these.
+    fn may_join(&self, terms: &[Term], effect: Effect) -> bool {
+        terms.iter().all(|(e, _)| *e != effect && !e.excludes(effect))
+    }
+
+    /// Adds, drops and exchanges effects as long as the evidence grows.
+    fn climb(&self, from: Fit, pool: &mut Vec<Fit>) -> Fit {
+        let mut best = from;
+        for _ in 0..MOST {
+            if self.at_floor(&best) || best.terms.len() >= MOST {
+                break;
+            }
+            (self.progress)(&format!("{} hypotheses fitted", pool.len()));
+            let added = self.added(&best, best.terms.len());
+            pool.extend(added.iter().cloned());
+            let material = |f: &&Fit| best.terms.is_empty() || self.is_material(&best, f);
+            let all: Vec<Fit> = added.iter().filter(material).cloned().collect();
+            let share = self.independent(&all);
+            let Some(next) = self.best(&all, share) else { break };
+            if self.evidence(next, share) <= self.evidence(&best, share) {
+                break;
+            }
+            best = self.exchanged(next.clone(), pool);
+            best = self.pruned(best, pool);
+        }
+        best
+    }
+
+    /// Whether the richer explains a material part of what the plainer leaves.
+    fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
+        let (before, after) = (self.band().excess(&plain.rows), self.band().excess(&rich.rows));
+        (0..self.band().equations()).any(|i| after[i] <= (1.0 - MATERIAL) * before[i])
+    }
+
+    /// The fit with each effect that may join it, the best starts of all fitted.
+    fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
+        let Some(scales) = &self.problem.scales else { return Vec::new() };
+        let regression = Regression::new(&self.problem, fit);
+        let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
+        let of = |terms: Vec<Term>| -> Vec<StartPoint> {
+            terms
+                .par_iter()
+                .flat_map_iter(|t| starts(&self.problem, fit, &regression, scales, *t).into_iter().take(2))
+                .collect()
+        };
+        // Forms that free more than another are looked at where that other is among the best.
+        let mut points = of(suspects.iter().flat_map(|e| forms(*e, false)).collect());
+        points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut promising: Vec<Effect> = Vec::new();
+        for p in &points {
+            if promising.len() < PROMISING && !promising.contains(&p.term.0) {
+                promising.push(p.term.0);
+            }
+        }
+        points.truncate(FITTED);
+        let richer = of(promising.iter().flat_map(|e| forms(*e, true)).collect());
+        points.extend(richer);
+        points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        points.truncate(FITTED);
+        points
+            .par_iter()
+            .filter_map(|s| {
+                let mut terms = fit.terms.clone();
+                terms.insert(keep, s.term);
+                self.problem.fit(&s.model, &terms, fit.discrepancy, STEPS)
+            })
+            .collect()
+    }
+
+    /// The fit without one of its effects.
+    fn without(&self, fit: &Fit, i: usize) -> Option<Fit> {
+        let mut terms = fit.terms.clone();
+        let (gone, _) = terms.remove(i);
+        let mut start = fit.model;
+        start.effects.of_mut(gone).copy_from_slice(self.problem.nominal.effects.of(gone));
+        self.problem.fit(&start, &terms, fit.discrepancy, STEPS)
+    }
+
+    /// Each effect in turn exchanged for another that explains the record better.
+    fn exchanged(&self, fit: Fit, pool: &mut Vec<Fit>) -> Fit {
+        let mut best = fit;
+        if best.terms.len() < 2 || self.at_floor(&best) {
+            return best;
+        }
+        for i in 0..best.terms.len() {
+            let Some(without) = self.without(&best, i) else { continue };
+            let others = self.added(&without, i);
+            pool.extend(others.iter().cloned());
+            pool.push(without);
+            let mut all = others;
+            all.push(best.clone());
+            let share = self.independent(&all);
+            if let Some(other) = self.best(&all, share) {
+                best = other.clone();
+            }
+        }
+        best
+    }
+
+    /// Drops effects that the evidence does not need.
+    fn pruned(&self, fit: Fit, pool: &mut Vec<Fit>) -> Fit {
+        let mut best = fit;
+        while best.terms.len() > 1 {
+            let mut all: Vec<Fit> =
+                (0..best.terms.len()).into_par_iter().filter_map(|i| self.without(&best, i)).collect();
+            pool.extend(all.iter().cloned());
+            all.retain(|plain| {
+                !self.is_material(plain, &best) || {
+                    let share = self.independent(std::slice::from_ref(&best));
+                    self.evidence(plain, share) >= self.evidence(&best, share)
+                }
+            });
+            let share = self.independent(std::slice::from_ref(&best));
+            match self.best(&all, share) {
+                Some(plain) => best = plain.clone(),
+                None => break,
+            }
+        }
+        best
+    }
+
+    /// The verdict on the hypothesis at the end.
+    fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, mut pool: Vec<Fit>) -> Decision {
+        pool.push(chosen.clone());
+        let independent = self.independent(std::slice::from_ref(&chosen));
+        let plain = if self.evidence(&parameters, independent) > self.evidence(&given, independent) {
+            &parameters
+        } else {
+            &given
+        };
+        let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
+        let explained = self.explained(&parameters, &chosen);
+        let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
+        let settled = self.at_floor(&chosen) || white;
+        let verdict = match chosen.terms.is_empty() {
+            false if settled || explained >= EXPLAINED => Verdict::Effect,
+            false => Verdict::Unexplained,
+            true if !settled && self.band().torque_share(&chosen.rows, self.problem.record) > 0.15 => {
+                Verdict::Unexplained
+            }
+            true if chosen.coordinates.is_empty() => Verdict::NoGap,
+            true => Verdict::Parameters,
+        };
+        // What the chosen hypothesis lacks no material part of is no rival of it, only itself and something small.
+        pool.retain(|f| {
+            f.terms.len() <= chosen.terms.len() || !chosen.terms.iter().all(|t| f.terms.iter().any(|o| o.0 == t.0))
+        });
+        let mut ranking = self.weighed(pool, independent);
+        let probabilities: Vec<f64> = chosen
+            .terms
+            .iter()
+            .map(|(e, _)| {
+                let of: f64 = ranking
+                    .iter()
+                    .filter(|w| w.fit.terms.iter().any(|(o, _)| o.info().family == e.info().family))
+                    .map(|w| w.probability)
+                    .sum();
+                of * (1.0 - 0.5 * (1.0 - explained).clamp(0.0, 1.0))
+            })
+            .collect();
+        ranking.truncate(40);
+        let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
+        let shares = self.shares(&chosen);
+        Decision { verdict, given, parameters, chosen, ranking, shares, probabilities, independent, confusable }
+    }
+
+    /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.
+    fn explained(&self, parameters: &Fit, chosen: &Fit) -> f64 {
+        let (before, after) = (self.band().excess(&parameters.rows), self.band().excess(&chosen.rows));
+        let i = (0..self.band().equations())
+            .max_by(|a, b| {
+                let seen = |i: usize| before[i] / self.band().noise_power(i).max(f64::MIN_POSITIVE);
+                seen(*a).total_cmp(&seen(*b))
+            })
+            .unwrap_or(0);
+        if before[i] > 0.0 { (1.0 - after[i] / before[i]).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// Each hypothesis once, best first, with its probability.
+    fn weighed(&self, pool: Vec<Fit>, independent: f64) -> Vec<Weighed> {
+        let mut all: Vec<Weighed> = pool
+            .into_iter()
+            .map(|fit| Weighed { evidence: self.evidence(&fit, independent), fit, probability: 0.0 })
+            .filter(|w| w.evidence.is_finite())
+            .collect();
+        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let key = |f: &Fit| {
+            let mut ids: Vec<(Effect, usize)> = f.terms.clone();
+            ids.sort_unstable();
+            (ids, f.coordinates.is_empty())
+        };
+        let mut seen = Vec::new();
+        all.retain(|w| {
+            let k = key(&w.fit);
+            let new = !seen.contains(&k);
+            if new {
+                seen.push(k);
+            }
+            new
+        });
+        let top = all.first().map_or(0.0, |w| w.evidence);
+        let sum: f64 = all.iter().map(|w| (w.evidence - top).exp()).sum();
+        for w in &mut all {
+            w.probability = (w.evidence - top).exp() / sum;
+        }
+        all
+    }
+
+    /// Share of each effect: what comes back without it, everything else as it is.
+    fn shares(&self, fit: &Fit) -> Vec<f64> {
+        let own = self.band().excess(&fit.rows);
+        let lost: Vec<f64> = fit
+            .terms
+            .iter()
+            .map(|(e, _)| {
+                let mut model = fit.model;
+                model.effects.of_mut(*e).copy_from_slice(self.problem.nominal.effects.of(*e));
+                let Some(rows) = self.problem.rows(&model, fit.bandwidth) else { return 1.0 };
+                let without = self.band().excess(&rows);
+                (0..self.band().equations())
+                    .map(|i| (without[i] - own[i]).max(0.0) / self.band().noise_power(i).max(f64::MIN_POSITIVE))
+                    .sum::<f64>()
+            })
+            .collect();
+        let sum: f64 = lost.iter().sum();
+        lost.iter().map(|l| if sum > 0.0 { l / sum } else { 1.0 / lost.len() as f64 }).collect()
+    }
+}
+
+/// Forms of an effect: those that free all that an earlier one does and more, or the others.
+fn forms(effect: Effect, richer: bool) -> Vec<Term> {
+    let all = effect.info().variants;
+    let contains = |v: usize| all[..v].iter().any(|p| p.free.iter().all(|i| all[v].free.contains(i)));
+    (0..all.len()).filter(|v| contains(*v) == richer).map(|v| (effect, v)).collect()
+}
+
+/// Named effects that another family explains as well.
+fn confusable(chosen: &Fit, ranking: &[Weighed], evidence: f64) -> Vec<Confusable> {
+    let mut out: Vec<Confusable> = Vec::new();
+    for w in ranking.iter().filter(|w| evidence - w.evidence < ALIKE && w.fit.terms.len() == chosen.terms.len()) {
+        let gone: Vec<Effect> =
+            chosen.terms.iter().map(|t| t.0).filter(|e| w.fit.terms.iter().all(|t| t.0 != *e)).collect();
+        let come: Vec<Effect> =
+            w.fit.terms.iter().map(|t| t.0).filter(|e| chosen.terms.iter().all(|t| t.0 != *e)).collect();
+        if let ([named], [other]) = (&gone[..], &come[..])
+            && !out.iter().any(|c| c.named == *named && c.other == *other)
+        {
+            out.push(Confusable { named: *named, other: *other, difference: evidence - w.evidence });
+        }
+    }
+    out
+}

@@ -1,0 +1,355 @@
+//! Where a fit of an effect starts: the shapes on the record's scales, the sizes by linear regression on what the model lacks.
+
+use super::super::model::Model;
+use super::fit::{Fit, Problem, Term};
+use super::likelihood::C;
+use super::scales::Scales;
+use super::tracking::track;
+use crate::effects::{Place, Role, Scale, Settings, Start};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+
+/// A start with the gain in log likelihood that the regression promises.
+#[derive(Clone)]
+pub struct StartPoint {
+    pub term: Term,
+    pub model: Model,
+    pub gain: f64,
+}
+
+/// Projects the present columns out, and regresses.
+pub struct Regression {
+    q: Vec<Vec<f64>>,
+    z: Vec<f64>,
+    s: [f64; 2],
+}
+
+impl Regression {
+    pub fn new(p: &Problem<'_>, fit: &Fit) -> Self {
+        let s = fit.discrepancy;
+        let mut q: Vec<Vec<f64>> = Vec::new();
+        for c in &fit.columns {
+            let mut v = p.band.whiten(c, s);
+            orthogonalise(&q, &mut v);
+            if normalise(&mut v) {
+                q.push(v);
+            }
+        }
+        let mut z = p.band.whiten(&fit.rows, s);
+        orthogonalise(&q, &mut z);
+        Self { q, z, s }
+    }
+
+    /// Coefficients of columns for the lacking torque to vanish, and the gain in log likelihood; negative coefficients where not allowed are dropped.
+    pub fn solve(&self, p: &Problem<'_>, columns: &[[Vec<C>; 2]], signed: &[bool]) -> Option<(Vec<f64>, f64)> {
+        let j: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|c| {
+                let mut v = p.band.whiten(c, self.s);
+                orthogonalise(&self.q, &mut v);
+                v
+            })
+            .collect();
+        let k = j.len();
+        let a = DMatrix::from_fn(k, k, |x, y| dot(&j[x], &j[y]));
+        let full: Vec<f64> = columns
+            .iter()
+            .map(|c| {
+                let v = p.band.whiten(c, self.s);
+                dot(&v, &v)
+            })
+            .collect();
+        for i in 0..k {
+            if a[(i, i)].is_nan() || a[(i, i)] <= 1e-9 * full[i] {
+                return None;
+            }
+        }
+        let g = DVector::from_fn(k, |x, _| -dot(&j[x], &self.z));
+        let scale: Vec<f64> = (0..k).map(|i| a[(i, i)].sqrt()).collect();
+        let m = DMatrix::from_fn(k, k, |x, y| a[(x, y)] / (scale[x] * scale[y]) + if x == y { 1e-9 } else { 0.0 });
+        let r = DVector::from_fn(k, |x, _| g[x] / scale[x]);
+        let sol = m.cholesky()?.solve(&r);
+        let c: Vec<f64> = (0..k).map(|i| sol[i] / scale[i]).collect();
+        for i in 0..k {
+            if !signed[i] && c[i] <= 0.0 {
+                return None;
+            }
+        }
+        let gain = 0.5 * g.dot(&DVector::from_vec(c.clone()));
+        Some((c, gain))
+    }
+
+    pub fn residual(&self) -> &[f64] {
+        &self.z
+    }
+}
+
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+fn orthogonalise(q: &[Vec<f64>], v: &mut [f64]) {
+    for _ in 0..2 {
+        for u in q {
+            let c = dot(u, v);
+            for (x, y) in v.iter_mut().zip(u) {
+                *x -= c * y;
+            }
+        }
+    }
+}
+fn normalise(v: &mut [f64]) -> bool {
+    let n = dot(v, v).sqrt();
+    if n.is_nan() || n <= 1e-150 {
+        return false;
+    }
+    for x in v.iter_mut() {
+        *x /= n;
+    }
+    true
+}
+
+/// Frequencies (Hz) at which a side's residual stands out.
+fn frequencies(p: &Problem<'_>, reg: &Regression, side: usize) -> Vec<f64> {
+    let per = 2 * p.band.equations();
+    let eq = if p.band.equations() == 2 { side } else { 0 };
+    let power: Vec<f64> = reg.residual().chunks_exact(per).map(|c| c[2 * eq].powi(2) + c[2 * eq + 1].powi(2)).collect();
+    peaks(&power, 4)
+        .into_iter()
+        .filter(|m| *m > 0)
+        .map(|m| refine(&power, m) * p.band.omega[1] / std::f64::consts::TAU)
+        .collect()
+}
+
+fn refine(power: &[f64], m: usize) -> f64 {
+    // Two bins of a line share its amplitude.
+    let (a, b) = (power[m - 1].sqrt(), power.get(m + 1).copied().unwrap_or(0.0).sqrt());
+    let c = power[m].sqrt();
+    m as f64 + if b > a { b / (b + c) } else { -a / (a + c) }
+}
+
+fn peaks(power: &[f64], most: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = (1..power.len())
+        .filter(|&i| power[i] >= power[i - 1] && power.get(i + 1).is_none_or(|n| power[i] >= *n))
+        .collect();
+    all.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    all.truncate(most);
+    all
+}
+
+/// Orders (periods per radian over 2 pi: as the effect's own unit, 1/rad) at which the residual is periodic in the angle.
+fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Vec<f64>> {
+    let t = track(&fit.model, p.record, fit.bandwidth)?;
+    let band = p.band;
+    let per = 2 * band.equations();
+    let eq = if band.equations() == 2 { side } else { 0 };
+    let mut z = vec![C::default(); band.n];
+    for (m, c) in reg.residual().chunks_exact(per).enumerate() {
+        z[m] = C::new(c[2 * eq], c[2 * eq + 1]);
+        if m > 0 {
+            z[band.n - m] = z[m].conj();
+        }
+    }
+    FftPlanner::new().plan_fft_inverse(band.n).process(&mut z);
+    let low = t.motion.iter().map(|m| m[2 * side]).fold(f64::INFINITY, f64::min);
+    let high = t.motion.iter().map(|m| m[2 * side]).fold(f64::NEG_INFINITY, f64::max);
+    let range = (high - low).max(1e-12);
+    const BINS: usize = 4096;
+    let mut bins = vec![C::default(); 4 * BINS];
+    for (k, m) in t.motion.iter().enumerate() {
+        let at = ((m[2 * side] - low) / range * (BINS as f64 - 1.0)) as usize;
+        bins[at.min(BINS - 1)] += C::new(z[k].re * band.taper[k], 0.0);
+    }
+    FftPlanner::new().plan_fft_forward(4 * BINS).process(&mut bins);
+    // Not faster than the band at the rms speed, at least half a period over the range.
+    let speed =
+        (t.motion.iter().map(|m| m[2 * side + 1].powi(2)).sum::<f64>() / t.motion.len() as f64).sqrt().max(1e-12);
+    let step = std::f64::consts::TAU / (4.0 * range);
+    let top = ((band.omega.last()? / speed / step) as usize).min(BINS / 2);
+    let power: Vec<f64> = (0..=top).map(|m| if m < 3 { 0.0 } else { bins[m].norm_sqr() }).collect();
+    Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
+}
+
+/// Starts of one form of an effect beside the fit's, the best first.
+pub fn starts(p: &Problem<'_>, fit: &Fit, reg: &Regression, scales: &Scales, term: Term) -> Vec<StartPoint> {
+    let (effect, form) = term;
+    let info = effect.info();
+    let side = usize::from(info.place == Place::Table);
+    let free = info.variants[form].free;
+    let mut grid: Vec<Settings> = vec![fit.model.effects];
+    let off = Settings::default();
+    for s in &mut grid {
+        s.of_mut(effect).copy_from_slice(off.of(effect));
+    }
+    let mut order: Vec<usize> = free.to_vec();
+    order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
+    for &i in &order {
+        let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
+        let found;
+        let fractions = match scale {
+            Scale::Order => {
+                found = orders(p, fit, reg, side).unwrap_or_default();
+                &found[..]
+            }
+            Scale::Frequency => {
+                found = frequencies(p, reg, side);
+                &found[..]
+            }
+            _ => fractions,
+        };
+        let mut next = Vec::new();
+        for s in &grid {
+            for &f in fractions {
+                let mut t = *s;
+                let v = scales.value(effect, scale, f, &t);
+                if !(v >= info.parameters[i].min && v <= info.parameters[i].max) {
+                    continue;
+                }
+                t.of_mut(effect)[i] = v;
+                next.push(t);
+            }
+        }
+        grid = next;
+    }
+    let mut all: Vec<StartPoint> = grid.par_iter().filter_map(|s| one(p, fit, reg, scales, term, s)).collect();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    all
+}
+
+fn one(
+    p: &Problem<'_>,
+    fit: &Fit,
+    reg: &Regression,
+    scales: &Scales,
+    (effect, form): Term,
+    shapes: &Settings,
+) -> Option<StartPoint> {
+    let info = effect.info();
+    let free = info.variants[form].free;
+    if info.parameters.iter().all(|q| !matches!(q.start, Start::Linear))
+        && !scales.admit(&Model { effects: *shapes, ..fit.model }, std::iter::once(effect))
+    {
+        return None;
+    }
+    let rows_of = |s: &Settings| p.rows(&Model { effects: *s, ..fit.model }, fit.bandwidth);
+    let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
+        [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
+    };
+    let size = |c: &[Vec<C>; 2]| (c.iter().flatten().map(|c| c.norm_sqr()).sum::<f64>() * 2.0 / p.band.n as f64).sqrt();
+    let target = 0.05 * scales.torque;
+    let sizes: Vec<usize> = free
+        .iter()
+        .copied()
+        .filter(|&i| info.parameters[i].role == Role::Size && matches!(info.parameters[i].start, Start::Linear))
+        .collect();
+    let mut columns: Vec<[Vec<C>; 2]> = Vec::new();
+    let mut signed = Vec::new();
+    let mut trial = Vec::new();
+    let mut at = *shapes;
+    for &i in &sizes {
+        let q = &info.parameters[i];
+        let mut v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
+        let mut column = None;
+        for _ in 0..2 {
+            let v1 = v.clamp(q.min, q.max);
+            let mut s = *shapes;
+            s.of_mut(effect)[i] = v1;
+            let r = rows_of(&s)?;
+            let c = difference(&r, &fit.rows, 1.0);
+            let got = size(&c);
+            if got.is_nan() || got <= 0.0 {
+                return None;
+            }
+            v = v1;
+            column = Some(c);
+            let ratio = target / got;
+            if ratio > 0.1 && ratio < 10.0 {
+                break;
+            }
+            v *= ratio;
+        }
+        columns.push(column?);
+        signed.push(q.min < 0.0);
+        trial.push(v.clamp(q.min, q.max));
+        at.of_mut(effect)[i] = v.clamp(q.min, q.max);
+    }
+    if sizes.is_empty() {
+        // The size is among the shapes tried.
+        let r = rows_of(shapes)?;
+        columns.push(difference(&r, &fit.rows, 1.0));
+        signed.push(false);
+    }
+    // Shapes that enter linearly beside the first size.
+    let mut extra = Vec::new();
+    let base = if sizes.len() == 1 { Some(columns[0].clone()) } else { None };
+    for &i in free {
+        let q = &info.parameters[i];
+        let step = match q.start {
+            Start::Share => 0.3,
+            Start::Phase => std::f64::consts::FRAC_PI_2,
+            Start::Linear if q.role == Role::Shape => {
+                // A damping.
+                let v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
+                v.clamp(q.min, q.max)
+            }
+            _ => continue,
+        };
+        let mut s = at;
+        s.of_mut(effect)[i] = q.off + step;
+        let r = rows_of(&s)?;
+        let total = difference(&r, &fit.rows, 1.0);
+        let c = if matches!(q.start, Start::Phase) { total } else { difference(&total, base.as_ref()?, 1.0) };
+        columns.push(c);
+        signed.push(true);
+        extra.push((i, step));
+    }
+    let (c, gain) = reg.solve(p, &columns, &signed)?;
+    let mut model = fit.model;
+    let own = model.effects.of_mut(effect);
+    own.copy_from_slice(at.of(effect));
+    if sizes.is_empty() {
+        // Only the first size follows the factor.
+        if let Some(&i) = free.iter().find(|&&i| info.parameters[i].role == Role::Size) {
+            own[i] = (own[i] * c[0].clamp(0.2, 5.0)).clamp(info.parameters[i].min, info.parameters[i].max);
+        }
+    }
+    for (j, &i) in sizes.iter().enumerate() {
+        own[i] = (trial[j] * c[j]).clamp(info.parameters[i].min, info.parameters[i].max);
+    }
+    for (e, &(i, step)) in extra.iter().enumerate() {
+        let b = c[columns.len() - extra.len() + e];
+        let q = &info.parameters[i];
+        if matches!(q.start, Start::Phase) {
+            // a*sin(x) + b*cos(x).
+            let (a0, t) = (c[0], trial[0]);
+            own[sizes[0]] = t * a0.hypot(b);
+            own[i] = b.atan2(a0);
+        } else {
+            own[i] = (q.off + step * b / c[0]).clamp(q.min, q.max);
+            if matches!(q.start, Start::Share) {
+                own[i] = own[i].clamp(-0.9, 0.9);
+            }
+        }
+    }
+    if !scales.admit(&model, std::iter::once(effect)) {
+        return None;
+    }
+    Some(StartPoint { term: (effect, form), model, gain })
+}
+
+/// A size that makes about the record's torque, by its unit.
+fn guess(unit: &str, s: &Scales, side: usize) -> f64 {
+    let (t, w, x) = (s.torque, s.speed[side].max(1e-12), s.rotation[side].max(1e-12));
+    match unit {
+        "N.m" => t,
+        "N.m.s/rad" => t / w,
+        "N.m.s2/rad2" => t / (w * w),
+        "N.m/rad" => t / x,
+        "N.m/s" => t / s.length,
+        "1/s" => 1.0 / s.length,
+        "1/rad2" => 1.0 / (s.twist * s.twist),
+        "rad" => s.twist,
+        "1" => 1.0,
+        _ => t,
+    }
+}

@@ -1,0 +1,123 @@
+//! Rigid axes under control, made by the axis' own step: what a drive's log looks like.
+
+use super::super::assess::{Case, Outcome};
+use super::super::decide::Verdict;
+use super::super::model::Model;
+use super::super::noise::estimate_noise;
+use super::super::record::Record;
+use super::diagnose;
+use crate::axis::{Axis, Hold, Motion, Parameters, Scheme, Structure};
+use crate::effects::{EFFECTS, Effect, Ramp, Settings};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const INERTIA: f64 = 2.0;
+const DT: f64 = 2e-3;
+
+fn parameters(i1: f64) -> Parameters {
+    Parameters { i1, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 }
+}
+
+/// A record of moves under a position controller; `foreign` is a torque that no model knows of.
+fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn(f64) -> f64, seed: u64) -> Record {
+    let n = 6000;
+    let axis = Axis::new(parameters(INERTIA), Structure::Rigid, effects, Scheme::Exact, DT);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut noise = |size: f64| size * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut torque, mut theta) = (Vec::new(), Vec::new());
+    for k in 0..n {
+        let t = f64::from(k) * DT;
+        let wanted = amplitude * ((0.9 * t).sin() + 0.35 * (2.3 * t).sin() * (1.0 - (-t).exp()));
+        let seen = state.theta1() + noise(1e-6);
+        let command = INERTIA * (900.0 * (wanted - seen) - 42.0 * state.omega1());
+        theta.push(seen);
+        torque.push(command + noise(torque_noise));
+        let acts = command + foreign(t);
+        state = axis.advance(&state, Ramp { start: acts, end: acts }, t);
+    }
+    Record { start: 0.0, dt: DT, hold: Hold::Zoh, torque, channels: [Some(theta), None, None, None], noise: [1e-6; 4] }
+}
+
+fn diagnosed(record: &Record, nominal: f64) -> Outcome {
+    let noise = estimate_noise(&record.torque, &[record.channels[0].as_deref(), None, None, None], None);
+    let case = Case {
+        machine: "stage".to_owned(),
+        nominal: Model::new(parameters(nominal), Structure::Rigid, Settings::default()),
+        motion: Motion::Rotary,
+        train: record,
+        noise: &noise,
+        holdout: None,
+        suspects: EFFECTS.to_vec(),
+    };
+    diagnose(&case, &|_| ())
+}
+
+fn named(o: &Outcome) -> Vec<&'static str> {
+    let mut ids: Vec<&str> = o.decision.chosen.effects.iter().map(|(e, _)| e.info().family.as_str()).collect();
+    ids.sort_unstable();
+    ids
+}
+
+/// What was tried, for a test that fails.
+fn told(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
+    let line = |w: &super::super::decide::Weighed| {
+        let f = &w.tested;
+        let values = f.effects.iter().map(|(e, _)| f.fitted.model.effects.of(*e).to_vec()).collect();
+        (f.ids().join("+"), w.bic, values)
+    };
+    o.decision.ranking.iter().take(12).map(line).collect()
+}
+
+fn with(values: &[(Effect, usize, f64)]) -> Settings {
+    let mut s = Settings::default();
+    for (e, i, v) in values {
+        s.of_mut(*e)[*i] = *v;
+    }
+    s
+}
+
+#[test]
+fn a_stage_with_nothing_hidden_has_no_cause_whatever_the_noise_of_its_torque() {
+    for (noise, nominal) in [(1e-9, INERTIA), (0.2, INERTIA), (0.05, 1.2 * INERTIA)] {
+        let o = diagnosed(&logged(Settings::default(), 1.0, noise, |_| 0.0, 1), nominal);
+        assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{noise}: {:?}", named(&o));
+        assert!((o.models[1].parameters.i1 / INERTIA - 1.0).abs() < 0.02, "{:?}", o.models[1].parameters);
+    }
+}
+
+#[test]
+fn friction_and_a_bias_are_named_with_their_sizes_at_the_axis() {
+    let hidden = [(Effect::CoulombMotor, 0, 1.5), (Effect::ViscousMotor, 0, 2.0), (Effect::LoadMotor, 0, 0.8)];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 0.02, |t| 0.02 * (0.31 * t * t).sin(), 2), 1.1 * INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "load_torque", "viscous_friction"], "{:#?}", told(&o));
+    for (effect, i, value) in hidden {
+        let got = o.improved.effects.of(effect)[i];
+        assert!((got / value - 1.0).abs() < 0.03, "{effect:?} {got}");
+    }
+    assert!(o.diagnosis.causes.iter().all(|c| c.place == "axis"), "{:?}", o.diagnosis.causes);
+    let remainder = o.diagnosis.remainder.expect("compared");
+    assert!(remainder.share < 0.05 && remainder.place == "axis", "{remainder:?}");
+}
+
+#[test]
+fn gravity_is_told_from_a_spring_where_the_hinge_turns_far_enough() {
+    let hidden = [(Effect::Gravity, 0, 6.0), (Effect::CoulombMotor, 0, 0.5)];
+    let o = diagnosed(&logged(with(&hidden), 1.2, 0.02, |_| 0.0, 3), INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "gravity"]);
+    assert!((o.improved.effects.of(Effect::Gravity)[0] / 6.0 - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_torque_that_the_library_has_no_law_for_is_not_named() {
+    // Wanders with the square root of the position's absolute value, of no sign of its own in time.
+    let o = diagnosed(
+        &logged(Settings::default(), 1.0, 0.01, |t| 2.0 * ((0.31 * t * t).sin() * (1.7 * t).sin()).cbrt(), 4),
+        INERTIA,
+    );
+    assert!(
+        o.decision.verdict == Verdict::Unexplained || o.diagnosis.causes.iter().all(|c| c.probability < 0.9),
+        "{:?}",
+        o.diagnosis.causes
+    );
+}

@@ -1,0 +1,286 @@
+//! The torque that a model lacks to follow a record: its simulation, held to the measured motion by a feedback.
+//!
+//! At every sample the model's reading is compared with the measured one and each measured inertia gets the impulse
+//! `d*dt`, `d = I*(g1*e + g2*(e - e_before))/dt^2`, `e = measured - read`. What the model lacks in all is then
+//!
+//! ```text
+//! r_i(k) = d_i(k) + (D e)_i(k),   D = [[I1 s^2 + B s + K, -(B s + K)], [-(B s + K), I2 s^2 + B s + K]]
+//! ```
+//!
+//! with central differences for `s` and `s^2`: exact for the linear axis whatever the feedback's bandwidth, because an impulse at a
+//! sample is one in the second difference there. The bandwidth only says along which motion the effects act: the model's own (low:
+//! output error) or the measured one (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a
+//! Kalman filter does.
+
+use super::super::model::{LOOPS, Model};
+use super::super::record::Record;
+use crate::axis::{Axis, Hold, Scheme, Structure, substeps};
+use crate::effects::{Ramp, Settings, TorqueHistory};
+
+/// What the model lacks, and the motion it was lacking it along.
+#[derive(Debug, Clone)]
+pub struct Tracked {
+    /// Torque lacking at motor and table, N.m; the second is zero on a rigid axis.
+    pub torque: [Vec<f64>; 2],
+    /// Measured less read position of each side, rad.
+    pub error: [Vec<f64>; 2],
+    /// Motion of the model: `[theta1, omega1, theta2, omega2]`.
+    pub motion: Vec<[f64; 4]>,
+}
+
+impl Tracked {
+    /// Of a model that could not be run.
+    #[must_use]
+    pub fn nothing(n: usize) -> Self {
+        let zero = || [vec![0.0; n], vec![0.0; n]];
+        Self { torque: zero(), error: zero(), motion: vec![[0.0; 4]; n] }
+    }
+}
+
+/// Bandwidth of the feedback on each side, rad/s.
+pub type Bandwidth = [f64; 2];
+
+/// Damping ratio of the feedback.
+const DAMPING: f64 = 0.7;
+
+/// Simulates the model held to the record; `None` when it leaves the finite numbers.
+#[must_use]
+pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth) -> Option<Tracked> {
+    Some(track_with(model, record, bandwidth, &[])?.0)
+}
+
+/// The same, with the effects' internal states at some samples, in order.
+fn track_with(
+    model: &Model,
+    record: &Record,
+    bandwidth: Bandwidth,
+    kept: &[usize],
+) -> Option<(Tracked, Vec<crate::effects::Memory<f64>>)> {
+    let mut memories = Vec::with_capacity(kept.len());
+    let n = record.len();
+    let dt = record.dt;
+    let rigid = model.structure == Structure::Rigid;
+    let per = substeps(&model.parameters, model.structure, &model.effects, dt);
+    let h = dt / per as f64;
+    let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
+    let p = &model.parameters;
+    let inertia = if rigid { [p.i1 + p.i2, 0.0] } else { [p.i1, p.i2] };
+    let position = [record.channels[0].as_deref(), record.channels[2].as_deref()];
+    let speed = [record.channels[1].as_deref(), record.channels[3].as_deref()];
+    let sides: Vec<usize> = (0..2).filter(|&i| position[i].is_some() || speed[i].is_some()).collect();
+    let gains = bandwidth.map(|w| {
+        let x = (w * dt).min(0.6);
+        [x * x, 2.0 * DAMPING * x]
+    });
+    // A complementary filter of position and speed crosses over where their noises are alike.
+    let crossover = [0, 1].map(|i| (record.noise[2 * i + 1] / record.noise[2 * i] * dt).min(1.0));
+    let first = initial(record);
+    let mut memory = [0.0; crate::effects::MEMORY];
+    for (effect, share) in LOOPS.iter().zip(&model.loops) {
+        if axis.on().forces().contains(effect) {
+            Settings::set_loop(&mut memory, *effect, *share);
+        }
+    }
+    let mut state = axis.resume(first, &memory, record.start);
+    let mut inputs = TorqueHistory::settled(*record.torque.first()?);
+    let sensed = !axis.on().sensors().is_empty();
+    let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), dt));
+    let mut error = [vec![0.0; n], vec![0.0; n]];
+    let mut given = [vec![0.0; n], vec![0.0; n]];
+    let mut motion = Vec::with_capacity(n);
+    let mut before = [f64::NAN; 2];
+    let mut fused = [0.0; 2];
+    for k in 0..n {
+        let time = record.start + k as f64 * dt;
+        let reading = match &history {
+            Some(history) => model.effects.transform_sensor(axis.on(), history, dt),
+            None => state.reading(),
+        };
+        let own = [[reading.theta1, reading.omega1], [reading.theta2, reading.omega2]];
+        let now = state.reading();
+        if kept.get(memories.len()) == Some(&k) {
+            memories.push(*state.memory());
+        }
+        motion.push([now.theta1, now.omega1, now.theta2, now.omega2]);
+        let mut push = [0.0; 2];
+        for &i in &sides {
+            let [g1, g2] = gains[i];
+            let d = match (position[i], speed[i]) {
+                (Some(y), v) => {
+                    let e = y[k] - own[i][0];
+                    let ev = v.map(|v| v[k] - own[i][1]);
+                    let rate = if before[i].is_nan() { 0.0 } else { e - before[i] };
+                    before[i] = e;
+                    error[i][k] = match ev {
+                        Some(ev) => {
+                            if k == 0 {
+                                fused[i] = e;
+                            }
+                            fused[i] += crossover[i] * (e - fused[i]);
+                            let at = fused[i];
+                            fused[i] += ev * dt;
+                            at
+                        }
+                        None => e,
+                    };
+                    g1 * e + g2 * rate
+                }
+                (None, Some(v)) => {
+                    let e = v[k] - own[i][1];
+                    error[i][k] = if k == 0 { 0.0 } else { error[i][k - 1] + before[i] * dt };
+                    before[i] = e;
+                    0.5 * g2 * e * dt
+                }
+                (None, None) => 0.0,
+            };
+            push[i] = inertia[i] * d / (dt * dt);
+        }
+        if push != [0.0; 2] {
+            push = axis.kick(&mut state, push.map(|d| d * dt), dt, time).map(|j| j / dt);
+        }
+        given[0][k] = push[0];
+        given[1][k] = push[1];
+        if k + 1 == n {
+            break;
+        }
+        let sample: Ramp<f64> = record.hold.ramp(&record.torque, k);
+        for j in 0..per {
+            let part = |i: usize| sample.start + (sample.end - sample.start) * (i as f64 / per as f64);
+            let mut ramp =
+                if per == 1 || record.hold == Hold::Zoh { sample } else { Ramp { start: part(j), end: part(j + 1) } };
+            if !axis.on().inputs().is_empty() {
+                ramp = model.effects.transform_input(axis.on(), ramp, h, &mut inputs);
+            }
+            state = axis.advance(&state, ramp, time + j as f64 * h);
+        }
+        if let Some(history) = &mut history {
+            model.effects.push_sensors(axis.on(), history, state.reading());
+        }
+        if !state.theta1().is_finite() || !state.omega2().is_finite() || state.omega1().abs() > 1e12 {
+            return None;
+        }
+    }
+    Some((Tracked { torque: lacking(model, dt, inertia, &error, given), error, motion }, memories))
+}
+
+/// Adds `D e` to what was given.
+fn lacking(model: &Model, dt: f64, inertia: [f64; 2], error: &[Vec<f64>; 2], given: [Vec<f64>; 2]) -> [Vec<f64>; 2] {
+    let n = given[0].len();
+    let p = &model.parameters;
+    let coupled = model.structure == Structure::TwoInertia;
+    let mut torque = given;
+    for k in 1..n.saturating_sub(1) {
+        let second = |e: &[f64]| (e[k + 1] - 2.0 * e[k] + e[k - 1]) / (dt * dt);
+        let first = |e: &[f64]| (e[k + 1] - e[k - 1]) / (2.0 * dt);
+        torque[0][k] += inertia[0] * second(&error[0]);
+        if coupled {
+            torque[1][k] += inertia[1] * second(&error[1]);
+            let pull = p.b * (first(&error[0]) - first(&error[1])) + p.k * (error[0][k] - error[1][k]);
+            torque[0][k] += pull;
+            torque[1][k] -= pull;
+        }
+    }
+    torque
+}
+
+/// The state at the first sample: positions as measured, speeds from the first samples; a side that is not measured moves with the other.
+fn initial(record: &Record) -> [f64; 4] {
+    let side = |i: usize| -> Option<[f64; 2]> {
+        let speed = record.channels[2 * i + 1].as_ref().map(|v| v[0]);
+        match &record.channels[2 * i] {
+            Some(y) => {
+                let m = y.len().min(6);
+                let mean = (m as f64 - 1.0) / 2.0;
+                let (mut a, mut b) = (0.0, 0.0);
+                for (j, v) in y[..m].iter().enumerate() {
+                    a += (j as f64 - mean) * (v - y[0]);
+                    b += (j as f64 - mean).powi(2);
+                }
+                Some([y[0], speed.unwrap_or(if b > 0.0 { a / b / record.dt } else { 0.0 })])
+            }
+            None => speed.map(|v| [0.0, v]),
+        }
+    };
+    let (motor, table) = (side(0), side(1));
+    let [a, b] = [motor.or(table), table.or(motor)].map(|s| s.unwrap_or_default());
+    [a[0], a[1], b[0], b[1]]
+}
+
+/// A state along a tracked motion, to run on from freely.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// `[theta1, omega1, theta2, omega2]`.
+    pub motion: [f64; 4],
+    memory: crate::effects::Memory<f64>,
+}
+
+/// Bandwidth of the feedback that finds the states at which runs start, as a share of the sampling rate.
+const STARTING: f64 = 0.1;
+
+/// States of a model held to the record, at some samples.
+#[must_use]
+pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<Run> {
+    let tracked = track_with(model, record, [STARTING / record.dt; 2], samples);
+    match tracked {
+        Some((t, memories)) => {
+            samples.iter().zip(memories).map(|(&k, memory)| Run { motion: t.motion[k], memory }).collect()
+        }
+        None => {
+            let first = initial(record);
+            samples.iter().map(|_| Run { motion: first, memory: [0.0; crate::effects::MEMORY] }).collect()
+        }
+    }
+}
+
+impl Run {
+    /// What the encoders read over a range of the record, from these positions and speeds at its first sample.
+    #[must_use]
+    pub fn from(
+        &self,
+        model: &Model,
+        record: &Record,
+        range: &std::ops::Range<usize>,
+        motion: [f64; 4],
+    ) -> Vec<[f64; 4]> {
+        let per = substeps(&model.parameters, model.structure, &model.effects, record.dt);
+        let h = record.dt / per as f64;
+        let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
+        let mut state = axis.resume(motion, &self.memory, record.time(range.start));
+        // What the torque's way in remembers comes from the samples before.
+        let warm = range.start.saturating_sub(WARM);
+        let mut inputs = TorqueHistory::settled(record.torque[warm]);
+        let torque = |k: usize, inputs: &mut TorqueHistory<f64>, j: usize| {
+            let sample: Ramp<f64> = record.hold.ramp(&record.torque, k);
+            let part = |i: usize| sample.start + (sample.end - sample.start) * (i as f64 / per as f64);
+            let ramp =
+                if per == 1 || record.hold == Hold::Zoh { sample } else { Ramp { start: part(j), end: part(j + 1) } };
+            if axis.on().inputs().is_empty() { ramp } else { model.effects.transform_input(axis.on(), ramp, h, inputs) }
+        };
+        for k in warm..range.start {
+            for j in 0..per {
+                torque(k, &mut inputs, j);
+            }
+        }
+        let sensed = !axis.on().sensors().is_empty();
+        let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), record.dt));
+        let mut out = Vec::with_capacity(range.len());
+        for k in range.clone() {
+            let r = match &history {
+                Some(history) => model.effects.transform_sensor(axis.on(), history, record.dt),
+                None => state.reading(),
+            };
+            out.push([r.theta1, r.omega1, r.theta2, r.omega2]);
+            for j in 0..per {
+                let ramp = torque(k, &mut inputs, j);
+                state = axis.advance(&state, ramp, record.time(k) + j as f64 * h);
+            }
+            if let Some(history) = &mut history {
+                model.effects.push_sensors(axis.on(), history, state.reading());
+            }
+        }
+        out
+    }
+}
+
+/// Samples before a run that the torque's way in is filled with.
+const WARM: usize = 64;

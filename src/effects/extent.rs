@@ -1,0 +1,54 @@
+//! What a record extends over: the measure of what physics lets an effect be on it.
+
+/// The extent of a record's motion and torque on the side where an effect acts, SI units.
+#[derive(Debug, Clone, Copy)]
+pub struct Extent<'a> {
+    /// Largest torque, N.m.
+    pub torque: f64,
+    /// Positions of the effect's side, rad, sorted.
+    pub positions: &'a [f64],
+    /// Rms speed of that side, rad/s.
+    pub speed: f64,
+    /// Largest speed of that side, rad/s.
+    pub fastest: f64,
+    /// Rms twist, rad.
+    pub twist: f64,
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// Length of the record, s.
+    pub length: f64,
+    /// Upper end of the band that the motion excites, rad/s.
+    pub band: f64,
+    /// Inertia of the side, and of the whole axis, kg.m2.
+    pub inertia: [f64; 2],
+    /// Stiffness of the coupling, N.m/rad; zero for a rigid axis.
+    pub stiffness: f64,
+}
+
+impl Extent<'_> {
+    /// Travel of the effect's side, rad.
+    #[must_use]
+    pub fn travel(&self) -> f64 {
+        self.positions.last().unwrap_or(&0.0) - self.positions.first().unwrap_or(&0.0)
+    }
+
+    /// Share of the samples beyond two positions.
+    #[must_use]
+    pub fn beyond(&self, lower: f64, upper: f64) -> f64 {
+        let x = self.positions;
+        let inside = x.partition_point(|x| *x <= upper).saturating_sub(x.partition_point(|x| *x < lower));
+        1.0 - inside as f64 / x.len().max(1) as f64
+    }
+
+    /// Whether an angular frequency lies in the band, with at least two periods in the record.
+    #[must_use]
+    pub fn holds(&self, omega: f64) -> bool {
+        omega <= self.band && omega * self.length >= 2.0 * std::f64::consts::TAU
+    }
+
+    /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band.
+    #[must_use]
+    pub fn turns(&self, order: f64) -> bool {
+        order * self.travel() >= 0.75 * std::f64::consts::TAU && order * self.speed <= self.band
+    }
+}

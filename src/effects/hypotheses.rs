@@ -1,0 +1,40 @@
+//! Which effects may be named of an axis, and which of them beside each other.
+
+use super::Effect;
+use super::info::{Family, Place};
+use crate::axis::Structure;
+
+impl Effect {
+    /// Whether the effect can be told from a record of an axis of that structure: a rigid one has no coupling and no second
+    /// encoder, and of two laws that differ by their side alone the motor's stands for both.
+    #[must_use]
+    pub fn may_be_named(self, structure: Structure) -> bool {
+        let info = self.info();
+        if !info.named {
+            return false;
+        }
+        if structure == Structure::TwoInertia {
+            return true;
+        }
+        match info.place {
+            Place::Coupling => false,
+            Place::Sensor => info.family == Family::Latch,
+            Place::Table => !super::EFFECTS.iter().any(|o| o.info().place == Place::Motor && o.is_kin_of(self)),
+            Place::Input | Place::Motor => true,
+        }
+    }
+
+    /// Whether two effects are laws of one thing, so that a record has one or the other.
+    #[must_use]
+    pub fn excludes(self, other: Self) -> bool {
+        let (a, b) = (self.info(), other.info());
+        a.family == Family::DryFriction && b.family == Family::DryFriction && a.place == b.place
+    }
+
+    /// Whether the effect is one that simulation over windows is asked for: those with an initial state of their own that such a
+    /// window cannot give it, and those that another explains to the letter there, are left to the comparison in torque.
+    #[must_use]
+    pub fn has_windows(self) -> bool {
+        !matches!(self, Self::Gravity | Self::PositionFriction | Self::MotorMode | Self::Latch)
+    }
+}
