@@ -5,7 +5,8 @@
 
 use std::sync::OnceLock;
 
-use eixo::fmu::host::{Fmu, Instance, StateHandle};
+use eixo::fmu::description::{BaseType, Causality};
+use eixo::fmu::host::{Fmu, HostError, Instance, StateHandle};
 use eixo::fmu::package::Package;
 use eixo::variables::{at, find};
 use proptest::prelude::*;
@@ -196,6 +197,73 @@ fn perform(i: &mut Instance, call: Call, model: &Model, saved: &mut Vec<Saved>, 
         }
         Call::Cancel => i.cancel_step().is_ok(),
         Call::LastTime => i.last_successful_time().is_ok_and(|t| (t - model.time()).abs() < 1e-9),
+    }
+}
+
+/// Values as no axis has them, but as an importer may set them.
+fn extreme() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        Just(1e308),
+        Just(-1e308),
+        Just(f64::MAX),
+        Just(1e-308),
+        Just(0.0),
+        Just(1e-6),
+        Just(1e150),
+        -1e3..1e3_f64,
+        (-300.0..300.0_f64).prop_map(|e| 10_f64.powf(e)),
+    ]
+}
+
+/// Sequences: EIXO_FUZZ_RUNS makes it as many as that.
+fn many() -> u32 {
+    std::env::var("EIXO_FUZZ_RUNS").ok().and_then(|n| n.parse().ok()).unwrap_or(1500)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: many(), failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_value_that_is_not_finite_comes_with_ok(
+        sets in prop::collection::vec((any::<prop::sample::Index>(), extreme()), 0..6),
+        inputs in prop::collection::vec((extreme(), extreme()), 1..8),
+        step in prop_oneof![Just(DT), Just(1e-9), Just(1.0), 1e-6..1e-2_f64],
+    ) {
+        let mut i = fmu().instantiate("axis").unwrap();
+        let settable: Vec<u32> = fmu()
+            .description
+            .variables
+            .iter()
+            .filter(|v| v.causality == Causality::Parameter && v.base() == BaseType::Real)
+            .map(|v| v.value_reference)
+            .collect();
+        for (index, value) in sets {
+            let _ = i.set_real(&[*index.get(&settable)], &[value]);
+        }
+        let finite = |values: Result<Vec<f64>, HostError>| values.is_err() || values.is_ok_and(|v| v.iter().all(|x| x.is_finite()));
+        let all = |i: &mut Instance| {
+            // One by one: one value that is refused hides no other.
+            let values = (0..8).all(|r| finite(i.get_real(&[r])));
+            let slopes = OUTPUTS.iter().all(|&r| finite(i.get_output_derivatives(&[r], &[1])));
+            let partial = OUTPUTS.iter().all(|&r| finite(i.directional_derivative(&[r], &[0], &[1.0])));
+            values && slopes && partial
+        };
+        let _ = i.setup_experiment(None, 0.0, None);
+        let _ = i.enter_initialization();
+        prop_assert!(all(&mut i), "in initialisation mode");
+        if i.exit_initialization().is_ok() {
+            let mut time = 0.0;
+            for (torque, slope) in inputs {
+                let _ = i.set_real(&[0], &[torque]);
+                let _ = i.set_input_derivatives(&[0], &[1], &[slope]);
+                if i.do_step(time, step).is_err() {
+                    break;
+                }
+                time += step;
+                prop_assert!(all(&mut i), "at {time}");
+            }
+        }
+        prop_assert!(all(&mut i), "at the end");
     }
 }
 

@@ -22,6 +22,8 @@ pub(super) enum Fault {
     NotSettable { index: Named, mode: Mode },
     /// NaN or infinity.
     NotFinite { index: Named, value: f64 },
+    /// An output that is no finite number any more.
+    NoNumber { index: Named, value: f64 },
     /// Out of the bounds of the variable.
     Bounds { index: Named, value: f64 },
     /// An argument that must be a finite number, greater than zero where said.
@@ -68,6 +70,9 @@ impl fmt::Display for Fault {
                 write!(f, "{v} ({:?} {:?}) cannot be set {mode}", v.variability, v.causality)
             }
             Self::NotFinite { index, value } => write!(f, "{} = {value}: it must be a finite number", index),
+            Self::NoNumber { index, value } => {
+                write!(f, "{index} is {value}: check the start values, the parameters and the inputs")
+            }
             Self::Bounds { index, value } => {
                 let v = index.variable();
                 let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));

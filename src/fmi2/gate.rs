@@ -255,7 +255,7 @@ unsafe fn instance<'a>(c: Component) -> Option<&'a Instance> {
 pub(super) unsafe fn destroy(c: Component) {
     // SAFETY: the caller's.
     let Some(found) = (unsafe { instance(c) }) else { return };
-    if found.busy.load(Ordering::Acquire) {
+    if found.busy.swap(true, Ordering::Acquire) {
         // Freed from inside its own logger: the call under way still needs it.
         return;
     }
@@ -280,10 +280,10 @@ pub(super) unsafe fn enter(
 ) -> Status {
     // SAFETY: the caller's.
     let Some(instance) = (unsafe { instance(c) }) else { return Status::Error };
-    if instance.busy.load(Ordering::Acquire) {
+    // Taken and looked at in one: two threads at once, which the standard forbids, do not both come in.
+    if instance.busy.swap(true, Ordering::Acquire) {
         return Status::Error;
     }
-    instance.busy.store(true, Ordering::Release);
     // SAFETY: `busy` lets one call at a time come here, so this is the only reference.
     let body = unsafe { &mut *instance.body.get() };
     let status = if body.mode as u8 & function.mask() == 0 {

@@ -11,8 +11,9 @@ use crate::effects::{Effect, Ramp, Reading, SensorHistory, TorqueHistory, effect
 use crate::scalar::{Dual, Scalar};
 use crate::variables::{Slot, Starts, Values, Variable, all, effect_of};
 
-/// Most internal steps in one communication step.
-pub(super) const MOST_STEPS: f64 = 1e9;
+/// Most internal steps in one communication step: about a second of work with every effect on, so that no call is taken
+/// for one that hangs.
+pub(super) const MOST_STEPS: f64 = 2e6;
 /// A communication step that is longer than whole internal steps by less than this share is cut into that many.
 const SLACK: f64 = 1e-6;
 /// Share of the internal step over which the output derivatives of an axis with effects look ahead.

@@ -39,7 +39,8 @@ slots! {
         ..gain("rho", "m/rad", 3.18e-4, "Lead of the screw per radian")
     };
     SampleTime = Variable {
-        min: Some(1e-9),
+        // As for the axis' internal step.
+        min: Some(1e-6),
         max: Some(1e3),
         variability: Variability::Fixed,
         ..gain("sample_time", "s", 1e-3, "Sampling interval: the drive reads its inputs at its start and after each interval")

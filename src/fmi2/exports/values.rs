@@ -53,6 +53,12 @@ fn set(body: &mut Body, references: &[c_uint], real: bool, value: impl Fn(usize)
     Ok(Status::Ok)
 }
 
+/// A value for the importer: no infinity and no NaN passes as fmi2OK.
+#[inline]
+fn finite(model: Model, index: usize, value: f64) -> Result<f64, Fault> {
+    if value.is_finite() { Ok(value) } else { Err(Fault::NoNumber { index: Named(model, index), value }) }
+}
+
 /// Refuses every value reference: there is no variable of that type.
 fn none_of(references: &[c_uint], wanted: &'static str) -> Result<Status, Fault> {
     match references.first() {
@@ -68,7 +74,8 @@ pub unsafe extern "C" fn fmi2GetReal(c: Component, vr: *const c_uint, count: usi
         let (vr, value) = unsafe { (array(vr, count, "vr")?, array_mut(value, count, "value")?) };
         let model = body.kernel.model();
         for (out, &reference) in value.iter_mut().zip(vr) {
-            *out = body.kernel.get(resolve(model, reference, true)?)?;
+            let index = resolve(model, reference, true)?;
+            *out = finite(model, index, body.kernel.get(index)?)?;
         }
         Ok(Status::Ok)
     })
@@ -178,6 +185,9 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
                 *out = derivative(index(reference));
             }
         })?;
+        for (out, &reference) in result.iter().zip(unknown) {
+            finite(model, index(reference), *out)?;
+        }
         Ok(Status::Ok)
     })
 }
@@ -237,7 +247,7 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
             if order != 1 {
                 return Err(Fault::Order(order));
             }
-            *out = body.kernel.output_derivative(index)?;
+            *out = finite(model, index, body.kernel.output_derivative(index)?)?;
         }
         Ok(Status::Ok)
     })
