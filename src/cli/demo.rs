@@ -20,9 +20,9 @@ use super::say::{say, say_line};
 use crate::axis::{Parameters, dt_criterion};
 use crate::diagnose::{Case, Model, diagnose};
 use crate::effects::EFFECTS;
-use crate::fmu::host::Fmu;
+use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
-use crate::fmu::simulate::{Inputs, Options, Rows, parse_setting, simulate};
+use crate::fmu::simulate::{Inputs, Options, Rows, parse_setting};
 use crate::identify::excitation::{Kind, Multisine};
 use crate::identify::run::{Method, Request, identify};
 use crate::identify::tables::reproduce;
@@ -68,9 +68,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write_csv(&file("excitation.csv"), &torque, Motion::Rotary)?;
 
     steps.next("simulating the FMU");
-    let fmu = Fmu::open(&fmu_file).with_context(|| fmu_file.display().to_string())?;
+    let host = Host::new().context("cannot find this program's own file")?;
     let options = Options { hold: Hold::Linear, rows: Rows::InputsSet, ..Options::default() };
-    let record = simulate(&fmu, &Inputs::of(&torque)?, &options).with_context(|| fmu_file.display().to_string())?;
+    let record = simulate(&fmu_file, &Inputs::of(&torque)?, &options, &host).with_context(|| fmu_file.display().to_string())?;
     let trace = record.trace(Hold::Linear)?;
     write_csv(&file("trace.csv"), &trace, Motion::Rotary)?;
 
@@ -87,7 +87,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let findings =
         Findings { consistent, euler, tables: reproduce()?, crest_factor: excitation.crest_factor(), lines: LINES };
 
-    let diagnosis = hidden_friction(&fmu, &args.output, dt, &steps)?;
+    let diagnosis = hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
 
     steps.next("writing the report");
     write_text(&file("identification.json"), &serde_json::to_vec_pretty(&findings.consistent)?)?;
@@ -124,7 +124,7 @@ const SEED: u64 = 20_060_718;
 const PERIODS: usize = 4;
 
 /// Lets the FMU play a machine with friction that the model does not know, and diagnoses it.
-fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::Result<Vec<Block>> {
+fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) -> anyhow::Result<Vec<Block>> {
     let file = |name: &str| folder.join(name);
     steps.next("simulating a machine with hidden friction");
     let period = Multisine::new(Kind::Schroeder, SAMPLES, 1, LINES, RMS, 0.0, 0)?.period();
@@ -132,7 +132,7 @@ fn hidden_friction(fmu: &Fmu, folder: &Path, dt: f64, steps: &Steps) -> anyhow::
     let torque = Trace::new(0.0, dt, Hold::Zoh).with(Signal::T, torque)?;
     let setting = parse_setting(&format!("coulomb_motor.level={HIDDEN}")).map_err(anyhow::Error::msg)?;
     let options = Options { hold: Hold::Zoh, rows: Rows::InputsSet, settings: vec![setting], ..Options::default() };
-    let run = simulate(fmu, &Inputs::of(&torque)?, &options)?.trace(Hold::Zoh)?;
+    let run = simulate(fmu, &Inputs::of(&torque)?, &options, host)?.trace(Hold::Zoh)?;
     let mut log = torque;
     let mut draws = ChaCha8Rng::seed_from_u64(SEED);
     for signal in [Signal::Theta1, Signal::Theta2] {

@@ -18,9 +18,9 @@ use crate::identify::parameters::{NAMES, units as base_units};
 use crate::report::diagnose::{Findings, report, short};
 use crate::report::format::{Medium, number};
 use crate::report::{html, terminal};
-use crate::fmu::host::Fmu;
+use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
-use crate::fmu::simulate::{Inputs, Options, Setting, simulate};
+use crate::fmu::simulate::{Inputs, Options, Setting};
 use crate::trace::{Machine, Signal, Trace, load, write_text};
 
 /// Arguments of `eixo diagnose`.
@@ -233,7 +233,7 @@ fn replayed(path: &Path, replay: &Replay) -> anyhow::Result<String> {
         settings: settings.map(|(n, v)| Setting { name: (*n).to_owned(), value: format!("{v:e}") }).collect(),
         ..Options::default()
     };
-    let run = simulate(&Fmu::open(path)?, &Inputs::of(&trace)?, &options)?;
+    let run = simulate(path, &Inputs::of(&trace)?, &options, &Host::new()?)?;
     let mut parts = Vec::new();
     for (channel, name) in record.channels.iter().zip(CHANNELS) {
         let (Some(measured), Some(own)) = (channel, run.get(name)) else { continue };

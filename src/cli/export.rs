@@ -1,13 +1,16 @@
 //! `eixo export`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
 
-use super::say::say_line;
+use super::say::{say, say_line};
 use super::drives::Drives;
+use crate::fmu::isolation;
+use crate::fmu::output;
 use crate::fmu::package::{Package, XyTable};
+use crate::fmu::validation::{Options, validate};
 use crate::trace::Machine;
 
 /// Arguments of `eixo export`.
@@ -28,6 +31,9 @@ pub struct Args {
     /// For an XY table: no connectors of the system itself, for tools that know only its components (ecos)
     #[arg(long)]
     pub bare: bool,
+    /// Validate the FMU that was written, as `eixo validate` does
+    #[arg(long, conflicts_with = "y")]
+    pub check: bool,
     /// The drives.
     #[command(flatten)]
     pub drives: Drives,
@@ -41,6 +47,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let x = args.axis.as_deref().map(Machine::read).transpose()?;
     if args.fmu.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
         anyhow::ensure!(!args.drive, "--drive writes an FMU: give {} the end .fmu", args.fmu.display());
+        anyhow::ensure!(!args.check, "--check is for an FMU: give {} the end .fmu", args.fmu.display());
         return table(&args, x.unwrap_or_default());
     }
     anyhow::ensure!(args.y.is_none() && !args.bare, "--y and --bare are for an XY table: give {} the end .ssp", args.fmu.display());
@@ -58,7 +65,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     package.write(&args.fmu)?;
     let platforms: Vec<&str> = Package::platforms().collect();
     say_line!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
-    Ok(ExitCode::SUCCESS)
+    if args.check { check(&args.fmu) } else { Ok(ExitCode::SUCCESS) }
+}
+
+/// Validates what was written; the FMU runs in child processes, as any other.
+fn check(fmu: &Path) -> anyhow::Result<ExitCode> {
+    let options = Options::new(std::env::current_exe().context("cannot find this program's own file")?);
+    isolation::adopt_orphans();
+    let report = validate(fmu, &options, &|_, _| {});
+    isolation::end_orphans();
+    let report = report?;
+    say!("{}", output::text(&report, false, false, false))?;
+    Ok(if report.passes(false) { ExitCode::SUCCESS } else { ExitCode::from(super::FINDINGS) })
 }
 
 /// The XY table: X carries Y.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use rand::SeedableRng;
@@ -9,9 +10,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::say::say_line;
-use crate::fmu::host::Fmu;
+use crate::fmu::contained::{self, Host, simulate};
+use crate::fmu::isolation;
 use crate::fmu::package::Package;
-use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting, simulate};
+use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting};
 use crate::trace::{Hold, Machine, Table, load, write_columns};
 
 /// Arguments of `eixo simulate`.
@@ -58,6 +60,12 @@ pub struct Args {
     /// Record the outputs as each step left them, before the next inputs are set (as most importers do)
     #[arg(long)]
     pub step_end: bool,
+    /// Run the FMU in a sandbox: no network, no new processes, no files but its own (as `validate` does)
+    #[arg(long)]
+    pub sandbox: bool,
+    /// Longest time a call of an FMI function may take, s; no limit by default
+    #[arg(long, value_name = "SECONDS")]
+    pub timeout: Option<f64>,
 }
 
 /// What the inputs do between samples.
@@ -136,16 +144,22 @@ fn add_noise(record: &mut Record, noise: &[Noise], seed: u64) -> anyhow::Result<
     Ok(())
 }
 
-/// Opens the model; an axis file is exported into a temporary folder and run as an FMU, as any other tool would.
-fn open(path: &Path) -> anyhow::Result<(Fmu, Option<Machine>)> {
+/// The model: an axis file is exported into a temporary folder and run as an FMU, as any other tool would.
+struct Model {
+    fmu: PathBuf,
+    machine: Option<Machine>,
+    _folder: Option<tempfile::TempDir>,
+}
+
+fn open(path: &Path) -> anyhow::Result<Model> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let machine = Machine::read(path)?;
-        let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
-        let file = folder.path().join("axis.fmu");
-        Package::of(&machine).with_context(|| path.display().to_string())?.write(&file)?;
-        return Ok((Fmu::open(&file)?, Some(machine)));
+        let folder = isolation::temporary::folder().context("cannot make a temporary folder")?;
+        let fmu = folder.path().join("axis.fmu");
+        Package::of(&machine).with_context(|| path.display().to_string())?.write(&fmu)?;
+        return Ok(Model { fmu, machine: Some(machine), _folder: Some(folder) });
     }
-    Ok((Fmu::open(path).with_context(|| path.display().to_string())?, None))
+    Ok(Model { fmu: path.to_owned(), machine: None, _folder: None })
 }
 
 /// Runs the command.
@@ -156,7 +170,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.controlled {
         return controlled(args);
     }
-    let (fmu, machine) = open(&args.model)?;
+    let Model { fmu, machine, _folder } = open(&args.model)?;
+    let name = || args.model.display().to_string();
+    let description = contained::describe(&fmu).with_context(name)?;
+    if let Some(timeout) = args.timeout {
+        anyhow::ensure!(timeout > 0.0 && timeout < 1e9, "--timeout {timeout}: must be above 0");
+    }
     let mut hold = args.hold.map(Hold::from);
     let inputs = match (&args.input, &machine) {
         (None, _) => Inputs::default(),
@@ -167,7 +186,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             hold = hold.or(Some(loaded.trace.hold));
             Inputs::of(&loaded.trace)?
         }
-        (Some(path), None) => Inputs::from_table(&Table::read(path)?, &fmu.description)?,
+        (Some(path), None) => Inputs::from_table(&Table::read(path)?, &description)?,
     };
     let options = Options {
         start: args.start,
@@ -178,7 +197,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         outputs: args.outputs,
         rows: if args.step_end { Rows::StepEnd } else { Rows::InputsSet },
     };
-    let record = simulate(&fmu, &inputs, &options)?;
+    let host = Host::new().context("cannot find this program's own file")?;
+    let host = Host { sandbox: args.sandbox, call: args.timeout.map(Duration::from_secs_f64), ..host };
+    isolation::adopt_orphans();
+    let record = simulate(&fmu, &inputs, &options, &host);
+    isolation::end_orphans();
+    let record = record.with_context(name)?;
     finish(record, &args.output, &args.noise, args.seed)
 }
 

@@ -9,12 +9,19 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::say::say;
-use crate::fmu::isolation::{self, Bounds};
+use crate::fmu::contained::Host;
+use crate::fmu::isolation;
 use crate::fmu::output;
+use crate::fmu::reference::{Wanted, compare};
+use crate::fmu::rules::Outcome;
 use crate::fmu::validation::{Options, validate};
-use crate::trace::write_text;
+use crate::report::{html, validation as page};
+use crate::trace::{Hold, write_text};
 
 use super::FINDINGS;
+
+/// Nothing was found, but the FMU's behaviour could not be tested.
+const NOT_TESTED: u8 = 3;
 
 /// How to write the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -32,14 +39,16 @@ enum Format {
 /// Arguments of `eixo validate`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Each behavioural rule runs the FMU in a process of its own with limits of time and memory. That contains mistakes, not
-malice: an FMU is a program, and runs with your rights.
+Each behavioural rule runs the FMU in a process of its own, with limits of time, memory and disk, in a sandbox without
+network, new processes and your files (Linux: Landlock and seccomp; a line says where the kernel lacks them).
 
-Exit code: 0 no finding of error severity (with --strict: no finding), 1 findings, 2 could not run.
+Exit code: 0 no finding of error severity (with --strict: nor a warning), 1 findings, 2 could not run, 3 no finding, but
+the behaviour could not be tested (no co-simulation, no binary for this platform, a tool that is missing).
 
 Examples:
   eixo validate axis.fmu --strict
-  eixo validate axis.fmu --format junit -o validation.xml")]
+  eixo validate axis.fmu --format junit -o validation.xml
+  eixo validate model.fmu --reference model_ref.csv --report validation.html")]
 pub struct Args {
     /// The FMU
     #[arg(required_unless_present_any = ["rules", "child"])]
@@ -56,7 +65,7 @@ pub struct Args {
     /// Leave these rules out
     #[arg(long, value_name = "RULE,...", value_delimiter = ',')]
     skip: Vec<String>,
-    /// Let any finding count as an error
+    /// Let warnings count as errors
     #[arg(long)]
     strict: bool,
     /// Test the archive and the XML alone; run nothing of the FMU
@@ -65,18 +74,45 @@ pub struct Args {
     /// Print the list of rules and end
     #[arg(long)]
     rules: bool,
-    /// Longest time a behavioural rule may take, in seconds
+    /// List each finding, not each cause
+    #[arg(long)]
+    all: bool,
+    /// Longest time a call of an FMI function may take, in seconds; an FMU that is slow from the start is given more
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     timeout: f64,
+    /// Longest time of all behavioural rules together, in seconds; what is not reached is not tested
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    budget: f64,
+    /// Run the FMU in the sandbox, the default
+    #[arg(long, overrides_with = "no_sandbox")]
+    sandbox: bool,
+    /// Run the FMU with your rights: files, network, processes
+    #[arg(long, overrides_with = "sandbox")]
+    no_sandbox: bool,
+    /// Let the FMU read this file or folder too, as its tool's; may be given many times
+    #[arg(long, value_name = "PATH")]
+    allow: Vec<PathBuf>,
     /// Most memory a behavioural rule may take, in MiB
     #[arg(long, value_name = "MIB", default_value_t = 8192)]
     memory: u64,
     /// Rules tested at the same time [default: as many as there are processors]
     #[arg(short, long)]
     jobs: Option<usize>,
-    /// Test one rule for a parent process
-    #[arg(long, hide = true, value_name = "TASK")]
-    child: Option<PathBuf>,
+    /// Compare a run with reference results: a trace with a column `time` and one for each variable
+    #[arg(long, value_name = "TRACE", conflicts_with = "static_only")]
+    reference: Option<PathBuf>,
+    /// Inputs of that run: a trace with a column `time` and one for each input
+    #[arg(long, value_name = "TRACE", requires = "reference")]
+    input: Option<PathBuf>,
+    /// How far that run may be from the reference, as a share of its range
+    #[arg(long, value_name = "SHARE", default_value_t = 0.01, requires = "reference")]
+    tolerance: f64,
+    /// Write the report as a page, with plots
+    #[arg(long, value_name = "HTML")]
+    report: Option<PathBuf>,
+    /// Do a job for a parent process, which comes through standard input
+    #[arg(long, hide = true)]
+    child: bool,
 }
 
 /// Runs the command.
@@ -84,8 +120,8 @@ pub struct Args {
 /// # Errors
 /// When the file cannot be read, a rule does not exist, or the report cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if let Some(task) = &args.child {
-        return Ok(isolation::child(task));
+    if args.child {
+        return Ok(isolation::child());
     }
     if args.rules {
         let text = match args.format {
@@ -97,14 +133,22 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let fmu = args.fmu.as_ref().context("no FMU given")?;
     anyhow::ensure!(args.timeout > 0.0 && args.timeout < 1e6, "--timeout {}: must be above 0", args.timeout);
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    anyhow::ensure!(args.budget > 0.0 && args.budget < 1e6, "--budget {}: must be above 0", args.budget);
+    for path in &args.allow {
+        path.symlink_metadata().with_context(|| format!("--allow {}", path.display()))?;
+    }
+    let defaults = Options::new(std::env::current_exe().context("cannot find this program's own file")?);
     let options = Options {
         only: args.only.clone(),
         skip: args.skip.clone(),
         static_only: args.static_only,
-        jobs: args.jobs.unwrap_or(cores),
-        bounds: Bounds { time: Duration::from_secs_f64(args.timeout), memory: args.memory << 20 },
-        program: std::env::current_exe().context("cannot find this program's own file")?,
+        jobs: args.jobs.unwrap_or(defaults.jobs),
+        call: Duration::from_secs_f64(args.timeout),
+        budget: Duration::from_secs_f64(args.budget),
+        memory: args.memory << 20,
+        sandbox: !args.no_sandbox,
+        allow: args.allow.clone(),
+        ..defaults
     };
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")?);
@@ -114,18 +158,47 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         bar.set_message(rule.to_owned());
         bar.inc(1);
     });
+    let comparison = args.reference.as_ref().filter(|_| report.is_ok()).map(|reference| {
+        bar.set_message("reference results");
+        anyhow::ensure!(args.tolerance > 0.0 && args.tolerance.is_finite(), "--tolerance {}: must be above 0", args.tolerance);
+        let wanted = Wanted { reference, input: args.input.as_deref(), hold: Hold::Linear, tolerance: args.tolerance };
+        let host = Host {
+            program: options.program.clone(),
+            sandbox: options.sandbox,
+            call: Some(options.call * 20),
+            memory: Some(options.memory),
+        };
+        compare(fmu, &wanted, &host).with_context(|| fmu.display().to_string())
+    });
     isolation::end_orphans();
     bar.finish_and_clear();
     let report = report?;
+    let comparison = comparison.transpose()?;
     let color = args.output.is_none() && std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let text = match args.format {
-        Format::Text => output::text(&report, args.strict, color),
-        Format::Json => format!("{:#}\n", output::json(&report, args.strict)),
+        Format::Text => {
+            let compared = comparison.as_ref().map(output::compared).unwrap_or_default();
+            compared + &output::text(&report, args.strict, color, args.all)
+        }
+        Format::Json => {
+            let mut json = output::json(&report, args.strict);
+            json["reference"] = comparison.as_ref().map_or(serde_json::Value::Null, output::compared_json);
+            format!("{json:#}\n")
+        }
         Format::Junit => output::junit(&report, args.strict),
         Format::Sarif => format!("{:#}\n", output::sarif(&report)),
     };
     write(&args, &text)?;
-    Ok(if report.passes(args.strict) { ExitCode::SUCCESS } else { ExitCode::from(FINDINGS) })
+    if let Some(path) = &args.report {
+        let page = page::report(&report, comparison.as_ref(), args.strict);
+        write_text(path, html::page(&page).as_bytes())?;
+    }
+    Ok(match report.outcome(args.strict) {
+        _ if comparison.is_some_and(|c| !c.passes()) => ExitCode::from(FINDINGS),
+        Outcome::Passes => ExitCode::SUCCESS,
+        Outcome::Fails => ExitCode::from(FINDINGS),
+        Outcome::NotTested => ExitCode::from(NOT_TESTED),
+    })
 }
 
 /// Writes to the file, which appears whole or not at all, or to standard output.

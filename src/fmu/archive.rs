@@ -248,9 +248,7 @@ impl Archive {
                 return Err(ArchiveError::Unsafe { name: entry.name.clone(), hazard });
             }
         }
-        let folder = tempfile::Builder::new()
-            .prefix("eixo-fmu-")
-            .tempdir()
+        let folder = super::isolation::temporary::folder()
             .map_err(|reason| ArchiveError::Io { path: std::env::temp_dir(), reason })?;
         let root = folder.path().to_owned();
         self.for_all(|archive, index, budget| archive.extract_entry(&root, index, budget))?;

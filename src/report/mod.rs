@@ -14,6 +14,7 @@ pub mod html;
 pub mod identify;
 pub mod polar;
 pub mod terminal;
+pub mod validation;
 
 mod controlled;
 mod decimate;

@@ -32,10 +32,18 @@ enum {
     NAN_HANG, CANCEL, TIME, DERIVATIVE, INPUT_DERIVATIVE, OUTPUT_DERIVATIVE, DIRECTIONAL, DEPENDENCY, GLOBAL, THREADS,
     HANDOVER, LEAK, LEAK_LARGE, NULL_CRASH, LEAK_FILE, LEAK_THREAD, STEP_LEAK, CALLBACKS, NAME_KEPT, ALLOCATION, DEBUG_LOGGING, LOG_CATEGORY,
     DIRECTORY, ROUNDING, DENORMALS, STDOUT, SIGNALS, ENVIRONMENT, LOCALE, FILES,
+    SECOND_FAILS, SECOND_CRASH, KEPT, ORDER, TERMINATED_GET, TERMINATED_RESET, RESOURCES_PATH, START_TIME, STOP_TIME,
+    INPUTS_LOST, SET_WRONG, STRING_BUFFER, TUNABLE_IGNORED, REFERENCE_CUT, STATE_LEAK, STATE_LATE, STATE_PROMISE,
+    RESET_SLOPE, INITIAL_KEPT, OUTPUT_BEHIND, SLOPE_IGNORED, DEPENDENCY_STEP, NOT_CONSTANT, TIME_HIDDEN, LOCALE_NUMBERS,
+    ENUMERATION, DISK, LOG_FOREIGN, FORGES,
     DAEMON
 };
 #ifndef DEFECT
 #define DEFECT NONE
+#endif
+/* What hostile.c does in each step. */
+#ifndef HOOK
+#define HOOK()
 #endif
 #define IS(name) (DEFECT == (name))
 
@@ -54,7 +62,7 @@ typedef struct {
 typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8 } Phase;
 
 typedef struct {
-    double x, v, w, F, k, d, g, time, last_step, noise;
+    double x, v, w, F, k, d, g, time, last_step, noise, slope, stop, elapsed, shown, offset, spare;
     int mode, on, calls;
     Phase phase;
     char label[32];
@@ -70,11 +78,16 @@ typedef struct {
     pthread_t thread;
     void *leaks;
     Values *pointer;
+    double first_x;
+    int initialised;
 } Instance;
 
 static double global_w;
 static volatile double scratch;
 static Values shared_state;
+static int made, alive;
+static double kept_k = 10;
+static __thread char buffer[64];
 
 #define W(i) (*(IS(GLOBAL) ? &global_w : &(i)->values.w))
 
@@ -83,6 +96,7 @@ static void start(Values *s) {
     memset(s, 0, sizeof *s);
     s->x = 1;
     s->k = IS(START_VALUE) ? 11 : 10;
+    s->stop = INFINITY;
     s->d = 0.5;
     s->g = 9.81;
     strcpy(s->label, IS(START_STRING) ? "another" : "mass");
@@ -132,7 +146,7 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
         struct stat info;
         char path[4096];
         snprintf(path, sizeof path, "%s", resources + strlen("file://"));
-        if (stat(path, &info)) *(volatile int *)8 = 1;
+        if (stat(path, &info) && !strchr(path, '%')) *(volatile int *)8 = 1;
     }
     Instance *i = callbacks->allocate(1, sizeof(Instance));
     if (!i && !IS(ALLOCATION)) return NULL;
@@ -149,6 +163,18 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
         i->values.noise = ((unsigned char *)noise)[500];
         free(noise);
     }
+    if (IS(SECOND_FAILS) && made) return NULL;
+    if (IS(SECOND_CRASH) && made) *(volatile int *)8 = 1;
+    made++;
+    if (IS(KEPT)) i->values.k = kept_k;
+    if (IS(ORDER)) i->values.offset = 1e-3 * alive;
+    alive++;
+    if (IS(RESOURCES_PATH)) {
+        char path[4096];
+        snprintf(path, sizeof path, "%s/data.txt", resources + strlen("file://"));
+        if (access(path, R_OK)) return NULL;
+    }
+    if (IS(LOCALE_NUMBERS)) i->values.d = strtod("0.5", NULL);
     if (IS(LEAK)) i->leaks = malloc(1000);
     if (IS(LEAK_LARGE)) i->leaks = malloc(100000);
     if (IS(LEAK_FILE)) i->leaks = fopen("/dev/null", "r");
@@ -183,6 +209,7 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
 EXPORT void fmi2FreeInstance(Component c) {
     Instance *i = c;
     if (!i && !IS(FREE_NULL)) return;
+    alive--;
     if (IS(FREE_CRASH) && i->values.phase == TERMINATED) abort();
     if (IS(STEP_LEAK))
         while (i->leaks) {
@@ -212,7 +239,8 @@ EXPORT Status fmi2SetupExperiment(Component c, int has_tolerance, double toleran
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
     if (!i) return ERROR;
     if (!IS(INIT_ORDER) && in(i, INSTANTIATED, "fmi2SetupExperiment")) return ERROR;
-    i->values.time = begin;
+    if (!IS(START_TIME)) i->values.time = begin;
+    if (has_stop && !IS(STOP_TIME)) i->values.stop = stop;
     return OK;
 }
 
@@ -220,6 +248,8 @@ EXPORT Status fmi2EnterInitializationMode(Component c) {
     Instance *i = c;
     if (in(i, INSTANTIATED, "fmi2EnterInitializationMode")) return ERROR;
     if (IS(GLOBAL)) global_w = 0;
+    if (IS(INITIAL_KEPT) && i->initialised) i->values.x = i->first_x;
+    if (IS(KEPT)) kept_k = i->values.k;
     i->values.phase = INITIALIZING;
     return OK;
 }
@@ -228,6 +258,10 @@ EXPORT Status fmi2ExitInitializationMode(Component c) {
     Instance *i = c;
     if (in(i, INITIALIZING, "fmi2ExitInitializationMode")) return ERROR;
     if (IS(INITIALISE)) return fail(i, "no solution");
+    if (IS(INPUTS_LOST)) i->values.F = 0;
+    i->first_x = i->values.x;
+    i->initialised = 1;
+    i->values.shown = i->values.v;
     log_text(i, OK, IS(LOG_CATEGORY) ? "logChatter" : "logEvents", "initialised", i->values.x);
     i->values.phase = STEPPING;
     return OK;
@@ -246,9 +280,11 @@ EXPORT Status fmi2Terminate(Component c) {
 EXPORT Status fmi2Reset(Component c) {
     Instance *i = c;
     if (!i) return ERROR;
-    double w = i->values.w, k = i->values.k;
+    double w = i->values.w, k = i->values.k, slope = i->values.slope;
     if (IS(RESET_CRASH)) *(volatile int *)8 = 1;
+    if (IS(TERMINATED_RESET) && i->values.phase == TERMINATED) return fail(i, "already ended");
     start(&i->values);
+    if (IS(RESET_SLOPE)) i->values.slope = slope;
     if (IS(RESET_FORGETS)) i->values.w = w;
     if (IS(RESET_PARAMETER)) i->values.k = k;
     return OK;
@@ -257,12 +293,13 @@ EXPORT Status fmi2Reset(Component c) {
 
 static double acceleration(const Instance *i, double x, double v, double w) {
     const Values *s = &i->values;
-    return s->F - s->k * x - s->d * v - 0.2 * w + 0.1 * s->on + 0.01 * s->mode;
+    double late = IS(STATE_LATE) && s->elapsed > 0.8 ? 0.5 : 0;
+    return s->F - s->k * x - s->d * v - 0.2 * w + 0.1 * s->on + 0.01 * s->mode + late;
 }
 
-static void rate(const Instance *i, const double s[3], double d[3]) {
+static void rate(const Instance *i, const double s[3], double after, double d[3]) {
     d[0] = s[1];
-    d[1] = acceleration(i, s[0], s[1], s[2]);
+    d[1] = acceleration(i, s[0], s[1], s[2]) + i->values.slope * after;
     d[2] = s[1] - s[2];
 }
 
@@ -272,13 +309,13 @@ static void integrate(Instance *i, double span) {
     double h = span / (count > 0 ? count : 1);
     for (n = 0; n < count; n++) {
         double a[3] = {s->x, s->v, W(i)}, b[3], k1[3], k2[3], k3[3], k4[3];
-        rate(i, a, k1);
+        rate(i, a, n * h, k1);
         for (j = 0; j < 3; j++) b[j] = a[j] + 0.5 * h * k1[j];
-        rate(i, b, k2);
+        rate(i, b, (n + 0.5) * h, k2);
         for (j = 0; j < 3; j++) b[j] = a[j] + 0.5 * h * k2[j];
-        rate(i, b, k3);
+        rate(i, b, (n + 0.5) * h, k3);
         for (j = 0; j < 3; j++) b[j] = a[j] + h * k3[j];
-        rate(i, b, k4);
+        rate(i, b, (n + 1) * h, k4);
         for (j = 0; j < 3; j++) a[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
         s->x = a[0], s->v = a[1], W(i) = a[2];
     }
@@ -293,14 +330,15 @@ static int overflow(int depth) {
 EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prior) {
     Instance *i = c;
     Values *s = &i->values;
-    (void)no_set_prior;
     if (IS(EARLY_CRASH) && i && s->phase == INSTANTIATED) *(volatile int *)8 = 1;
     int phases = STEPPING | (IS(EARLY) ? INSTANTIATED | INITIALIZING : 0) | (IS(LATE) ? TERMINATED : 0);
     if (in(i, phases, "fmi2DoStep")) return ERROR;
     if (step < 0 && !IS(NEGATIVE)) return fail(i, "negative step");
     if (!IS(WRONG_POINT) && !(step < 0) && fabs(point - s->time) > 1e-9 * fmax(1, fabs(point)))
         return fail(i, "wrong communication point");
+    if (point + step > s->stop + 1e-9 * fmax(1, s->stop)) return fail(i, "past the stop time");
     if (IS(STEP_FAILS) && point > 0.5) return fail(i, "no convergence");
+    HOOK();
     if (IS(STEP_CRASH)) *(volatile int *)8 = 1;
     if (IS(STEP_ABORT)) abort();
     if (IS(STEP_EXIT)) exit(3);
@@ -330,11 +368,35 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
         if (file) fclose(file);
     }
     if (IS(FIXED_DRIFTS)) s->k += 0.1 * step;
+    if (IS(STATE_PROMISE) && !no_set_prior) s->spare = 1;
+    if (IS(DISK)) {
+        static char block[1 << 20];
+        int n;
+        for (n = 0; n < 1000; n++) {
+            char name[64];
+            snprintf(name, sizeof name, "fill%d", n);
+            FILE *file = fopen(name, "w");
+            if (file) fwrite(block, 1, sizeof block, file), fclose(file);
+        }
+    }
+    if (IS(LOG_FOREIGN)) i->callbacks.logger(&i->values, i->name, OK, "logEvents", "step to %g", point + step);
+    if (IS(FORGES)) {
+        int fd;
+        for (fd = 3; fd < 100; fd++) {
+            if (write(fd, "{\"findings\":[]}", 15) < 0) continue;
+        }
+    }
+    s->shown = s->v;
+    s->elapsed += step;
     double span = step;
     if (IS(STEP_IGNORED)) span = 0.01;
     if (IS(VARIABLE) && s->last_step > 0 && step > 0.1 * s->last_step) span = s->last_step;
     s->last_step = step;
     if (!IS(HANDOVER) || pthread_equal(i->thread, pthread_self())) integrate(i, span);
+    if (!IS(OUTPUT_BEHIND)) s->shown = s->v;
+    if (IS(DEPENDENCY_STEP)) s->shown = s->v + 0.05 * s->F;
+    s->F += s->slope * step;
+    s->slope = 0;
     s->calls++;
     if (IS(RANDOM)) {
         struct timespec now;
@@ -351,10 +413,10 @@ EXPORT Status fmi2GetReal(Component c, const uint32_t r[], size_t count, double 
     Instance *i = c;
     Values *s = &i->values;
     size_t n;
-    if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetReal")) return ERROR;
+    if (in(i, INITIALIZING | STEPPING | (IS(TERMINATED_GET) ? 0 : TERMINATED), "fmi2GetReal")) return ERROR;
     if (IS(EMPTY_CALL) && !value) return fail(i, "null pointer");
     for (n = 0; n < count; n++) {
-        switch (r[n]) {
+        switch (IS(REFERENCE_CUT) ? (uint16_t)r[n] : r[n]) {
         case 0: value[n] = s->time - (IS(TIME) ? s->last_step : 0); break;
         case 1: value[n] = s->x; break;
         case 2:
@@ -364,9 +426,11 @@ EXPORT Status fmi2GetReal(Component c, const uint32_t r[], size_t count, double 
         case 3: value[n] = (IS(DERIVATIVE) ? 2 : 1) * s->v; break;
         case 4: value[n] = der_v(i); break;
         case 5: value[n] = s->F; break;
-        case 6: value[n] = s->x + 0.1 * s->F + s->noise; break;
+        case 6: value[n] = s->x + 0.1 * s->F + s->noise + s->offset + (IS(NOT_CONSTANT) ? 0.5 * s->F * s->F : 0); break;
         case 7:
             value[n] = s->v;
+            if ((IS(OUTPUT_BEHIND) || IS(DEPENDENCY_STEP)) && s->phase != INITIALIZING) value[n] = s->shown;
+            if (IS(TIME_HIDDEN)) value[n] += sin(s->time);
             if (IS(CONVERGENCE)) value[n] += 1e-2 * s->calls;
             if (IS(DEPENDENCY)) value[n] += 0.05 * s->F;
             if (IS(NAN_OUTPUT) && s->time > 0.05) value[n] = NAN;
@@ -392,7 +456,7 @@ EXPORT Status fmi2GetInteger(Component c, const uint32_t r[], size_t count, int 
         switch (r[n]) {
         case 0: value[n] = (int)floor(s->time * 10 + 1e-6); break;
         case 1: value[n] = s->mode; break;
-        case 2: value[n] = IS(RANGE) ? 7 : s->x > 0.5 ? 3 : s->x > 0 ? 2 : 1; break;
+        case 2: value[n] = IS(RANGE) || IS(ENUMERATION) && s->F > 0.01 ? 7 : s->x > 0.5 ? 3 : s->x > 0 ? 2 : 1; break;
         default: return fail(i, "unknown reference");
         }
     }
@@ -420,6 +484,11 @@ EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const
     size_t n;
     if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetString")) return ERROR;
     for (n = 0; n < count; n++) {
+        if (IS(STRING_BUFFER) && r[n] < 2) {
+            snprintf(buffer, sizeof buffer, "%s", r[n] ? fabs(s->v) > 1e-3 ? "moving" : "at rest" : s->label);
+            value[n] = buffer;
+            continue;
+        }
         switch (r[n]) {
         case 0: value[n] = s->label; break;
         case 1: value[n] = IS(STRING_NULL) ? NULL : IS(STRING_LATIN) ? "bewegt \xe4" : fabs(s->v) > 1e-3 ? "moving" : "at rest"; break;
@@ -450,11 +519,11 @@ EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const d
             break;
         case 8:
             if (!before && !IS(FIXED_ACCEPTED)) return fail(i, "k is fixed");
-            s->k = value[n];
+            s->k = value[n] + (IS(SET_WRONG) ? 0.1 : 0);
             break;
         case 9:
             if (!before && IS(TUNABLE_REFUSED)) return fail(i, "d is not to be set now");
-            s->d = value[n];
+            if (!IS(TUNABLE_IGNORED) || before) s->d = value[n];
             break;
         case 10: return fail(i, "g is constant");
         default:
@@ -502,6 +571,7 @@ typedef struct {
 
 EXPORT Status fmi2GetFMUstate(Component c, State *state) {
     Instance *i = c;
+    if (IS(STATE_LEAK) && !malloc(1000)) return ERROR;
     if (!*state) *state = IS(STATE_SHARED) ? (void *)&shared_state : calloc(1, sizeof(Saved));
     Saved *saved = *state;
     saved->values = i->values;
@@ -512,9 +582,11 @@ EXPORT Status fmi2GetFMUstate(Component c, State *state) {
 EXPORT Status fmi2SetFMUstate(Component c, State state) {
     Instance *i = c;
     Saved *saved = state;
-    double w = i->values.w, F = i->values.F;
+    double w = i->values.w, F = i->values.F, elapsed = i->values.elapsed, spare = i->values.spare;
     if (!saved) return fail(i, "null state");
     i->values = saved->values;
+    if (IS(STATE_LATE)) i->values.elapsed = elapsed;
+    if (IS(STATE_PROMISE) && spare) i->values.w = w;
     if (IS(GLOBAL)) global_w = saved->w;
     if (IS(STATE_FORGETS)) i->values.w = w;
     if (IS(STATE_INPUT)) i->values.F = F;
@@ -524,7 +596,7 @@ EXPORT Status fmi2SetFMUstate(Component c, State state) {
 EXPORT Status fmi2FreeFMUstate(Component c, State *state) {
     (void)c;
     if (!state || !*state) return OK;
-    if (!IS(STATE_SHARED)) free(*state);
+    if (*state != (State)&shared_state) free(*state);
     *state = IS(STATE_HANDLE) ? (State)8 : NULL;
     return OK;
 }
@@ -565,7 +637,7 @@ static double partial(const Instance *i, uint32_t unknown, uint32_t known) {
     case 402: return -s->d;
     case 405: return 1;
     case 601: return 1;
-    case 605: return 0.1;
+    case 605: return 0.1 + (IS(NOT_CONSTANT) ? s->F : 0);
     case 702: return 1;
     case 705: return IS(DEPENDENCY) ? 0.05 : 0;
     default: return 0;
@@ -582,8 +654,14 @@ EXPORT Status fmi2GetDirectionalDerivative(Component c, const uint32_t unknown[]
 
 EXPORT Status fmi2SetRealInputDerivatives(Component c, const uint32_t r[], size_t count, const int order[],
                                           const double value[]) {
-    (void)r, (void)count, (void)order, (void)value;
-    return IS(INPUT_DERIVATIVE) ? fail(c, "not implemented") : OK;
+    Instance *i = c;
+    size_t n;
+    if (IS(INPUT_DERIVATIVE)) return fail(c, "not implemented");
+    for (n = 0; n < count; n++) {
+        if (r[n] != 5 || order[n] != 1) return fail(i, "no such derivative");
+        if (!IS(SLOPE_IGNORED)) i->values.slope = value[n];
+    }
+    return OK;
 }
 
 EXPORT Status fmi2GetRealOutputDerivatives(Component c, const uint32_t r[], size_t count, const int order[],

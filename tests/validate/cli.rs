@@ -29,6 +29,13 @@ fn exit_codes_tell_passed_from_failed_from_could_not_run() {
     assert_eq!(eixo(&["--static"], &pack(&files(DESCRIPTION))).status.code(), Some(0));
     assert_eq!(eixo(&["--static"], &warned()).status.code(), Some(0));
     assert_eq!(eixo(&["--static", "--strict"], &warned()).status.code(), Some(1));
+    // Notes are no matter even then.
+    let noted = || {
+        let dependency = [("dependencies=\"2 6\"", "dependencies=\"2 9\"")];
+        pack(&files(&description(&dependency)))
+    };
+    let output = eixo(&["--static", "--strict"], &noted());
+    assert!(output.status.code() == Some(0) && text(&output).contains("1 note"), "{}", text(&output));
     assert_eq!(eixo(&["--static", "--strict", "--skip", "model-name"], &warned()).status.code(), Some(0));
     assert_eq!(eixo(&["--static"], &failing()).status.code(), Some(1));
     assert_eq!(eixo(&["--static", "--only", "guid"], &failing()).status.code(), Some(0));
@@ -123,7 +130,7 @@ fn nothing_survives_the_run_and_nothing_printed_is_taken_for_a_result() {
 }
 
 /// Processes whose environment names a path.
-fn processes_with(path: &std::path::Path) -> Vec<std::path::PathBuf> {
+pub fn processes_with(path: &std::path::Path) -> Vec<std::path::PathBuf> {
     use std::os::unix::ffi::OsStrExt;
     let needle = path.as_os_str().as_bytes();
     let entries = std::fs::read_dir("/proc").unwrap().flatten().map(|e| e.path());
@@ -165,4 +172,116 @@ fn info_lists_platforms_capabilities_variables_and_units() {
     assert_eq!(json["units"][3]["base"]["exponents"]["s"], -2);
     assert_eq!(json["coSimulation"]["capabilities"]["canSerializeFMUstate"], true);
     assert_eq!(json["platforms"][0]["platform"], "linux64");
+}
+
+#[test]
+fn not_tested_is_no_pass_and_another_version_of_fmi_is_one_sentence() {
+    // A binary of another platform, as far as its head tells: nothing of it can be run.
+    let mut foreign = files(DESCRIPTION);
+    let mut dll = vec![0; 256];
+    dll[..2].copy_from_slice(b"MZ");
+    dll[0x3C] = 0x80;
+    dll[0x80..0x84].copy_from_slice(b"PE\0\0");
+    dll[0x98..0x9A].copy_from_slice(&0x20B_u16.to_le_bytes());
+    foreign[1] = ("binaries/win64/corpus.dll".into(), dll);
+    let output = eixo(&[], &pack(&foreign));
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output));
+    assert!(text(&output).contains("was not tested beyond its archive and XML"), "{}", text(&output));
+    let output = eixo(&["--static"], &pack(&foreign));
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert!(text(&output).contains("--static"), "{}", text(&output));
+    for version in ["1.0", "3.0", "4.0-alpha"] {
+        let fmu = pack(&files(&description(&[("fmiVersion=\"2.0\"", &format!("fmiVersion=\"{version}\""))])));
+        let output = eixo(&[], &fmu);
+        let said = String::from_utf8(output.stderr.clone()).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(&format!("FMI {version}")) && said.lines().count() == 1, "{said}");
+    }
+}
+
+#[test]
+fn findings_of_one_cause_are_one_line_unless_all_are_asked_for() {
+    let three = [
+        ("name=\"x\" valueReference=\"1\"", "name=\"x y\" valueReference=\"1\""),
+        ("name=\"v\" valueReference=\"2\"", "name=\"v y\" valueReference=\"2\""),
+        ("name=\"k\" valueReference=\"8\"", "name=\"k\ty\" valueReference=\"8\""),
+    ];
+    let fmu = pack(&files(&description(&three)));
+    let output = text(&eixo(&["--static", "--only", "variable-name"], &fmu));
+    assert_eq!(output.matches("[variable-name]").count(), 1, "{output}");
+    assert!(output.contains("and 2 more like it") && output.contains("3 errors"), "{output}");
+    assert!(!output.contains('\u{FFFD}'), "a tab is a blank: {output}");
+    let output = text(&eixo(&["--static", "--only", "variable-name", "--all"], &fmu));
+    assert_eq!(output.matches("[variable-name]").count(), 3, "{output}");
+    let json = text(&eixo(&["--static", "--only", "variable-name", "--format", "json"], &fmu));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["findings"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn a_run_is_compared_with_reference_results_and_the_page_shows_it() {
+    if !corpus::compiler() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(path("model.fmu"), pack(&running(DESCRIPTION, "NONE"))).unwrap();
+    let run = |args: &[&str]| {
+        let mut command = Command::new(corpus::program());
+        let output = command.args(args).current_dir(folder.path()).output().unwrap();
+        (output.status.code(), text(&output), String::from_utf8(output.stderr).unwrap())
+    };
+    // The spring without its force, from the exact solution of x'' = -10 x - 0.5 x' - 0.2 w, w' = x' - w: by the same
+    // equations in a finer step, so that the reference is not this program's.
+    let (mut x, mut v, mut w, h) = (1.0_f64, 0.0_f64, 0.0_f64, 1e-5);
+    let mut rows = String::from("time,y,z\n");
+    for k in 0..=100_000 {
+        if k % 1000 == 0 {
+            rows += &format!("{},{x},{v}\n", f64::from(k) * h);
+        }
+        // The midpoint rule: second order, an error of about h^2.
+        let rate = |x: f64, v: f64, w: f64| (v, -10.0 * x - 0.5 * v - 0.2 * w, v - w);
+        let (a, b, c) = rate(x, v, w);
+        let (a, b, c) = rate(x + 0.5 * h * a, v + 0.5 * h * b, w + 0.5 * h * c);
+        (x, v, w) = (x + h * a, v + h * b, w + h * c);
+    }
+    std::fs::write(path("good.csv"), &rows).unwrap();
+    std::fs::write(path("bad.csv"), rows.replace("time,y,z", "time,z,y")).unwrap();
+    let only = ["--only", "simulate"];
+    let (code, said, _) =
+        run(&[&["validate", "model.fmu", "--reference", "good.csv", "--report", "page.html"][..], &only].concat());
+    assert!(code == Some(0) && said.matches("within ").count() >= 2, "{said}");
+    let page = std::fs::read_to_string(path("page.html")).unwrap();
+    assert!(page.contains("The FMU passes.") && page.contains("good.csv") && page.contains("<svg"), "{}", page.len());
+    let (code, said, _) =
+        run(&[&["validate", "model.fmu", "--reference", "bad.csv", "--report", "page.html"][..], &only].concat());
+    assert!(code == Some(1) && said.contains("OUTSIDE"), "{said}");
+    let page = std::fs::read_to_string(path("page.html")).unwrap();
+    assert!(page.contains("but not to its reference results"), "{}", page.len());
+    let (code, said, _) =
+        run(&[&["validate", "model.fmu", "--reference", "bad.csv", "--format", "json"][..], &only].concat());
+    let json: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert!(code == Some(1) && json["reference"]["passes"] == false && json["outcome"] == "passes", "{said}");
+    std::fs::write(path("none.csv"), "time,q\n0,1\n1,1\n").unwrap();
+    let (code, _, said) = run(&[&["validate", "model.fmu", "--reference", "none.csv"][..], &only].concat());
+    assert!(code == Some(2) && said.contains("none.csv") && said.contains("y, z"), "{said}");
+}
+
+/// Reference-FMUs of the Modelica Association, where they lie beside the project.
+#[test]
+fn the_reference_fmus_have_no_error_and_no_warning() {
+    let folder = std::env::var_os("EIXO_FMUS").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/fmus"),
+        std::path::PathBuf::from,
+    );
+    let Ok(entries) = std::fs::read_dir(folder.join("fmi2")) else {
+        return eprintln!("SKIPPED: no FMUs in {} (EIXO_FMUS)", folder.display());
+    };
+    let mut count = 0;
+    for path in entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "fmu")) {
+        let output = Command::new(corpus::program()).arg("validate").arg(&path).arg("--strict").output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        count += 1;
+    }
+    assert!(count > 0, "no FMU in {}", folder.display());
 }

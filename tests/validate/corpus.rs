@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 
-use eixo::fmu::isolation::Bounds;
 use eixo::fmu::rules::Report;
 use eixo::fmu::validation::{self, Options};
 use zip::{ZipWriter, write::SimpleFileOptions};
@@ -125,8 +124,8 @@ pub fn validate(bytes: &[u8], static_only: bool) -> Report {
 /// Validates a file.
 pub fn validate_file(path: &Path, static_only: bool) -> Report {
     // A hang is told from a slow machine by a generous limit.
-    let bounds = Bounds { time: std::time::Duration::from_secs(8), ..Bounds::default() };
-    let options = Options { only: vec![], skip: vec![], static_only, jobs: 2, bounds, program: program() };
+    let (call, budget) = (std::time::Duration::from_secs(8), std::time::Duration::from_secs(600));
+    let options = Options { static_only, jobs: 2, call, budget, ..Options::new(program()) };
     validation::validate(path, &options, &|_, _| {}).unwrap()
 }
 

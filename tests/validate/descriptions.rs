@@ -11,7 +11,6 @@ const MUTATIONS: &[Mutation] = &[
     ("attribute twice", "xml-well-formed", &[("modelName=\"Corpus\"", "modelName=\"Corpus\" modelName=\"Corpus\"")]),
     ("version of the standard's text", "fmi-version", &[("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.4\"")]),
     ("no version", "fmi-version", &[("fmiVersion=\"2.0\"", "")]),
-    ("FMI 3", "fmi-version", &[("fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"")]),
     (
         "no interface",
         "interface-missing",
@@ -231,6 +230,11 @@ const MUTATIONS: &[Mutation] = &[
         "alias",
         &[("name=\"der(v)\" valueReference=\"4\"", "name=\"der(v)\" valueReference=\"10\"")],
     ),
+    (
+        "an alias without a unit",
+        "alias-unit-missing",
+        &[("name=\"k\" valueReference=\"8\"", "name=\"k\" valueReference=\"7\"")],
+    ),
     ("aliases of two units", "alias-unit", &[("name=\"z\" valueReference=\"7\"", "name=\"z\" valueReference=\"6\"")]),
     (
         "index beyond the variables",
@@ -296,7 +300,7 @@ const MUTATIONS: &[Mutation] = &[
         "dependencies-kind",
         &[("dependencies=\"2 6\" dependenciesKind=\"constant constant\"", "dependenciesKind=\"constant constant\"")],
     ),
-    ("constant kind of a boolean", "dependencies-kind", &[("dependencies=\"2 6\"", "dependencies=\"2 15\"")]),
+    ("constant kind of a boolean", "dependencies-kind-real", &[("dependencies=\"2 6\"", "dependencies=\"2 15\"")]),
 ];
 
 pub fn mutants() -> Vec<Mutant> {

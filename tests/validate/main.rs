@@ -10,10 +10,13 @@
 
 mod archives;
 mod cli;
+mod contained;
 mod corpus;
 mod defects;
 mod descriptions;
 mod foreign;
+mod hostile;
+mod pipeline;
 mod variants;
 
 use std::collections::BTreeSet;

@@ -28,6 +28,8 @@ pub struct Learned {
     pub steps: usize,
     /// Wall time of a step, in s.
     pub cost: f64,
+    /// A communication step that the FMU takes, where it declares none and refused the usual one, in s; 0 where not.
+    pub step: f64,
 }
 
 /// Why a rule ended without a result.
@@ -66,6 +68,8 @@ pub(super) fn not_tested<T>(why: impl Into<String>) -> Result<T, Stop> {
 pub(crate) struct Observed {
     pub name: String,
     pub reference: u32,
+    /// Whether it follows from the rest: an output or a local variable.
+    pub calculated: bool,
 }
 
 /// Values of the observed variables, by type.
@@ -124,7 +128,8 @@ impl Probe {
         let e = d.default_experiment.unwrap_or_default();
         let start = e.start_time.unwrap_or(0.0);
         let stop = e.stop_time.filter(|&stop| stop > start);
-        let step = e.step_size.filter(|&h| h > 0.0).or_else(|| stop.map(|stop| (stop - start) / 500.0)).unwrap_or(0.01);
+        let step = e.step_size.filter(|&h| h > 0.0).or(Some(learned.step).filter(|&h| h > 0.0));
+        let step = step.or_else(|| stop.map(|stop| (stop - start) / 500.0)).unwrap_or(0.01);
         let mut probe = Self {
             observed: Default::default(),
             instances: AtomicUsize::new(0),
@@ -158,7 +163,8 @@ impl Probe {
                     && !masked.contains(&(index as u8, v.value_reference))
                     && seen.insert((index, v.value_reference))
                 {
-                    chosen[index].push(Observed { name: v.name.clone(), reference: v.value_reference });
+                    let calculated = matches!(v.causality, Causality::Output | Causality::Local);
+                    chosen[index].push(Observed { name: v.name.clone(), reference: v.value_reference, calculated });
                 }
             }
         }
@@ -310,6 +316,68 @@ impl Probe {
         a.iter().zip(b).enumerate().find_map(|(k, (x, y))| {
             self.difference(x, y).map(|what| format!("{what} at t = {}", self.time(from + k + 1)))
         })
+    }
+
+    /// How closely two runs of the same model agree whose solver may choose its steps anew: the default experiment's
+    /// tolerance (FMI 2.0.4, section 2.2.5), relative; a usual one where the FMU declares none.
+    pub fn tolerance(&self) -> f64 {
+        let declared = self.d.default_experiment.and_then(|e| e.tolerance).filter(|t| *t > 0.0);
+        declared.map_or(1e-6, |t| t.clamp(1e-12, 1e-3))
+    }
+
+    /// As [`Probe::difference_of_runs`], leaving out what a solver's tolerance explains. That is local to a step; over a
+    /// run a few ten of it come together.
+    pub fn difference_beyond_tolerance(&self, a: &[Snapshot], b: &[Snapshot], from: usize) -> Option<String> {
+        const OVER_A_RUN: f64 = 30.0;
+        self.difference_of_runs(a, b, from)?;
+        let allowed = OVER_A_RUN * self.tolerance();
+        let swing = |i: usize| {
+            let values = || a.iter().map(|s| s.reals[i]).filter(|v| v.is_finite());
+            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+        };
+        let swings: Vec<f64> = (0..self.observed[0].len()).map(swing).collect();
+        let close = |(x, y): (f64, f64), swing: f64| {
+            x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= allowed * x.abs().max(y.abs()).max(swing)
+        };
+        let mut rounded = false;
+        let mut jumps = 0;
+        for (k, (x, y)) in a.iter().zip(b).enumerate() {
+            let pairs = || x.reals.iter().copied().zip(y.reals.iter().copied());
+            rounded |= pairs().any(|(x, y)| x != y);
+            if let Some(i) = pairs().zip(&swings).position(|(pair, swing)| !close(pair, *swing)) {
+                let (name, time) = (&self.observed[0][i].name, self.time(from + k + 1));
+                return Some(format!("\"{name}\" is {} instead of {} at t = {time}", y.reals[i], x.reals[i]));
+            }
+            let discrete = |s: &Snapshot| Snapshot { reals: x.reals.clone(), ..s.clone() };
+            if let Some(what) = self.difference(&discrete(x), &discrete(y)) {
+                // An event may fall on the other side of a communication point, but not for long.
+                jumps += 1;
+                if !rounded || jumps > 2 {
+                    return Some(format!("{what} at t = {}", self.time(from + k + 1)));
+                }
+            }
+        }
+        None
+    }
+
+    /// Whether an output or local variable other than those left out answers to what is different in the second run.
+    pub fn answers(&self, a: &[Snapshot], b: &[Snapshot], without: &[u32]) -> bool {
+        a.iter().zip(b).any(|(x, y)| {
+            let real = |((o, x), y): ((&Observed, &f64), &f64)| {
+                o.calculated && !without.contains(&o.reference) && (x - y).abs() > 1e-12 * x.abs().max(y.abs())
+            };
+            let whole = |((o, x), y): ((&Observed, &i32), &i32)| o.calculated && x != y;
+            self.observed[0].iter().zip(&x.reals).zip(&y.reals).any(real)
+                || self.observed[1].iter().zip(&x.integers).zip(&y.integers).any(whole)
+                || self.observed[2].iter().zip(&x.booleans).zip(&y.booleans).any(whole)
+        })
+    }
+
+    /// Steps to the end of the default experiment, as many as fit into a fifth of a second.
+    pub fn long(&self) -> usize {
+        let whole = self.stop.map_or(100.0, |stop| (stop - self.start) / self.step * (1.0 + 1e-9));
+        let affordable = 0.2 / self.learned.cost.max(1e-7);
+        (whole.min(affordable).min(2000.0) as usize).max(self.steps())
     }
 
     /// Every type and value reference that differs between two records.

@@ -126,6 +126,42 @@ pub(super) fn convergence(p: &Probe) -> Tested {
     Ok(problems)
 }
 
+/// Outputs that are those of the step before: then a course in steps of h, looked at one step later, is that in steps of
+/// h/2, looked at one of its steps later.
+pub(super) fn delay(p: &Probe) -> Tested {
+    let count = 10;
+    let courses = two_sizes(p, count)?;
+    if ignores_size(&courses).is_some() {
+        return not_tested("the step size is ignored");
+    }
+    let (variables, whole, half) = courses;
+    let mut problems = Vec::new();
+    for (at, (name, _)) in variables.iter().enumerate() {
+        let scale = range(&half, at);
+        // The first step changes nothing yet, of either size.
+        if whole[1][at] != whole[0][at] || half[1][at] != half[0][at] || scale <= 1e-9 * whole[0][at].abs() {
+            continue;
+        }
+        let apart = |later: bool| {
+            let pairs = (1..count).map(|k| match later {
+                false => (whole[k][at], half[2 * k][at]),
+                true => (whole[k + 1][at], half[2 * k + 1][at]),
+            });
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        if apart(false) > 1e-4 * scale && apart(true) < 0.01 * apart(false) {
+            problems.push(format!(
+                "\"{name}\" is one step late: it stays {} over the first step, and in steps of {} and {} it differs by one \
+                 step's worth each time",
+                whole[0][at],
+                p.step,
+                p.step / 2.0
+            ));
+        }
+    }
+    Ok(problems)
+}
+
 fn range(rows: &[Vec<f64>], at: usize) -> f64 {
     let low = rows.iter().map(|row| row[at]).fold(f64::INFINITY, f64::min);
     let high = rows.iter().map(|row| row[at]).fold(f64::NEG_INFINITY, f64::max);
@@ -168,15 +204,30 @@ pub(super) fn time(p: &Probe) -> Tested {
         return not_applicable("there is no independent variable");
     };
     let mut instance = p.ready()?;
-    for k in 0..=p.steps().min(5) {
-        let (expected, found) = (p.time(k), instance.get_real(&[v.value_reference])?[0]);
-        let error = (found - expected).abs();
-        if error.is_nan() || error > 1e-6 * p.step + 1e-9 * expected.abs() {
-            return Ok(vec![format!("the independent variable \"{}\" is {found} at t = {expected}", v.name)]);
-        }
-        p.run(&mut instance, k, k + 1)?;
+    let close = |found: f64, expected: f64| (found - expected).abs() <= 1e-6 * p.step + 1e-9 * expected.abs();
+    let read = |instance: &mut Instance| instance.get_real(&[v.value_reference]).map(|values| values[0]);
+    let found = read(&mut instance)?;
+    if !close(found, p.start) {
+        return Ok(vec![format!("the independent variable \"{}\" is {found} at t = {}", v.name, p.start)]);
     }
-    Ok(vec![])
+    // An FMU with a fixed step of its own lags behind by less than that step, and catches up again: it is in time
+    // where it comes to a communication point at all, and never ahead.
+    let mut wrong = None;
+    for k in 1..=p.long() {
+        if p.run(&mut instance, k - 1, k).is_err() {
+            break;
+        }
+        let (expected, found) = (p.time(k), read(&mut instance)?);
+        if close(found, expected) {
+            return Ok(vec![]);
+        }
+        let problem = format!("the independent variable \"{}\" is {found} at t = {expected}", v.name);
+        if found.is_nan() || found > expected {
+            return Ok(vec![problem]);
+        }
+        wrong = wrong.or(Some(problem));
+    }
+    Ok(wrong.into_iter().collect())
 }
 
 pub(super) fn derivative(p: &Probe) -> Tested {
@@ -322,49 +373,4 @@ pub(super) fn status_functions(p: &Probe) -> Tested {
     // There is no step to cancel; the call must come back all the same.
     let _ = instance.cancel_step();
     Ok(vec![])
-}
-
-pub(super) fn input_derivatives(p: &Probe) -> Tested {
-    if !p.interface().can_interpolate_inputs {
-        return not_applicable("canInterpolateInputs is false");
-    }
-    let inputs: Vec<u32> = p
-        .inputs()
-        .filter(|v| v.base() == BaseType::Real && v.variability == Variability::Continuous)
-        .map(|v| v.value_reference)
-        .collect();
-    if inputs.is_empty() {
-        return not_applicable("there is no continuous Real input");
-    }
-    let mut instance = p.ready()?;
-    p.drive(&mut instance, p.start)?;
-    instance.set_input_derivatives(&inputs, &vec![1; inputs.len()], &vec![0.0; inputs.len()])?;
-    instance.do_step(p.start, p.step)?;
-    let flat = p.observe(&mut instance)?;
-    // A slope of zero is what happens without derivatives.
-    let mut plain = p.ready()?;
-    p.drive(&mut plain, p.start)?;
-    plain.do_step(p.start, p.step)?;
-    let what = p.difference(&p.observe(&mut plain)?, &flat);
-    Ok(what.map(|what| format!("input derivatives of 0 change the step: {what}")).into_iter().collect())
-}
-
-pub(super) fn output_derivatives(p: &Probe) -> Tested {
-    let order = p.interface().max_output_derivative_order;
-    if order == 0 {
-        return not_applicable("maxOutputDerivativeOrder is 0");
-    }
-    let kept = |v: &&Variable| {
-        v.base() == BaseType::Real && v.causality == Causality::Output && v.variability == Variability::Continuous
-    };
-    let outputs: Vec<&Variable> = p.d.variables.iter().filter(kept).collect();
-    if outputs.is_empty() {
-        return not_applicable("there is no continuous Real output");
-    }
-    let mut instance = p.ready()?;
-    p.run(&mut instance, 0, 3)?;
-    let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
-    let values = instance.get_output_derivatives(&references, &vec![1; references.len()])?;
-    let bad = outputs.iter().zip(values).filter(|(_, value)| !value.is_finite());
-    Ok(bad.map(|(v, value)| format!("the first derivative of \"{}\" is {value}", v.name)).collect())
 }

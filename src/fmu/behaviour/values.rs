@@ -2,7 +2,7 @@
 
 use super::super::description::{BaseType, Causality, Initial, Value, Variability, Variable};
 use super::super::host::{HostError, Instance};
-use super::probe::{Probe, Tested, not_applicable, settable, type_index};
+use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested, settable, type_index};
 use super::settable_real;
 
 /// Relative tolerance between a start value as printed in the XML and as compiled: tools print six digits and more.
@@ -40,7 +40,8 @@ fn show(value: &Value) -> String {
 fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Real(x), Value::Real(y)) => {
-            x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= PRINTED * x.abs().max(y.abs())
+            // What is next to nothing beside 1 may print as 0.
+            x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= (PRINTED * x.abs().max(y.abs())).max(1e-300)
         }
         _ => a == b,
     }
@@ -88,7 +89,12 @@ pub(super) fn start_settable(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn set_get(p: &Probe) -> Tested {
+/// What was set and read again: name, kind, as set, as read.
+type Kept<'a> = (&'a str, &'static str, f64, f64);
+
+/// Sets Real parameters before initialisation and inputs after it, and reads them. An input that takes effect with the
+/// next step only is read after that.
+fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
     let mut instance = p.instantiate()?;
     let mut written = Vec::new();
     for v in p.d.variables.iter().filter(|v| v.causality == Causality::Parameter) {
@@ -99,32 +105,57 @@ pub(super) fn set_get(p: &Probe) -> Tested {
         }
     }
     // Other parameters may not go together; then only inputs are tested.
-    if instance.initialize(p.start, p.stop).is_err() {
+    if instance.initialize(p.start, None).is_err() {
         instance.free();
         instance = p.instantiate()?;
-        instance.initialize(p.start, p.stop)?;
+        instance.initialize(p.start, None)?;
         written.clear();
     }
-    let mut problems = Vec::new();
+    let mut found = Vec::new();
     for (v, value) in written {
-        let found = instance.get_real(&[v.value_reference])?[0];
-        if found != value {
-            problems.push(format!("the parameter \"{}\" was set to {value} and reads {found}", v.name));
-        }
+        found.push((v.name.as_str(), "parameter", value, instance.get_real(&[v.value_reference])?[0]));
     }
+    let mut late = Vec::new();
     for (order, v) in p.inputs().filter(|v| v.base() == BaseType::Real).enumerate() {
         let value = p.input(v, order, p.start);
         if instance.set_real(&[v.value_reference], &[value]).is_ok() {
-            let found = instance.get_real(&[v.value_reference])?[0];
-            if found != value {
-                problems.push(format!("the input \"{}\" was set to {value} and reads {found}", v.name));
+            let read = instance.get_real(&[v.value_reference])?[0];
+            if read == value {
+                found.push((v.name.as_str(), "input", value, read));
+            } else {
+                late.push((v, value));
             }
         }
     }
+    if !late.is_empty() {
+        let _ = instance.do_step_status(p.start, p.step, true)?;
+        for (v, value) in late {
+            found.push((v.name.as_str(), "input", value, instance.get_real(&[v.value_reference])?[0]));
+        }
+    }
+    Ok(found)
+}
+
+/// Relative difference that a value kept as a 32-bit number has (half a unit in its last place, 2^-24), with room.
+const SINGLE: f64 = 1e-6;
+
+fn is_rounded(value: f64, read: f64) -> bool {
+    (read - value).abs() <= SINGLE * value.abs()
+}
+
+pub(super) fn set_get(p: &Probe) -> Tested {
+    let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
+    let mut problems: Vec<String> =
+        kept(p)?.into_iter().filter(|(_, _, value, read)| !is_rounded(*value, *read)).map(say).collect();
+    let mut instance = p.ready()?;
     for v in p.inputs() {
         let Some(value) = &v.start else { continue };
         if v.base() != BaseType::Real && set(&mut instance, v, value).is_ok() {
-            let found = get(&mut instance, v)?;
+            let mut found = get(&mut instance, v)?;
+            if found != *value {
+                let _ = instance.do_step_status(p.start, p.step, true)?;
+                found = get(&mut instance, v)?;
+            }
             if found != *value {
                 problems.push(format!(
                     "the input \"{}\" was set to {} and reads {}",
@@ -136,6 +167,73 @@ pub(super) fn set_get(p: &Probe) -> Tested {
         }
     }
     Ok(problems)
+}
+
+pub(super) fn set_get_rounded(p: &Probe) -> Tested {
+    let rounded = kept(p)?.into_iter().filter(|(_, _, value, read)| value != read && is_rounded(*value, *read));
+    let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
+    Ok(rounded.map(say).collect())
+}
+
+/// A tunable parameter that acts when it is set before the run acts when it is set during it.
+pub(super) fn tunable_effect(p: &Probe) -> Tested {
+    let tunable = |v: &&Variable| v.causality == Causality::Parameter && v.variability == Variability::Tunable;
+    p.comparable()?;
+    let (n, cut) = (p.steps(), p.steps() / 3);
+    p.affordable(12 * n)?;
+    // As far as the FMU goes: some end their run of themselves.
+    let as_far = |instance: &mut Instance, from: usize| -> Vec<Snapshot> {
+        let mut record = Vec::new();
+        for k in from..3 * n {
+            match p.run(instance, k, k + 1) {
+                Ok(mut one) => record.append(&mut one),
+                Err(_) => break,
+            }
+        }
+        record
+    };
+    let mut plain = p.ready()?;
+    let expected = as_far(&mut plain, 0);
+    plain.free();
+    if expected.len() < n {
+        return not_tested("the run is too short");
+    }
+    let (mut problems, mut any) = (Vec::new(), false);
+    for v in p.d.variables.iter().filter(tunable).take(20) {
+        let Some(value) = other(p, v) else { continue };
+        if Some(&value) == v.start.as_ref() {
+            continue;
+        }
+        let early = || -> Result<_, HostError> {
+            let mut instance = p.instantiate()?;
+            set(&mut instance, v, &value)?;
+            p.enter(&mut instance)?;
+            instance.exit_initialization()?;
+            p.run(&mut instance, 0, n)
+        };
+        let late = || -> Result<_, HostError> {
+            let mut instance = p.ready()?;
+            p.run(&mut instance, 0, cut)?;
+            set(&mut instance, v, &value)?;
+            Ok(as_far(&mut instance, cut))
+        };
+        // What cannot be set, or fails with that value, is another rule's.
+        let (early, late) = match (early(), late()) {
+            (Err(HostError::OnlyOnce), _) | (_, Err(HostError::OnlyOnce)) => return Err(HostError::OnlyOnce.into()),
+            (Ok(early), Ok(late)) => (early, late),
+            _ => continue,
+        };
+        any = true;
+        let own = [v.value_reference];
+        if p.answers(&expected[..n], &early, &own) && !p.answers(&expected[cut..], &late, &own) {
+            problems.push(format!(
+                "the tunable parameter \"{}\" set to {} during the run changes nothing; set before it, it does",
+                v.name,
+                show(&value)
+            ));
+        }
+    }
+    if any { Ok(problems) } else { not_applicable("there is no tunable parameter with another value to set") }
 }
 
 pub(super) fn get_consistent(p: &Probe) -> Tested {
@@ -170,46 +268,6 @@ pub(super) fn get_consistent(p: &Probe) -> Tested {
         .collect())
 }
 
-const TYPES: [BaseType; 4] = [BaseType::Real, BaseType::Integer, BaseType::Boolean, BaseType::String];
-
-pub(super) fn bad_reference_get(p: &Probe) -> Tested {
-    let mut instance = p.ready()?;
-    let mut problems = Vec::new();
-    for base in TYPES {
-        let r = [p.unused_reference(base)];
-        let accepted = match base {
-            BaseType::Real => instance.get_real(&r).is_ok(),
-            BaseType::Boolean => instance.get_boolean_raw(&r).is_ok(),
-            BaseType::String => instance.get_string_raw(&r).is_ok(),
-            _ => instance.get_integer(&r).is_ok(),
-        };
-        if accepted {
-            problems
-                .push(format!("fmi2Get{base} of the value reference {}, which no variable has, returned fmi2OK", r[0]));
-        }
-    }
-    Ok(problems)
-}
-
-pub(super) fn bad_reference_set(p: &Probe) -> Tested {
-    let mut instance = p.ready()?;
-    let mut problems = Vec::new();
-    for base in TYPES {
-        let r = [p.unused_reference(base)];
-        let accepted = match base {
-            BaseType::Real => instance.set_real(&r, &[0.0]),
-            BaseType::Boolean => instance.set_boolean(&r, &[false]),
-            BaseType::String => instance.set_string(&r, &[""]),
-            _ => instance.set_integer(&r, &[0]),
-        };
-        if accepted.is_ok() {
-            problems
-                .push(format!("fmi2Set{base} of the value reference {}, which no variable has, returned fmi2OK", r[0]));
-        }
-    }
-    Ok(problems)
-}
-
 pub(super) fn boolean_values(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let booleans: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::Boolean).collect();
@@ -221,19 +279,6 @@ pub(super) fn boolean_values(p: &Probe) -> Tested {
     let values = instance.get_boolean_raw(&references)?;
     let wrong = booleans.iter().zip(values).filter(|(_, value)| !matches!(value, 0 | 1));
     Ok(wrong.map(|(v, value)| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name)).collect())
-}
-
-pub(super) fn string_values(p: &Probe) -> Tested {
-    let strings: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::String).collect();
-    if strings.is_empty() {
-        return not_applicable("there is no String variable");
-    }
-    let mut instance = p.ready()?;
-    p.run(&mut instance, 0, 3)?;
-    let references: Vec<u32> = strings.iter().map(|v| v.value_reference).collect();
-    let values = instance.get_string_raw(&references)?;
-    let wrong = strings.iter().zip(values).filter_map(|(v, value)| Some((v, value.err()?)));
-    Ok(wrong.map(|(v, what)| format!("\"{}\" is {what}", v.name)).collect())
 }
 
 pub(super) fn unchanging(p: &Probe) -> Tested {
@@ -315,7 +360,13 @@ pub(super) fn finite(p: &Probe) -> Tested {
         Ok(bad.map(|(v, value)| format!("the output \"{}\" is {value} at t = {time}", v.name)))
     };
     let found = watch(p, false, look)?;
-    let found = if found.is_none() && p.learned.stimulus { watch(p, true, look)? } else { found };
+    // Values chosen here count against an FMU that says which ones it takes.
+    let bounded = |v: &Variable| {
+        let r = p.d.resolved(v);
+        v.base() != BaseType::Real || r.min.is_some() && r.max.is_some()
+    };
+    let driven = found.is_none() && p.learned.stimulus && p.inputs().all(bounded);
+    let found = if driven { watch(p, true, look)? } else { found };
     Ok(found.into_iter().collect())
 }
 
@@ -335,7 +386,7 @@ pub(super) fn range(p: &Probe) -> Tested {
     if watched.is_empty() {
         return not_applicable("no calculated variable has a min, a max or items");
     }
-    let found = watch(p, false, |instance, time| {
+    let look = |instance: &mut Instance, time: f64| {
         for (v, low, high, items) in &watched {
             let value = match get(instance, v)? {
                 Value::Real(x) => x,
@@ -352,7 +403,12 @@ pub(super) fn range(p: &Probe) -> Tested {
             }
         }
         Ok(None)
-    })?;
+    };
+    let found = watch(p, false, look)?;
+    // No input makes an enumeration leave its items.
+    let items = watched.iter().any(|(.., items)| !items.is_empty());
+    let driven = found.is_none() && items && p.learned.stimulus;
+    let found = if driven { watch(p, true, look)?.filter(|said| said.contains("no item")) } else { found };
     Ok(found.into_iter().collect())
 }
 
@@ -406,12 +462,6 @@ pub(super) fn tunable_set(p: &Probe) -> Tested {
         }
     }
     if any { Ok(problems) } else { not_applicable("there is no tunable parameter") }
-}
-
-pub(super) fn empty(p: &Probe) -> Tested {
-    let mut instance = p.ready()?;
-    let failed = instance.empty_calls().into_iter().filter(|(_, status)| !status.is_ok());
-    Ok(failed.map(|(name, status)| format!("{name} of no variables at all returned {status}")).collect())
 }
 
 /// Every variable of the description is one of the binary.

@@ -41,8 +41,10 @@ pub struct Instance {
     pub(crate) component: Component,
     pub(super) callbacks: Box<Callbacks>,
     pub(super) binary: Arc<Binary>,
-    log: Box<LogSink>,
+    log: Arc<LogSink>,
     freed: bool,
+    /// Whether steps may be taken back: what is told by `noSetFMUStatePriorToCurrentPoint`, turned round.
+    pub(crate) may_go_back: bool,
     // Kept for FMUs that go on using the pointers handed to them.
     pub(super) texts: [Vec<u8>; 3],
     _folder: Option<Arc<TempDir>>,
@@ -119,15 +121,19 @@ impl Instance {
             [&options.name, &options.guid, &options.resources].map(|t| c_string(t).map(CString::into_bytes_with_nul));
         let [name, guid, resources] = texts;
         let texts = [name?, guid?, resources?];
-        let log = Box::new(LogSink::default());
+        let log = Arc::new(LogSink::default());
+        logger::register(&log);
         let callbacks = Box::new(Callbacks {
             logger: logger::logger(),
             allocate: Some(allocate),
             free: Some(release),
             step_finished: std::ptr::null(),
-            environment: std::ptr::from_ref::<LogSink>(&log).cast_mut().cast(),
+            environment: Arc::as_ptr(&log).cast_mut().cast(),
         });
-        let function = binary.functions.instantiate.ok_or(HostError::Missing("fmi2Instantiate"))?;
+        let function = binary.functions.instantiate.ok_or_else(|| {
+            logger::forget(&log);
+            HostError::Missing("fmi2Instantiate")
+        })?;
         note(Call::instantiate);
         // SAFETY: all pointers stay valid as long as the instance; co-simulation is 1 in `fmi2Type`.
         let component = unsafe {
@@ -144,7 +150,8 @@ impl Instance {
             )
         };
         note(Call::None);
-        let instance = Self { component, callbacks, binary, log, freed: false, texts, _folder: folder };
+        let instance =
+            Self { component, callbacks, binary, log, freed: false, may_go_back: false, texts, _folder: folder };
         if component.is_null() {
             let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
             return Err(HostError::Refused(said.join("; ")));
@@ -250,7 +257,8 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`]; `fmi2Discard` and `fmi2Pending` are errors too.
     pub fn do_step(&mut self, time: f64, step: f64) -> Result<(), HostError> {
-        checked!(self, do_step(time, step, 1))
+        let no_set_prior = i32::from(!self.may_go_back);
+        checked!(self, do_step(time, step, no_set_prior))
     }
 
     /// `fmi2CancelStep`.
@@ -505,6 +513,7 @@ impl Instance {
 impl Drop for Instance {
     fn drop(&mut self) {
         self.free_once();
+        logger::forget(&self.log);
     }
 }
 

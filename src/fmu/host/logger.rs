@@ -9,7 +9,7 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, c_char, c_void};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Status;
 
@@ -29,7 +29,11 @@ pub struct LogMessage {
 /// Most messages that one instance keeps; later ones are counted only.
 const MAX_MESSAGES: usize = 10_000;
 
-/// Where an instance's messages go. Shared with the FMU as `componentEnvironment`.
+/// The sinks of the instances that live. An FMU hands back what it takes for `componentEnvironment`: the pointer is
+/// compared with these and never followed, for some FMUs pass one of their own.
+static SINKS: Mutex<Vec<Arc<LogSink>>> = Mutex::new(Vec::new());
+
+/// Where an instance's messages go. Its address is the instance's `componentEnvironment`.
 #[derive(Debug, Default)]
 pub(crate) struct LogSink {
     pub messages: Mutex<(Vec<LogMessage>, usize)>,
@@ -56,14 +60,27 @@ pub(crate) unsafe fn lossy(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
+/// Makes a sink known to the logger.
+pub(crate) fn register(sink: &Arc<LogSink>) {
+    SINKS.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::clone(sink));
+}
+
+/// Forgets a sink; messages that come later are dropped.
+pub(crate) fn forget(sink: &Arc<LogSink>) {
+    SINKS.lock().unwrap_or_else(PoisonError::into_inner).retain(|other| !Arc::ptr_eq(other, sink));
+}
+
+/// The sink of a message: the one that the pointer names; else, for a pointer of the FMU's own, that of the youngest
+/// instance.
+fn sink(environment: *mut c_void) -> Option<Arc<LogSink>> {
+    let sinks = SINKS.lock().unwrap_or_else(PoisonError::into_inner);
+    sinks.iter().find(|sink| std::ptr::eq(Arc::as_ptr(sink).cast(), environment)).or(sinks.last()).cloned()
+}
+
 /// # Safety
-/// `environment` is a live [`LogSink`] or null, the texts are C strings or null.
+/// The texts are C strings or null.
 unsafe fn record(environment: *mut c_void, name: *const c_char, status: i32, category: *const c_char, message: String) {
-    if environment.is_null() {
-        return;
-    }
-    // SAFETY: the host hands out only pointers to sinks that outlive their instance.
-    let sink = unsafe { &*environment.cast::<LogSink>() };
+    let Some(sink) = sink(environment) else { return };
     // SAFETY: C strings by the standard's contract.
     let (instance, category) = unsafe { (lossy(name), lossy(category)) };
     sink.push(LogMessage { instance, status: Status::from(status), category, message });

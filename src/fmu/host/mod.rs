@@ -12,13 +12,14 @@ pub(crate) mod logger;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicPtr, Ordering};
 
 use libloading::Library;
 use tempfile::TempDir;
 
 use super::archive::{Archive, ArchiveError};
 use super::description::{Description, DescriptionError, Interface};
+use super::isolation::Page;
 use abi::{Call, Functions};
 pub(crate) use instance::static_text;
 pub use instance::{Instance, InstanceOptions, StateHandle};
@@ -146,14 +147,20 @@ pub fn platform() -> (&'static str, &'static str) {
 }
 
 /// Where the number of the call under way is written, so that another process can read it; null when nowhere.
-pub(crate) static CALL_SLOT: AtomicPtr<AtomicU32> = AtomicPtr::new(std::ptr::null_mut());
+pub(crate) static CALL_SLOT: AtomicPtr<Page> = AtomicPtr::new(std::ptr::null_mut());
 
 /// Notes which call is made next.
 pub(crate) fn note(call: Call) {
     let slot = CALL_SLOT.load(Ordering::Relaxed);
     if !slot.is_null() {
         // SAFETY: the slot is set once to memory that lives as long as the process.
-        unsafe { &*slot }.store(call as u32, Ordering::Relaxed);
+        let page = unsafe { &*slot };
+        page.call.store(call as u32, Ordering::Relaxed);
+        if call != Call::None {
+            page.last.store(call as u32, Ordering::Relaxed);
+            // Calls from several threads may be counted as one: that there are any is what counts.
+            page.count.store(page.count.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        }
     }
 }
 
@@ -232,7 +239,25 @@ pub struct Fmu {
     pub description: Description,
     binary: Arc<Binary>,
     // After the library: it is closed before its file goes.
-    folder: Arc<TempDir>,
+    folder: Folder,
+}
+
+/// Where an FMU was extracted to.
+#[derive(Debug, Clone)]
+enum Folder {
+    /// Deleted when the FMU and its instances are gone.
+    Own(Arc<TempDir>),
+    /// Another's.
+    Lent(PathBuf),
+}
+
+impl Folder {
+    fn path(&self) -> &Path {
+        match self {
+            Self::Own(folder) => folder.path(),
+            Self::Lent(folder) => folder,
+        }
+    }
 }
 
 impl Fmu {
@@ -249,7 +274,19 @@ impl Fmu {
         };
         let file = binary_file(folder.path(), interface)?;
         let binary = Arc::new(Binary::load(&file, false)?);
-        Ok(Self { description, binary, folder: Arc::new(folder) })
+        Ok(Self { description, binary, folder: Folder::Own(Arc::new(folder)) })
+    }
+
+    /// Loads the co-simulation binary of this platform from a folder to which an FMU was extracted.
+    ///
+    /// # Errors
+    /// When the binary cannot be used.
+    pub(crate) fn in_folder(folder: &Path, description: Description) -> Result<Self, HostError> {
+        let Some(interface) = &description.co_simulation else {
+            return Err(HostError::NoCoSimulation(folder.to_owned()));
+        };
+        let binary = Arc::new(Binary::load(&binary_file(folder, interface)?, false)?);
+        Ok(Self { description, binary, folder: Folder::Lent(folder.to_owned()) })
     }
 
     /// The co-simulation interface.
@@ -284,7 +321,11 @@ impl Fmu {
     /// # Errors
     /// As [`Fmu::instantiate`].
     pub fn instantiate_with(&self, options: &InstanceOptions) -> Result<Instance, HostError> {
-        Instance::new(Arc::clone(&self.binary), Some(Arc::clone(&self.folder)), options)
+        let folder = match &self.folder {
+            Folder::Own(folder) => Some(Arc::clone(folder)),
+            Folder::Lent(_) => None,
+        };
+        Instance::new(Arc::clone(&self.binary), folder, options)
     }
 }
 

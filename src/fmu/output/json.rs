@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::rules::{Report, Severity, Verdict, rule};
+use super::super::rules::{Outcome, Report, Severity, Verdict, rule};
 
 /// The report as JSON, `eixo.validation/1`.
 #[must_use]
@@ -29,7 +29,7 @@ pub fn json(report: &Report, strict: bool) -> Value {
             if let Some(call) = &f.call {
                 value["call"] = json!(call);
             }
-            value["advice"] = json!(rule.map(|r| r.advice));
+            value["advice"] = json!(f.advice.as_deref().or(rule.map(|r| r.advice)));
             value
         })
         .collect();
@@ -49,7 +49,13 @@ pub fn json(report: &Report, strict: bool) -> Value {
         "schema": "eixo.validation/1",
         "file": report.file,
         "model": report.model,
+        "outcome": match report.outcome(strict) {
+            Outcome::Passes => "passes",
+            Outcome::Fails => "fails",
+            Outcome::NotTested => "not_tested",
+        },
         "passes": report.passes(strict),
+        "static": report.static_only,
         "strict": strict,
         "counts": {
             "error": report.count(Severity::Error),

@@ -1,10 +1,12 @@
 //! A validation report written down: for people, for programs, for continuous integration.
 
+mod compared;
 mod json;
 mod junit;
 mod sarif;
 mod text;
 
+pub use compared::{compared, compared_json};
 pub use json::json;
 pub use junit::junit;
 pub use sarif::sarif;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::super::rules::{Finding, RULES, Report, Rule, Severity, Verdict, rule};
+use super::super::rules::{Finding, Outcome, RULES, Report, Rule, Severity, Verdict, rule};
 
 /// Longest part of a source line that is quoted, in characters.
 const QUOTE: usize = 120;
@@ -24,17 +24,19 @@ impl Paint {
     }
 }
 
-/// The report as text; `color` with ANSI colours.
+/// The report as text; `color` with ANSI colours. Findings of one rule and one cause are told once, with how many there
+/// are; with `all`, each.
 #[must_use]
-pub fn text(report: &Report, strict: bool, color: bool) -> String {
+pub fn text(report: &Report, strict: bool, color: bool, all: bool) -> String {
     let paint = Paint(color);
     let mut out = String::new();
+    let causes = causes(report, all);
     for severity in [Severity::Error, Severity::Warning, Severity::Note] {
-        for finding in &report.findings {
-            if let Some(rule) = rule(&finding.rule)
+        for cause in &causes {
+            if let Some(rule) = rule(&cause[0].rule)
                 && rule.severity == severity
             {
-                write_finding(&mut out, report, finding, rule, &paint);
+                write_cause(&mut out, report, cause, rule, &paint);
             }
         }
     }
@@ -42,12 +44,67 @@ pub fn text(report: &Report, strict: bool, color: bool) -> String {
     out
 }
 
-/// Control characters of an FMU's texts shown as what they are, so that they cannot steer the terminal.
-fn plain(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() && c != '\n' { '\u{FFFD}' } else { c }).collect()
+/// The findings by cause: of one rule, and alike but for names and numbers.
+fn causes(report: &Report, all: bool) -> Vec<Vec<&Finding>> {
+    let mut groups: Vec<(String, Vec<&Finding>)> = Vec::new();
+    for finding in &report.findings {
+        let cause = format!("{} {}", finding.rule, cause(&finding.message));
+        match groups.iter_mut().find(|(key, _)| !all && *key == cause) {
+            Some((_, group)) => group.push(finding),
+            None => groups.push((cause, vec![finding])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
 }
 
-fn write_finding(out: &mut String, report: &Report, finding: &Finding, rule: &Rule, paint: &Paint) {
+/// A message without its names, in quotes, and its numbers.
+fn cause(message: &str) -> String {
+    let mut out = String::new();
+    let mut quoted = false;
+    let mut number = false;
+    for c in message.chars() {
+        match c {
+            '"' => {
+                quoted = !quoted;
+                out.push('"');
+            }
+            _ if quoted => {}
+            // Signs and exponents belong to a number that has begun; letters end it.
+            '0'..='9' => number = true,
+            '.' | '+' | '-' | 'e' | 'E' if number => {}
+            _ => {
+                number = false;
+                if c != '-' {
+                    out.push(c);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The first name in quotes of a message.
+fn named(message: &str) -> Option<&str> {
+    message.split('"').nth(1)
+}
+
+/// How many rules are named that one cause kept from being tested.
+const SHOWN: usize = 8;
+/// How many names are given of findings that have one cause.
+const NAMES: usize = 5;
+
+/// Control characters of an FMU's texts shown as what they are, so that they cannot steer the terminal; a tab is a blank.
+fn plain(text: &str) -> String {
+    let shown = |c: char| match c {
+        '\t' => ' ',
+        c if c.is_control() && c != '\n' => '\u{FFFD}',
+        c => c,
+    };
+    text.chars().map(shown).collect()
+}
+
+fn write_cause(out: &mut String, report: &Report, cause: &[&Finding], rule: &Rule, paint: &Paint) {
+    let finding = cause[0];
     let message = plain(&finding.message);
     let _ = writeln!(out, "{} {}: {message}", paint.severity(rule.severity), paint.with("1", format!("[{}]", rule.id)));
     if let Some(place) = &finding.place {
@@ -71,11 +128,23 @@ fn write_finding(out: &mut String, report: &Report, finding: &Finding, rule: &Ru
     if let Some(call) = &finding.call {
         let _ = writeln!(out, "  {} in {}", paint.with("34", "-->"), plain(call));
     }
+    if cause.len() > 1 {
+        let names: Vec<String> = cause[1..]
+            .iter()
+            .filter_map(|f| named(&f.message))
+            .take(NAMES)
+            .map(|n| format!("\"{}\"", plain(n)))
+            .collect();
+        let more = if cause.len() - 1 > names.len() { ", ..." } else { "" };
+        let names = if names.is_empty() { String::new() } else { format!(": {}{more}", names.join(", ")) };
+        let _ =
+            writeln!(out, "  {} and {} more like it{names} (--all lists each)", paint.with("34", "+"), cause.len() - 1);
+    }
     let _ = writeln!(
         out,
         "  {} {} (FMI 2.0.4, section {}; {})\n",
         paint.with("34", "="),
-        rule.advice,
+        finding.advice.as_deref().unwrap_or(rule.advice),
         rule.section,
         rule.kind
     );
@@ -91,10 +160,11 @@ fn write_rest(out: &mut String, report: &Report, strict: bool, paint: &Paint) {
             }
         }
     }
-    if !untested.is_empty() {
+    if !untested.is_empty() && !report.static_only {
         let _ = writeln!(out, "{}", paint.with("1", "Not tested (which is not passed):"));
         for (why, ids) in untested {
-            let _ = writeln!(out, "  {}: {}", plain(why), ids.join(", "));
+            let shown = if ids.len() > SHOWN { format!("{} rules", ids.len()) } else { ids.join(", ") };
+            let _ = writeln!(out, "  {}: {shown}", plain(why));
         }
         out.push('\n');
     }
@@ -102,12 +172,22 @@ fn write_rest(out: &mut String, report: &Report, strict: bool, paint: &Paint) {
         let _ = writeln!(out, "{}\n", plain(remark));
     }
     let count = |verdict: fn(&Verdict) -> bool| report.rules.iter().filter(|(_, v)| verdict(v)).count();
-    let verdict = if report.passes(strict) { paint.with("1;32", "passes") } else { paint.with("1;31", "fails") };
+    let verdict = match report.outcome(strict) {
+        Outcome::Passes if report.static_only => paint.with("1;32", "passes the static rules"),
+        Outcome::Passes => paint.with("1;32", "passes"),
+        Outcome::Fails => paint.with("1;31", "fails"),
+        Outcome::NotTested => paint.with("1;33", "was not tested beyond its archive and XML"),
+    };
     let _ = writeln!(
         out,
         "{} {verdict}{}: {}, {}, {}; {} rules passed, {} not applicable, {} not tested",
         plain(&report.file),
-        if strict { " (strict)" } else { "" },
+        match (strict, report.static_only) {
+            (true, true) => " (--strict, --static: nothing of it was run)",
+            (true, false) => " (--strict)",
+            (false, true) => " (--static: nothing of it was run)",
+            (false, false) => "",
+        },
         plural(report.count(Severity::Error), "error"),
         plural(report.count(Severity::Warning), "warning"),
         plural(report.count(Severity::Note), "note"),
@@ -154,4 +234,16 @@ pub fn rules_json() -> serde_json::Value {
         })
         .collect();
     serde_json::json!({ "schema": "eixo.rules/1", "rules": rules })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cause;
+
+    #[test]
+    fn one_cause_has_one_key_whatever_the_names_and_numbers() {
+        let of = |name: &str, a: &str, b: &str| format!("the parameter \"{name}\" was set to {a} and reads {b}");
+        assert_eq!(cause(&of("a.b[1]", "1.05", "-1")), cause(&of("c", "1e-300", "0")));
+        assert_ne!(cause(&of("a", "1", "2")), cause("the input \"a\" was set to 1 and reads 2"));
+    }
 }

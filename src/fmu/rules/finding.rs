@@ -28,6 +28,9 @@ pub struct Finding {
     /// The FMI function at fault, for behavioural rules.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub call: Option<String>,
+    /// What to do, where the rule's own advice does not fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub advice: Option<String>,
 }
 
 /// What became of a rule.
@@ -60,6 +63,19 @@ pub struct Report {
     pub remarks: Vec<String>,
     /// The lines of `modelDescription.xml`, for quoting.
     pub source: Vec<String>,
+    /// Whether it was asked that nothing of the FMU is run.
+    pub static_only: bool,
+}
+
+/// What a report comes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Nothing that counts was found; unless it was not asked for, the FMU's behaviour was tested.
+    Passes,
+    /// Something was found that counts.
+    Fails,
+    /// Nothing that counts was found, but the FMU's behaviour could not be tested.
+    NotTested,
 }
 
 impl Report {
@@ -69,10 +85,26 @@ impl Report {
         self.findings.iter().filter(|f| super::rule(&f.rule).is_some_and(|r| r.severity == severity)).count()
     }
 
-    /// Whether the FMU passes: no finding of error severity; `strict`, no finding at all.
+    /// What the report comes to; `strict`, warnings count as errors do. Notes never do.
+    #[must_use]
+    pub fn outcome(&self, strict: bool) -> Outcome {
+        if self.count(Severity::Error) > 0 || strict && self.count(Severity::Warning) > 0 {
+            return Outcome::Fails;
+        }
+        let asked = || self.rules.iter().filter(|(r, v)| !r.check.is_static() && *v != Verdict::Skipped);
+        let untested = |(_, verdict): &(&Rule, Verdict)| matches!(verdict, Verdict::NotTested(_));
+        // Without the default experiment nothing of the FMU has been seen at work.
+        let idle = asked().any(|rule| rule.0.id == "simulate" && untested(rule));
+        if !self.static_only && asked().next().is_some() && (idle || asked().all(untested)) {
+            return Outcome::NotTested;
+        }
+        Outcome::Passes
+    }
+
+    /// Whether the FMU passes: see [`Report::outcome`].
     #[must_use]
     pub fn passes(&self, strict: bool) -> bool {
-        if strict { self.findings.is_empty() } else { self.count(Severity::Error) == 0 }
+        self.outcome(strict) == Outcome::Passes
     }
 }
 
@@ -100,7 +132,7 @@ impl Findings {
 
     fn push(&mut self, rule: &'static str, place: Option<Place>, message: String) {
         debug_assert!(super::rule(rule).is_some(), "{rule} is not in the list of rules");
-        self.list.push(Finding { rule: rule.into(), message, place, call: None });
+        self.list.push(Finding { rule: rule.into(), message, place, call: None, advice: None });
     }
 
     /// Whether a rule has a finding.

@@ -18,7 +18,7 @@ use super::archive::Archive;
 use super::description::Description;
 use super::xml::Document;
 use finding::Findings;
-pub use finding::{Finding, Place, Report, Verdict};
+pub use finding::{Finding, Outcome, Place, Report, Verdict};
 pub use list::RULES;
 
 /// How bad a finding is.
@@ -103,6 +103,8 @@ pub(crate) struct Static {
     pub source: Vec<String>,
     /// Static rules that were not tested, and why.
     pub untested: Vec<(&'static str, String)>,
+    /// The version of FMI, where it is not 2.
+    pub foreign: Option<String>,
 }
 
 /// Runs every static rule on a file.
@@ -122,7 +124,7 @@ pub(crate) fn check_file(path: &Path) -> Result<Static, super::archive::ArchiveE
 impl Static {
     fn empty() -> Self {
         let findings = Findings::default();
-        Self { findings, archive: None, description: None, source: Vec::new(), untested: Vec::new() }
+        Self { findings, archive: None, description: None, source: Vec::new(), untested: Vec::new(), foreign: None }
     }
 
     /// Notes that the static rules from this one on were not tested.
@@ -169,6 +171,11 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
     };
     result.source = document.source.lines().map(str::to_owned).collect();
     let findings = &mut result.findings;
+    if let Some(version) = document::foreign(&document.root) {
+        result.foreign = Some(version.to_owned());
+        result.stop("fmi-version", "this is no FMI 2.0");
+        return None;
+    }
     if !document::root(&document.root, findings) {
         result.stop("interface-missing", "this is no model description of FMI 2.0");
         return None;

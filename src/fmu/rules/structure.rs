@@ -181,7 +181,7 @@ fn kind_of_type(
         } else {
             continue;
         };
-        f.at("dependencies-kind", unknown.position, message);
+        f.at("dependencies-kind-real", unknown.position, message);
     }
 }
 

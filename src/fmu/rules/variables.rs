@@ -212,8 +212,18 @@ fn aliases(d: &Description, findings: &mut Findings) {
         let units: HashSet<Option<String>> = set.iter().map(|v| unit_key(d, v)).collect();
         if units.len() > 1 {
             let names: Vec<&str> = set.iter().map(|v| v.name.as_str()).collect();
-            let message = format!("{} have one value reference, but not one unit", names.join(", "));
-            findings.at("alias-unit", set[1].position, message);
+            let names = names.join(", ");
+            // No unit beside one is untidy; two that cannot be converted make one number two quantities.
+            if units.iter().flatten().count() > 1 {
+                findings.at(
+                    "alias-unit",
+                    set[1].position,
+                    format!("{names} have one value reference, but not one unit"),
+                );
+            } else {
+                let message = format!("{names} have one value reference, but only some of them have a unit");
+                findings.at("alias-unit-missing", set[1].position, message);
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::trace::{Hold, Sampling, Table, Trace, TraceError, Unit, grid, nearest
 use super::SimulateError;
 
 /// Sampled signals with one time axis, increasing, s.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Inputs {
     /// Time of each sample, s.
     pub time: Vec<f64>,

@@ -6,7 +6,7 @@
 mod inputs;
 mod values;
 
-use super::description::{BaseType, Causality};
+use super::description::{BaseType, Causality, Description};
 use super::host::{Fmu, HostError, Instance, InstanceOptions, Status};
 use crate::trace::{Hold, Motion, Signal, Trace, TraceError};
 
@@ -46,6 +46,16 @@ pub enum SimulateError {
         wanted: String,
         /// A near miss.
         near: String,
+    },
+    /// No column of the reference results is a variable of the FMU.
+    #[error("{file}: no column is a variable of the FMU; the columns are: {present}; the outputs are: {wanted}")]
+    NoReference {
+        /// The file.
+        file: String,
+        /// Its columns.
+        present: String,
+        /// The FMU's outputs.
+        wanted: String,
     },
     /// A unit that is not the FMU's.
     #[error("{file}: column {column} is in [{unit}], but the FMU takes it in {wanted}: convert the column")]
@@ -110,6 +120,9 @@ pub enum SimulateError {
         /// Its last log messages.
         log: Vec<String>,
     },
+    /// What became of the child process that ran the FMU.
+    #[error("{0}")]
+    Child(String),
 }
 
 fn log_text(log: &[String]) -> String {
@@ -117,7 +130,7 @@ fn log_text(log: &[String]) -> String {
 }
 
 /// What a row of the record holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Rows {
     /// The outputs after the inputs of that instant have been set.
     #[default]
@@ -127,7 +140,7 @@ pub enum Rows {
 }
 
 /// How an FMU is run.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Options {
     /// Start, s; by default the first sample of the input, else the default experiment's.
     pub start: Option<f64>,
@@ -136,6 +149,7 @@ pub struct Options {
     /// Communication step, s; by default the input's sampling interval, else the default experiment's step.
     pub step: Option<f64>,
     /// What the inputs do between samples.
+    #[serde(with = "hold")]
     pub hold: Hold,
     /// Values set before initialisation.
     pub settings: Vec<Setting>,
@@ -143,6 +157,21 @@ pub struct Options {
     pub outputs: Vec<String>,
     /// What a row holds.
     pub rows: Rows,
+}
+
+/// How [`Hold`], which knows of no files, is written down.
+mod hold {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::Hold;
+
+    pub fn serialize<S: Serializer>(hold: &Hold, to: S) -> Result<S::Ok, S::Error> {
+        (*hold == Hold::Linear).serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Hold, D::Error> {
+        bool::deserialize(from).map(|linear| if linear { Hold::Linear } else { Hold::Zoh })
+    }
 }
 
 /// What was recorded: the inputs, then the outputs.
@@ -223,8 +252,8 @@ struct Experiment {
 }
 
 impl Experiment {
-    fn new(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Self, SimulateError> {
-        let default = fmu.description.default_experiment.unwrap_or_default();
+    fn new(description: &Description, inputs: &Inputs, options: &Options) -> Result<Self, SimulateError> {
+        let default = description.default_experiment.unwrap_or_default();
         let start = options.start.or(inputs.time.first().copied()).or(default.start_time).unwrap_or(0.0);
         let stop = options.stop.or(inputs.time.last().copied()).or(default.stop_time).ok_or(SimulateError::NoStop)?;
         let step = options.step.or(inputs.dt).or(default.step_size.filter(|_| inputs.time.is_empty()));
@@ -249,12 +278,21 @@ impl Experiment {
     }
 }
 
-/// Runs an FMU from start to end.
+/// Checks what can be checked before an FMU runs: the communication points and the names of inputs and outputs.
+///
+/// # Errors
+/// See [`SimulateError`].
+pub(crate) fn check(description: &Description, inputs: &Inputs, options: &Options) -> Result<(), SimulateError> {
+    Experiment::new(description, inputs, options)?;
+    Ports::find(description, inputs, &options.outputs).map(|_| ())
+}
+
+/// Runs an FMU from start to end, in this process: see [`super::contained::simulate`] for one whose maker you do not know.
 ///
 /// # Errors
 /// See [`SimulateError`].
 pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Record, SimulateError> {
-    let experiment = Experiment::new(fmu, inputs, options)?;
+    let experiment = Experiment::new(&fmu.description, inputs, options)?;
     let ports = Ports::find(&fmu.description, inputs, &options.outputs)?;
     let instance_options = InstanceOptions {
         name: fmu.description.model_name.clone(),

@@ -6,7 +6,7 @@ use crate::fmu::host::{Fmu, HostError, Instance};
 use crate::trace::{Hold, nearest};
 
 /// A value for a variable, as text: `name=value`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Setting {
     /// Name of the variable.
     pub name: String,

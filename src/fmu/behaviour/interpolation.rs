@@ -1,0 +1,99 @@
+//! Derivatives of inputs and outputs to time (FMI 2.0.4, section 4.2.1).
+
+use super::super::description::{BaseType, Causality, Variability, Variable};
+use super::super::host::HostError;
+use super::probe::{Probe, Snapshot, Stop, Tested, not_applicable, not_tested};
+
+fn continuous_inputs(p: &Probe) -> Result<Vec<(usize, &Variable)>, Stop> {
+    if !p.interface().can_interpolate_inputs {
+        return not_applicable("canInterpolateInputs is false");
+    }
+    let kept = |v: &Variable| v.base() == BaseType::Real && v.variability == Variability::Continuous;
+    let inputs: Vec<_> = p.inputs().enumerate().filter(|(_, v)| kept(v)).collect();
+    if inputs.is_empty() { not_applicable("there is no continuous Real input") } else { Ok(inputs) }
+}
+
+/// "Calling fmi2SetRealInputDerivatives has an effect" (canInterpolateInputs, section 4.3.1): a slope that brings the
+/// input where a step's result answers to it.
+pub(super) fn effect(p: &Probe) -> Tested {
+    let inputs = continuous_inputs(p)?;
+    let stepped = |change: Option<(&Variable, f64)>, slope: Option<(&Variable, f64)>| -> Result<Snapshot, HostError> {
+        let mut instance = p.ready()?;
+        p.run(&mut instance, 0, 2)?;
+        p.drive(&mut instance, p.time(2))?;
+        if let Some((v, value)) = change {
+            instance.set_real(&[v.value_reference], &[value])?;
+        }
+        if let Some((v, slope)) = slope {
+            instance.set_input_derivatives(&[v.value_reference], &[1], &[slope])?;
+        }
+        instance.do_step(p.time(2), p.step)?;
+        p.observe(&mut instance)
+    };
+    let plain = [stepped(None, None)?];
+    let (mut silent, mut answered) = (Vec::new(), false);
+    for (order, v) in inputs.into_iter().take(10) {
+        let r = p.d.resolved(v);
+        let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
+        let value = if p.learned.stimulus { p.input(v, order, p.time(2)) } else { 0.0 };
+        let size = 0.1 * r.nominal.filter(|n| n.is_finite()).unwrap_or(1.0).max(value.abs()).min((high - low).abs());
+        let size = if value + size > high { -size } else { size };
+        if value + size < low {
+            continue;
+        }
+        // Without the input itself, and what is computed from it at once, the course of the rest must answer.
+        let Ok(moved) = stepped(Some((v, value + size)), None) else { continue };
+        if !p.answers(&plain, &[moved], &[v.value_reference]) {
+            continue;
+        }
+        let sloped = stepped(None, Some((v, 2.0 * size / p.step)))?;
+        match p.answers(&plain, &[sloped], &[v.value_reference]) {
+            true => answered = true,
+            false => silent.push(v.name.as_str()),
+        }
+    }
+    match (answered, silent.first()) {
+        (false, Some(name)) => Ok(vec![format!(
+            "a slope of the input \"{name}\" set with fmi2SetRealInputDerivatives changes nothing, though its value does and \
+             canInterpolateInputs is true"
+        )]),
+        (true, _) => Ok(vec![]),
+        (false, None) => not_tested("nothing answers to an input within a step"),
+    }
+}
+
+pub(super) fn input_derivatives(p: &Probe) -> Tested {
+    let inputs: Vec<u32> = continuous_inputs(p)?.into_iter().map(|(_, v)| v.value_reference).collect();
+    let mut instance = p.ready()?;
+    p.drive(&mut instance, p.start)?;
+    instance.set_input_derivatives(&inputs, &vec![1; inputs.len()], &vec![0.0; inputs.len()])?;
+    instance.do_step(p.start, p.step)?;
+    let flat = p.observe(&mut instance)?;
+    instance.free();
+    // A slope of zero is what happens without derivatives.
+    let mut plain = p.ready()?;
+    p.drive(&mut plain, p.start)?;
+    plain.do_step(p.start, p.step)?;
+    let what = p.difference(&p.observe(&mut plain)?, &flat);
+    Ok(what.map(|what| format!("input derivatives of 0 change the step: {what}")).into_iter().collect())
+}
+
+pub(super) fn output_derivatives(p: &Probe) -> Tested {
+    let order = p.interface().max_output_derivative_order;
+    if order == 0 {
+        return not_applicable("maxOutputDerivativeOrder is 0");
+    }
+    let kept = |v: &&Variable| {
+        v.base() == BaseType::Real && v.causality == Causality::Output && v.variability == Variability::Continuous
+    };
+    let outputs: Vec<&Variable> = p.d.variables.iter().filter(kept).collect();
+    if outputs.is_empty() {
+        return not_applicable("there is no continuous Real output");
+    }
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, 3)?;
+    let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
+    let values = instance.get_output_derivatives(&references, &vec![1; references.len()])?;
+    let bad = outputs.iter().zip(values).filter(|(_, value)| !value.is_finite());
+    Ok(bad.map(|(v, value)| format!("the first derivative of \"{}\" is {value}", v.name)).collect())
+}

@@ -1,0 +1,187 @@
+//! The child's side: receives an order, does the job, answers, and leaves without running exit handlers.
+
+#![allow(unsafe_code)]
+
+/// There are no children on this system.
+#[cfg(not(unix))]
+pub fn child() -> std::process::ExitCode {
+    std::process::ExitCode::from(2)
+}
+
+#[cfg(unix)]
+pub use unix::child;
+
+#[cfg(unix)]
+mod unix {
+    use std::fs::File;
+    use std::io::{self, Write};
+    use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
+    use std::os::unix::net::UnixStream;
+    use std::process::ExitCode;
+    use std::sync::atomic::Ordering;
+
+    use super::super::super::behaviour::{self, Setup, Stop};
+    use super::super::super::description::Description;
+    use super::super::super::host::{Fmu, HostError};
+    use super::super::super::simulate::{self, Record};
+    use super::super::job::{Answer, Head, Job, Nonce, Order, RunTask, Task, numbers, send_numbers};
+    use super::super::page::{Mapped, Page};
+    use super::super::sandbox;
+
+    /// What a child does that was started with `--child`.
+    #[must_use]
+    pub fn child() -> ExitCode {
+        match attempt() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("{error}");
+                ExitCode::from(2)
+            }
+        }
+    }
+
+    fn attempt() -> io::Result<()> {
+        let mut line = Line::take()?;
+        let order = Order::receive(&mut line.socket)?;
+        // A session of its own: no terminal, and a group that the parent can kill as a whole.
+        // SAFETY: the call takes nothing.
+        unsafe { libc::setsid() };
+        limit(&order);
+        let page = Mapped::open(&order.page)?.publish();
+        if let Some(fence) = &order.fence {
+            let strength = sandbox::raise(fence, &page.refused);
+            page.strength.store(strength as u32, Ordering::Relaxed);
+        }
+        let at_once = !matches!(&order.job, Job::Rule(task) if task.rule == "unload");
+        let (answer, record) = match order.job {
+            Job::Rule(task) => (rule(task)?, None),
+            Job::Simulate(task) => match simulation(&task) {
+                Ok(record) => (Answer { record: Some(Head::of(&record)), ..Answer::default() }, Some(record)),
+                Err(error) => (Answer { error: Some(error), ..Answer::default() }, None),
+            },
+        };
+        line.answer(&answer, record.as_ref(), &order.nonce, page)?;
+        leave(at_once);
+        Ok(())
+    }
+
+    /// The socket to the parent, where nobody looks for it.
+    struct Line {
+        socket: UnixStream,
+        /// What the socket is, to tell when the FMU has put something else in its place.
+        inode: u64,
+    }
+
+    impl Line {
+        fn take() -> io::Result<Self> {
+            // SAFETY: standard input is open and a socket of ours; the copy is a descriptor of ours.
+            let copy = unsafe {
+                let fd = libc::fcntl(0, libc::F_DUPFD_CLOEXEC, 60);
+                if fd < 0 {
+                    return Err(io::Error::last_os_error());
+                }
+                OwnedFd::from_raw_fd(fd)
+            };
+            let nothing = File::open("/dev/null")?;
+            // SAFETY: both descriptors are open.
+            unsafe { libc::dup2(nothing.as_raw_fd(), 0) };
+            let mut line = Self { socket: UnixStream::from(copy), inode: 0 };
+            line.inode = line.now().unwrap_or(0);
+            Ok(line)
+        }
+
+        fn now(&self) -> Option<u64> {
+            // SAFETY: all-zero bytes are a valid `stat`, which the call only fills in; a closed descriptor is refused.
+            unsafe {
+                let mut stat: libc::stat = std::mem::zeroed();
+                (libc::fstat(self.socket.as_raw_fd(), &raw mut stat) == 0).then_some(stat.st_ino as u64)
+            }
+        }
+
+        fn answer(&mut self, answer: &Answer, record: Option<&Record>, nonce: &Nonce, page: &Page) -> io::Result<()> {
+            if self.now() == Some(self.inode) {
+                let head = answer.encode(nonce, record.map_or(0, numbers))?;
+                self.socket.write_all(&head)?;
+                return record.map_or(Ok(()), |record| send_numbers(record, &mut self.socket));
+            }
+            // The FMU has closed what was not its own; the descriptor may be another's now.
+            std::mem::forget(std::mem::replace(&mut self.socket, UnixStream::pair()?.0));
+            let (_, last) = page.call();
+            let error = format!("the FMU closed descriptors of its host's process; {last} was called last");
+            let answer = Answer { error: record.map(|_| error), record: None, ..answer.clone() };
+            if page.put(&answer.encode(nonce, 0)?) { Ok(()) } else { Err(io::Error::other("too long an answer")) }
+        }
+    }
+
+    fn rule(task: Task) -> io::Result<Answer> {
+        let xml = std::fs::read(task.folder.join("modelDescription.xml"))?;
+        let description = Description::parse(&xml).map_err(io::Error::other)?;
+        let test = behaviour::behaviour(&task.rule).ok_or_else(|| io::Error::other("no such rule"))?;
+        let Task { rule: task_rule, folder, binary_path, workplace, learned } = task;
+        let setup = Setup { description, folder, binary_path, workplace, learned };
+        let (tested, learned) = behaviour::run(test, &setup);
+        let mut answer = Answer { learned, ..Answer::default() };
+        match tested {
+            Ok(findings) => answer.findings = findings.into_iter().map(|message| (message, None)).collect(),
+            Err(Stop::NotApplicable(why)) => answer.not_applicable = Some(why),
+            Err(Stop::NotTested(why)) => answer.not_tested = Some(why),
+            Err(Stop::Host(error)) if behaviour::is_indirect(&task_rule) => answer.not_tested = Some(error.to_string()),
+            Err(Stop::Host(error)) => {
+                let call = match &error {
+                    HostError::Status { function, .. } | HostError::Missing(function) => Some((*function).to_owned()),
+                    HostError::Refused(_) => Some("fmi2Instantiate".to_owned()),
+                    _ => None,
+                };
+                answer.findings = vec![(error.to_string(), call)];
+            }
+        }
+        Ok(answer)
+    }
+
+    fn simulation(task: &RunTask) -> Result<Record, String> {
+        let xml = std::fs::read(task.folder.join("modelDescription.xml")).map_err(|error| error.to_string())?;
+        let description = Description::parse(&xml).map_err(|error| error.to_string())?;
+        let fmu = Fmu::in_folder(&task.folder, description).map_err(|error| error.to_string())?;
+        let record = simulate::simulate(&fmu, &task.inputs, &task.options).map_err(|error| error.to_string());
+        // What the library does when it is unloaded is no part of the run.
+        std::mem::forget(fmu);
+        record
+    }
+
+    /// Flushes what the FMU printed and ends the process; `at_once` without the exit handlers, which are a rule of their
+    /// own.
+    fn leave(at_once: bool) {
+        unsafe extern "C" {
+            fn fflush(stream: *mut std::ffi::c_void) -> i32;
+        }
+        // SAFETY: null flushes all of the C library's streams.
+        unsafe { fflush(std::ptr::null_mut()) };
+        if at_once {
+            // SAFETY: nothing is left to clean up: all files are written and closed.
+            unsafe { libc::_exit(0) };
+        }
+    }
+
+    /// Limits memory, core dumps and the size of files, and dies with the parent.
+    fn limit(order: &Order) {
+        let set = |resource, value| {
+            let limit = libc::rlimit { rlim_cur: value, rlim_max: value };
+            // SAFETY: the structure is valid; a refusal leaves the limit as it was.
+            unsafe { libc::setrlimit(resource, &raw const limit) };
+        };
+        if let Some(memory) = order.memory {
+            set(libc::RLIMIT_AS, memory);
+        }
+        set(libc::RLIMIT_CORE, 0);
+        set(libc::RLIMIT_FSIZE, order.file);
+        #[cfg(target_os = "linux")]
+        // SAFETY: the option takes a signal number; the other call takes nothing.
+        unsafe {
+            libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL);
+            // The parent may have ended before that was said.
+            if libc::getppid() as u32 != order.parent {
+                libc::_exit(2);
+            }
+        }
+    }
+}

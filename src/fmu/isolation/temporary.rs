@@ -1,0 +1,102 @@
+//! Temporary folders that do not outlive their process for long: what one that was killed left, the next one takes away.
+
+use std::io;
+use std::path::Path;
+use std::sync::Once;
+
+use tempfile::TempDir;
+
+/// What begins the name of every temporary folder; the process' number follows.
+const PREFIX: &str = "eixo-fmu-";
+/// A folder this old belongs to nobody, whatever process has its number now, s.
+const ABANDONED: u64 = 24 * 3600;
+
+/// Makes a temporary folder, which goes with the value. The first call takes away what killed processes left.
+///
+/// # Errors
+/// When the system's folder for temporary files cannot be written.
+pub fn folder() -> io::Result<TempDir> {
+    static SWEPT: Once = Once::new();
+    let root = std::env::temp_dir();
+    SWEPT.call_once(|| sweep(&root));
+    tempfile::Builder::new().prefix(&format!("{PREFIX}{}-", std::process::id())).tempdir_in(root)
+}
+
+fn sweep(root: &Path) {
+    if !Path::new("/proc/self").exists() {
+        return;
+    }
+    for entry in std::fs::read_dir(root).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let number = name.to_str().and_then(|n| n.strip_prefix(PREFIX)?.split_once('-')?.0.parse::<u32>().ok());
+        let Some(number) = number else { continue };
+        let ended = number != std::process::id() && !Path::new("/proc").join(number.to_string()).exists();
+        let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+        // A symbolic link of that name is another's.
+        let is_folder = entry.file_type().is_ok_and(|t| t.is_dir()) && own(&entry);
+        if is_folder && (ended || age().is_some_and(|a| a.as_secs() > ABANDONED)) {
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
+#[cfg(unix)]
+#[allow(unsafe_code)]
+fn own(entry: &std::fs::DirEntry) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    // SAFETY: the call takes nothing and cannot fail.
+    entry.metadata().is_ok_and(|m| m.uid() == unsafe { libc::geteuid() })
+}
+
+#[cfg(not(unix))]
+fn own(_entry: &std::fs::DirEntry) -> bool {
+    true
+}
+
+/// Bytes in a folder and all below it; symbolic links count as themselves.
+pub(super) fn size(folder: &Path) -> u64 {
+    let mut total = 0;
+    let mut open = vec![folder.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let Ok(metadata) = entry.metadata() else { continue };
+            if metadata.is_dir() {
+                open.push(entry.path());
+            } else {
+                // What is not written takes no room on the disk.
+                #[cfg(unix)]
+                let length = std::os::unix::fs::MetadataExt::blocks(&metadata) * 512;
+                #[cfg(not(unix))]
+                let length = metadata.len();
+                total += length;
+            }
+        }
+    }
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_killed_process_left_goes_and_what_a_running_one_has_stays() {
+        if !Path::new("/proc/self").exists() {
+            return eprintln!("SKIPPED: no list of processes here");
+        }
+        let root = tempfile::tempdir().unwrap();
+        let mut ended = std::process::Command::new("true").spawn().unwrap();
+        ended.wait().unwrap();
+        let make = |name: String| {
+            let path = root.path().join(name);
+            std::fs::create_dir_all(path.join("binaries")).unwrap();
+            path
+        };
+        let gone = make(format!("{PREFIX}{}-abc", ended.id()));
+        let kept =
+            [make(format!("{PREFIX}{}-abc", std::process::id())), make("eixo-fmu-other".into()), make("x".into())];
+        sweep(root.path());
+        assert!(!gone.exists());
+        assert!(kept.iter().all(|path| path.exists()));
+    }
+}

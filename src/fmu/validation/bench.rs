@@ -1,0 +1,298 @@
+//! Testing the behavioural rules: each in a child process, the first ones in order, the rest side by side.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::super::behaviour::probe::Learned;
+use super::super::description::Description;
+use super::super::host;
+use super::super::isolation::{
+    self, Answer, Bounds, Ended, Fence, Job, Outcome, Place, Strength, Task, sandbox, temporary,
+};
+use super::super::rules::{self, Finding, RULES, Rule, Verdict};
+use super::{Options, ValidationError};
+
+/// Rules that must pass before the others make sense, in order.
+const GATES: [&str; 10] = [
+    "binary-load",
+    "binary-symbols",
+    "instantiate",
+    "initialise",
+    "variable-readable",
+    "simulate",
+    "step-status",
+    "instances-repeated",
+    "terminate",
+    "determinism",
+];
+
+/// Rules whose failure may be the sandbox's doing.
+const NEEDY: [&str; 5] = ["binary-load", "instantiate", "initialise", "variable-readable", "simulate"];
+
+/// A call may take this many times what the longest call of the default experiment took.
+const PATIENCE: u32 = 20;
+/// Before that is known, this many times the limit of a call.
+const FIRST: u32 = 2;
+/// What is left of the budget must be this much for a rule to be tried.
+const LEAST: Duration = Duration::from_millis(50);
+
+pub(super) type Tested = (&'static Rule, Verdict, Vec<Finding>);
+
+pub(super) struct Bench<'a> {
+    folder: &'a Path,
+    binary_path: PathBuf,
+    scratch: tempfile::TempDir,
+    options: &'a Options,
+    progress: &'a (dyn Fn(&str, usize) + Sync),
+    total: usize,
+    /// Whether the FMU says that it needs its tool to run.
+    needs_tool: bool,
+    begin: Instant,
+    /// Longest call so far, and whether the default experiment has been run.
+    longest: Mutex<(Duration, bool)>,
+    /// The weakest sandbox of all children.
+    strength: Mutex<Option<Strength>>,
+}
+
+impl<'a> Bench<'a> {
+    pub fn new(
+        description: &Description,
+        folder: &'a Path,
+        options: &'a Options,
+        progress: &'a (dyn Fn(&str, usize) + Sync),
+    ) -> Result<Self, ValidationError> {
+        let interface = description.co_simulation.as_ref().expect("`prepare` lets co-simulation through alone");
+        let binary_path = host::binary_file(folder, interface).map_err(io::Error::other)?;
+        Ok(Self {
+            folder,
+            binary_path,
+            scratch: temporary::folder()?,
+            options,
+            progress,
+            total: RULES.iter().filter(|r| !r.check.is_static()).count(),
+            needs_tool: interface.needs_execution_tool,
+            begin: Instant::now(),
+            longest: Mutex::new((Duration::ZERO, false)),
+            strength: Mutex::new(None),
+        })
+    }
+
+    /// What is to be said of the sandbox.
+    pub fn gap(&self) -> Option<&'static str> {
+        self.strength.lock().unwrap_or_else(PoisonError::into_inner).filter(|_| self.options.sandbox)?.gap()
+    }
+
+    pub fn run(&self) -> Result<Vec<Tested>, ValidationError> {
+        let mut tested = Vec::new();
+        let mut learned = Learned::default();
+        let mut blocked: Option<String> = None;
+        let gates = GATES.iter().filter_map(|id| rules::rule(id));
+        for rule in gates {
+            if let Some(why) = &blocked {
+                tested.push((rule, Verdict::NotTested(why.clone()), vec![]));
+                continue;
+            }
+            let (mut result, more) = self.test(rule, &learned)?;
+            if let Some(more) = more {
+                learned = more;
+            }
+            if self.needs_tool && result.1 == Verdict::Failed && ["binary-load", "instantiate"].contains(&rule.id) {
+                // The tool may not be here, which is no fault of the FMU.
+                let first = result.2.first().map_or(String::new(), |f| format!(": {}", f.message));
+                let why = format!("the FMU needs its tool to run (needsExecutionTool){first}");
+                result = (rule, Verdict::NotTested(why.clone()), vec![]);
+            }
+            match &result.1 {
+                // A run that differs from its like is compared no more, but what else it does is tested.
+                Verdict::Failed if rule.id != "determinism" => blocked = Some(format!("{} must pass first", rule.id)),
+                Verdict::NotTested(why) if rule.id != "determinism" => blocked = Some(why.clone()),
+                _ => {}
+            }
+            tested.push(result);
+        }
+        let rest: Vec<&'static Rule> = RULES
+            .iter()
+            .filter(|r| !r.check.is_static() && !GATES.contains(&r.id))
+            .filter(|r| self.options.wants(r))
+            .collect();
+        if let Some(why) = blocked {
+            tested.extend(rest.into_iter().map(|rule| (rule, Verdict::NotTested(why.clone()), vec![])));
+            return Ok(tested);
+        }
+        let next = AtomicUsize::new(0);
+        let results = Mutex::new(Vec::new());
+        std::thread::scope(|scope| {
+            for _ in 0..self.options.jobs.max(1) {
+                scope.spawn(|| {
+                    while let Some(rule) = rest.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let result = self.test(rule, &learned);
+                        results.lock().unwrap_or_else(PoisonError::into_inner).push(result);
+                    }
+                });
+            }
+        });
+        for result in results.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            tested.push(result?.0);
+        }
+        Ok(tested)
+    }
+
+    fn out_of_budget(&self) -> Verdict {
+        let budget = self.options.budget.as_secs_f64();
+        Verdict::NotTested(format!("the budget of {budget} s was used up; --budget gives more"))
+    }
+
+    /// Tests one rule in a child process.
+    fn test(&self, rule: &'static Rule, learned: &Learned) -> Result<(Tested, Option<Learned>), ValidationError> {
+        let left = self.options.budget.saturating_sub(self.begin.elapsed());
+        if left < LEAST {
+            (self.progress)(rule.id, self.total);
+            return Ok(((rule, self.out_of_budget(), vec![]), None));
+        }
+        let (longest, known) = *self.longest.lock().unwrap_or_else(PoisonError::into_inner);
+        let call = if known { self.options.call.max(PATIENCE * longest) } else { FIRST * self.options.call };
+        let fence = self.options.sandbox.then(|| Fence {
+            read: self.options.allow.iter().cloned().chain(sandbox::configured()).collect(),
+            write: vec![self.folder.to_owned()],
+        });
+        let place = Place {
+            program: &self.options.program,
+            scratch: self.scratch.path().join(rule.id),
+            fence,
+            bounds: Bounds {
+                call: Some(call),
+                total: Some(left),
+                memory: Some(self.options.memory),
+                ..Bounds::default()
+            },
+            exact_heap: true,
+        };
+        let job = || {
+            Job::Rule(Task {
+                rule: rule.id.to_owned(),
+                folder: self.folder.to_owned(),
+                binary_path: self.binary_path.clone(),
+                workplace: place.workplace(),
+                learned: learned.clone(),
+            })
+        };
+        let mut outcome = isolation::run(&place, job())?;
+        if outcome.ended.is_from_outside() {
+            // Someone ended the process, or the FMU does so itself: again, to tell.
+            outcome = isolation::run(&place, job())?;
+        }
+        if GATES.contains(&rule.id) {
+            // What is slow is given time in proportion.
+            let mut longest = self.longest.lock().unwrap_or_else(PoisonError::into_inner);
+            longest.0 = longest.0.max(outcome.longest);
+            longest.1 |= rule.id == "simulate";
+        }
+        {
+            let mut strength = self.strength.lock().unwrap_or_else(PoisonError::into_inner);
+            if strength.is_none_or(|s| s.gap().is_none()) {
+                *strength = Some(outcome.strength);
+            }
+        }
+        let (verdict, findings, learned) = self.judge(rule, outcome);
+        (self.progress)(rule.id, self.total);
+        Ok(((rule, verdict, findings), learned))
+    }
+
+    fn judge(&self, rule: &'static Rule, outcome: Outcome) -> (Verdict, Vec<Finding>, Option<Learned>) {
+        // The temporary folder's name says nothing, and would differ from run to run.
+        let folders = [self.folder, self.scratch.path()].map(|folder| format!("{}/", folder.display()));
+        let finding = |message: String, call: Option<String>| Finding {
+            rule: rule.id.into(),
+            message: folders.iter().fold(message, |text, folder| text.replace(folder, "")),
+            place: None,
+            call,
+            advice: None,
+        };
+        let none = host::abi::CALLS[0];
+        let within = Some(outcome.call).filter(|c| *c != none).map(str::to_owned);
+        let said = outcome.stderr.lines().rfind(|line| !line.trim().is_empty());
+        let said = said.map_or(String::new(), |line| format!("; it printed: {line}"));
+        let after = || match outcome.last {
+            last if last == none || within.is_some() => String::new(),
+            last => format!(", after {last}"),
+        };
+        let answer = outcome.answer.as_deref().and_then(Answer::decode).map(|(answer, _)| answer);
+        let died = match &outcome.ended {
+            Ended::Slow(_) => return (self.out_of_budget(), vec![], answer.map(|a| a.learned)),
+            Ended::Signal(signal) => {
+                Some(format!("the FMU crashed: {}{}{said}", isolation::signal_name(*signal), after()))
+            }
+            Ended::Hangs(limit) => Some(format!("the FMU hangs: no end after {} s", limit.as_secs_f64())),
+            Ended::Exited(code) => {
+                Some(format!("the FMU ended its host's process with exit code {code}{}{said}", after()))
+            }
+            Ended::Disk(bytes) => Some(format!("the FMU wrote {} MB to the disk", bytes / 1_000_000)),
+            Ended::Forges => Some(format!("the FMU wrote to its host's own descriptor{}", after())),
+            Ended::Well if answer.is_none() => {
+                Some(format!("the FMU ended its host's process with exit code 0{}", after()))
+            }
+            Ended::Well => None,
+        };
+        if died.is_some() && rule.id == "reference-bits" {
+            let why = "reading an unknown value reference ends the process".to_owned();
+            return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
+        }
+        if let Some(message) = died {
+            let advice = Some(match &outcome.ended {
+                Ended::Signal(_) => {
+                    "Find the fault in the call named, with a debugger or a sanitizer: the host dies with it."
+                }
+                Ended::Hangs(_) => "Bound loops and waits, and return fmi2Error or fmi2Discard when they do not end.",
+                Ended::Disk(_) => "Write less, to a temporary folder, and remove it in fmi2FreeInstance.",
+                Ended::Forges => "Write to descriptors that the FMU has opened, and close no others.",
+                _ => "Never call exit in an FMU: return fmi2Error or fmi2Fatal, and leave the process to its host.",
+            });
+            let finding = Finding { advice: advice.map(str::to_owned), ..finding(message, within) };
+            return self.allowing_for_the_sandbox(rule, vec![finding], outcome.refused, None);
+        }
+        let Some(answer) = answer else { return (Verdict::NotTested("no answer".into()), vec![], None) };
+        let mut findings: Vec<Finding> = answer.findings.into_iter().map(|(m, call)| finding(m, call)).collect();
+        if rule.id == "side-stdout" && !outcome.stdout.is_empty() {
+            let line = outcome.stdout.lines().next().unwrap_or("").chars().take(80).collect::<String>();
+            findings.push(finding(format!("the FMU prints to standard output: {line:?}"), None));
+        }
+        let learned = Some(answer.learned);
+        if !findings.is_empty() {
+            return self.allowing_for_the_sandbox(rule, findings, outcome.refused, learned);
+        }
+        let verdict = match (answer.not_tested, answer.not_applicable) {
+            (Some(why), _) => Verdict::NotTested(why),
+            (_, Some(why)) => Verdict::NotApplicable(why),
+            _ => Verdict::Passed,
+        };
+        (verdict, findings, learned)
+    }
+
+    /// An FMU that does not start because the sandbox refuses what it asks for has not been tested.
+    fn allowing_for_the_sandbox(
+        &self,
+        rule: &Rule,
+        findings: Vec<Finding>,
+        refused: Option<&'static str>,
+        learned: Option<Learned>,
+    ) -> (Verdict, Vec<Finding>, Option<Learned>) {
+        let denied = || findings.iter().any(|f| f.message.contains("Permission denied"));
+        let first = findings.first().map_or("", |f| f.message.as_str());
+        let why = match refused {
+            _ if !self.options.sandbox || !NEEDY.contains(&rule.id) => None,
+            Some(what) => Some(format!("the FMU asked for {what}, which the sandbox refuses ({first})")),
+            None if denied() => Some(format!("the sandbox keeps files from the FMU ({first})")),
+            None => None,
+        };
+        match why {
+            Some(why) => {
+                let why = format!("{why}; --allow FOLDER opens a folder, --no-sandbox runs the FMU with your rights");
+                (Verdict::NotTested(why), vec![], learned)
+            }
+            None => (Verdict::Failed, findings, learned),
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! A whole validation: the static rules here, then each behavioural rule in a child process.
+
+mod bench;
+
+use std::collections::HashMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::description::Description;
+use super::host;
+use super::rules::{self, Check, RULES, Report, Rule, Verdict};
+use bench::Bench;
+
+/// What to validate and how.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Only these rules, when there are any.
+    pub only: Vec<String>,
+    /// None of these rules.
+    pub skip: Vec<String>,
+    /// No behavioural rules: nothing of the FMU is run.
+    pub static_only: bool,
+    /// Rules tested at the same time.
+    pub jobs: usize,
+    /// Longest time that a call of an FMI function may take; an FMU that is slow by itself is given more.
+    pub call: Duration,
+    /// Longest time of the whole; what it does not reach is not tested.
+    pub budget: Duration,
+    /// Address space of each behavioural rule, in bytes.
+    pub memory: u64,
+    /// Whether the FMU runs behind the fence of [`super::isolation::sandbox`].
+    pub sandbox: bool,
+    /// Files and folders that the FMU may read beside the system's.
+    pub allow: Vec<PathBuf>,
+    /// This program, which tests a rule when called as `program validate --child`.
+    pub program: PathBuf,
+}
+
+/// Why a validation could not run.
+#[derive(Debug, thiserror::Error)]
+pub enum ValidationError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Archive(#[from] super::archive::ArchiveError),
+    /// No rule of that name.
+    #[error("there is no rule {0}; `eixo validate --rules` lists them")]
+    NoRule(String),
+    /// Another version of FMI.
+    #[error("{}: this FMU is of FMI {version}, and the rules are those of FMI 2.0: nothing was tested", file.display())]
+    Version {
+        /// The file.
+        file: PathBuf,
+        /// What it says.
+        version: String,
+    },
+    /// The system refused something that the child processes need.
+    #[error("cannot run the rules: {0}")]
+    Io(#[from] io::Error),
+}
+
+impl Options {
+    /// Every rule, in the sandbox, as many at a time as there are processors.
+    #[must_use]
+    pub fn new(program: PathBuf) -> Self {
+        Self {
+            only: Vec::new(),
+            skip: Vec::new(),
+            static_only: false,
+            jobs: std::thread::available_parallelism().map_or(1, usize::from),
+            call: Duration::from_secs(10),
+            budget: Duration::from_secs(60),
+            memory: 8 << 30,
+            sandbox: true,
+            allow: Vec::new(),
+            program,
+        }
+    }
+
+    fn wants(&self, rule: &Rule) -> bool {
+        let named = |list: &[String]| list.iter().any(|id| id == rule.id);
+        (self.only.is_empty() || named(&self.only)) && !named(&self.skip)
+    }
+}
+
+/// Validates a file. `progress` is told of each behavioural rule that is done, and how many there are.
+///
+/// # Errors
+/// When the file cannot be read, a rule does not exist, or no child process can be started.
+pub fn validate(
+    path: &Path,
+    options: &Options,
+    progress: &(dyn Fn(&str, usize) + Sync),
+) -> Result<Report, ValidationError> {
+    if let Some(id) = options.only.iter().chain(&options.skip).find(|id| rules::rule(id).is_none()) {
+        return Err(ValidationError::NoRule(id.clone()));
+    }
+    let mut result = rules::check_file(path)?;
+    if let Some(version) = result.foreign.take() {
+        return Err(ValidationError::Version { file: path.to_owned(), version });
+    }
+    let mut verdicts: HashMap<&str, Verdict> = HashMap::new();
+    let mut remarks = Vec::new();
+    for rule in RULES.iter().filter(|r| r.check.is_static()) {
+        let untested = result.untested.iter().find(|(id, _)| *id == rule.id);
+        let verdict = match untested {
+            _ if result.findings.has(rule.id) => Verdict::Failed,
+            Some((_, why)) => Verdict::NotTested(why.clone()),
+            None => Verdict::Passed,
+        };
+        verdicts.insert(rule.id, verdict);
+    }
+    let mut findings = std::mem::take(&mut result.findings.list);
+    let model = result.description.as_ref().map(|d| d.model_name.clone());
+    match prepare(&mut result, options) {
+        Ok((description, folder)) => {
+            let bench = Bench::new(&description, folder.path(), options, progress)?;
+            for (rule, verdict, found) in bench.run()? {
+                verdicts.insert(rule.id, verdict);
+                findings.extend(found);
+            }
+            remarks.extend(bench.gap().map(str::to_owned));
+        }
+        Err(why) => {
+            if why.starts_with("this is a model exchange FMU") {
+                remarks.push(
+                    "This is a model exchange FMU: its behaviour was not tested, only its archive and XML.".into(),
+                );
+            }
+            for rule in RULES.iter().filter(|r| !r.check.is_static()) {
+                verdicts.insert(rule.id, Verdict::NotTested(why.clone()));
+            }
+        }
+    }
+    let rules: Vec<_> = RULES
+        .iter()
+        .map(|rule| {
+            let verdict = verdicts.remove(rule.id).unwrap_or(Verdict::Skipped);
+            (rule, if options.wants(rule) { verdict } else { Verdict::Skipped })
+        })
+        .collect();
+    findings.retain(|f| rules::rule(&f.rule).is_some_and(|r| options.wants(r)));
+    findings.sort_by_key(|f| RULES.iter().position(|r| r.id == f.rule));
+    Ok(Report {
+        file: path.display().to_string(),
+        model,
+        rules,
+        findings,
+        remarks,
+        source: result.source,
+        static_only: options.static_only,
+    })
+}
+
+/// Extracts the FMU for the behavioural rules, or says why they are not tested.
+fn prepare(result: &mut rules::Static, options: &Options) -> Result<(Description, tempfile::TempDir), String> {
+    let description = result.description.take().ok_or("modelDescription.xml must be in order first")?;
+    if options.static_only {
+        return Err("only the archive and the XML were to be tested".into());
+    }
+    let Some(interface) = &description.co_simulation else {
+        return Err("this is a model exchange FMU".into());
+    };
+    let archive = result.archive.as_mut().ok_or("the archive must be safe to extract first")?;
+    let folder = archive.extract().map_err(|error| error.to_string())?;
+    host::binary_file(folder.path(), interface).map_err(|error| error.to_string())?;
+    Ok((description, folder))
+}
+
+impl Check {
+    /// Whether the rule is tested without running the FMU.
+    #[must_use]
+    pub fn is_static(self) -> bool {
+        matches!(self, Self::Static)
+    }
+}

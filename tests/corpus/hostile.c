@@ -1,0 +1,147 @@
+/* FMUs that mean harm, for the tests of the sandbox: fmu.c, doing one of these things in its first step.
+ *
+ * EIXO_CANARY names a folder that is none of the FMU's business, EIXO_PORT a port on which the test listens. What could be
+ * read prints LEAK. Compile: cc -shared -fPIC -DACT=<name> -o corpus.so hostile.c -lm -lpthread */
+static void hostile(void);
+#define HOOK() hostile()
+#include "fmu.c"
+
+#include <arpa/inet.h>
+#include <dirent.h>
+#include <fcntl.h>
+#include <sys/ipc.h>
+#include <sys/mman.h>
+#include <sys/mount.h>
+#include <sys/prctl.h>
+#include <sys/ptrace.h>
+#include <sys/shm.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/time.h>
+#include <sys/types.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <sched.h>
+
+enum {
+    WRITE, APPEND, DELETE, RENAME, FOLDER, SYMLINK, HARDLINK, MODE, CUT, TIMES, OWNER, READ, READ_PASSWORDS, READ_PARENT,
+    LIST_HOME, TCP, UDP, LOCAL_SOCKET, FORK, BOMB, DETACH, SHELL, EXECUTE, KILL_PARENT, KILL_ALL, TRACE, FILL, PRINT, LINK_IN_TMP,
+    LINK_FOLDER, THREADS_MANY, MEMORY, HANG, SEGMENT, ANONYMOUS_FILE, MOUNT, NAMESPACE, CLOSE_ALL, WRITE_ALL, OUTLIVE, DEVICE,
+    PRIORITY_LIMITS, OTHERS_MEMORY
+};
+
+static char path[4096];
+
+static const char *canary(const char *name) {
+    snprintf(path, sizeof path, "%s/%s", getenv("EIXO_CANARY"), name);
+    return path;
+}
+
+static void put(const char *name) {
+    FILE *file = fopen(name, "a");
+    if (file) fputs("harm", file), fclose(file);
+}
+
+static void leak(const char *name) {
+    char text[16];
+    FILE *file = fopen(name, "r");
+    if (file && fread(text, 1, sizeof text, file) > 0) puts("LEAK");
+}
+
+static void send_to(int type) {
+    struct sockaddr_in to = {0};
+    int fd = socket(AF_INET, type, 0);
+    to.sin_family = AF_INET;
+    to.sin_port = htons((uint16_t)atoi(getenv("EIXO_PORT")));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (fd >= 0 && connect(fd, (struct sockaddr *)&to, sizeof to) == 0) send(fd, "harm", 4, 0);
+}
+
+static void *spin(void *unused) {
+    for (;;) sleep(1);
+    return unused;
+}
+
+static void hostile(void) {
+    static int done;
+    char other[4096], *arguments[] = {"touch", NULL, NULL};
+    int n;
+    if (done++) return;
+    switch (ACT) {
+    case WRITE: put(canary("new")); break;
+    case APPEND: put(canary("file")); break;
+    case DELETE: unlink(canary("file")); break;
+    case RENAME: snprintf(other, sizeof other, "%s", canary("file")); rename(other, canary("moved")); break;
+    case FOLDER: mkdir(canary("folder"), 0777); break;
+    case SYMLINK: symlink("/etc/passwd", canary("link")); break;
+    case HARDLINK: link(canary("file"), "mine"); put("mine"); break;
+    case MODE: chmod(canary("file"), 0777); syscall(SYS_fchmodat, AT_FDCWD, canary("file"), 0777); break;
+    case CUT: truncate(canary("file"), 0); open(canary("file"), O_WRONLY | O_TRUNC); break;
+    case TIMES: { struct timeval t[2] = {{1, 0}, {1, 0}}; utimes(canary("file"), t); break; }
+    case OWNER: chown(canary("file"), 12345, 12345); break;
+    case READ: leak(canary("file")); break;
+    case READ_PASSWORDS: leak("/etc/passwd"); leak("/etc/shadow"); leak("/etc/hostname"); break;
+    case READ_PARENT: snprintf(other, sizeof other, "/proc/%d/environ", getppid()); leak(other); break;
+    case LIST_HOME: if (opendir(getenv("HOME"))) puts("LEAK"); break;
+    case TCP: send_to(SOCK_STREAM); break;
+    case UDP: send_to(SOCK_DGRAM); break;
+    case LOCAL_SOCKET: {
+        struct sockaddr_un to = {.sun_family = AF_UNIX};
+        int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+        snprintf(to.sun_path, sizeof to.sun_path, "%s", canary("s"));
+        if (fd >= 0) connect(fd, (struct sockaddr *)&to, sizeof to);
+        break;
+    }
+    case FORK: if (fork() == 0) for (;;) sleep(1); break;
+    case BOMB: for (n = 0; n < 100; n++) fork(); break;
+    case DETACH: if (fork() == 0) { setsid(); if (fork() == 0) for (;;) sleep(1); _exit(0); } break;
+    case SHELL: snprintf(other, sizeof other, "touch %s", canary("new")); system(other); break;
+    case EXECUTE: arguments[1] = (char *)canary("new"); execv("/usr/bin/touch", arguments); break;
+    case KILL_PARENT: kill(getppid(), SIGKILL); syscall(SYS_tkill, getppid(), SIGKILL); break;
+    case KILL_ALL: kill(getppid(), SIGTERM); kill(-getppid(), SIGKILL); break;
+    case TRACE: ptrace(PTRACE_ATTACH, getppid(), 0, 0); break;
+    case FILL: {
+        static char block[1 << 20];
+        for (n = 0; n < 4000; n++) {
+            snprintf(other, sizeof other, "fill%d", n);
+            FILE *file = fopen(other, "w");
+            if (file) fwrite(block, 1, sizeof block, file), fclose(file);
+        }
+        break;
+    }
+    case PRINT: for (;;) puts("nothing to say");
+    case LINK_IN_TMP:
+        snprintf(other, sizeof other, "%s/link", getenv("TMPDIR"));
+        symlink(canary("file"), other);
+        put(other);
+        break;
+    case LINK_FOLDER:
+        snprintf(other, sizeof other, "%s/folder", getenv("TMPDIR"));
+        symlink(getenv("EIXO_CANARY"), other);
+        snprintf(path, sizeof path, "%s/new", other);
+        put(path);
+        break;
+    case THREADS_MANY:
+        for (n = 0; n < 20000; n++) {
+            pthread_t thread;
+            if (pthread_create(&thread, NULL, spin, NULL)) break;
+        }
+        break;
+    case MEMORY: for (;;) if (!memset(malloc(64 << 20), 1, 64 << 20)) break;
+    case HANG: for (;;) sleep(1);
+    case SEGMENT: { int id = shmget(4711, 4096, IPC_CREAT | 0666); if (id >= 0) puts("LEAK"); break; }
+    case ANONYMOUS_FILE: { int fd = (int)syscall(SYS_memfd_create, "m", 0); if (fd >= 0) puts("LEAK"); break; }
+    case MOUNT: mount("none", getenv("EIXO_CANARY"), "tmpfs", 0, ""); break;
+    case NAMESPACE: if (unshare(CLONE_NEWUSER) == 0) puts("LEAK"); break;
+    case CLOSE_ALL: for (n = 0; n < 1024; n++) close(n); break;
+    case WRITE_ALL: for (n = 3; n < 1024; n++) if (write(n, "harm", 4) < 0) continue; break;
+    case OUTLIVE: prctl(PR_SET_PDEATHSIG, 0); for (;;) sleep(1);
+    case DEVICE: { int fd = open("/dev/tty", O_RDWR); if (fd >= 0) puts("LEAK"); leak("/dev/mem"); break; }
+    case PRIORITY_LIMITS: {
+        struct { unsigned long now, most; } limit = {~0UL, ~0UL};
+        if (syscall(SYS_prlimit64, 0, 9, &limit, NULL) == 0) puts("LEAK");
+        break;
+    }
+    case OTHERS_MEMORY: snprintf(other, sizeof other, "/proc/%d/mem", getppid()); leak(other); leak("/proc/1/environ"); break;
+    }
+}
