@@ -7,8 +7,10 @@ use std::process::ExitCode;
 use anyhow::Context;
 use serde_json::{Value as Json, json};
 
+use super::info3;
 use super::say::say;
 use crate::fmu::archive::Archive;
+use crate::fmu::xml::Document;
 use crate::fmu::description::{Causality, Description, Interface, SI_BASE, Unit, Value, Variable};
 
 /// Arguments of `eixo info`.
@@ -35,11 +37,23 @@ fn causality(word: &str) -> Result<Causality, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// When the file is no FMU of FMI 2.0.
+/// When the file is no FMU of FMI 2.0 or 3.0.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut archive = Archive::open(&args.fmu)?;
     let xml = archive.read("modelDescription.xml").with_context(|| args.fmu.display().to_string())?;
-    let d = Description::parse(&xml).with_context(|| args.fmu.display().to_string())?;
+    let name = || args.fmu.display().to_string();
+    let document = Document::parse(&xml).with_context(name)?;
+    if document.root.name == "fmiModelDescription" && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3.")) {
+        let words: Vec<String> = args.causality.iter().map(|c| c.word().to_owned()).collect();
+        let platforms = platforms(&archive);
+        if args.json {
+            say!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
+        } else {
+            say!("{}", info3::as_text(&document.root, &platforms, &words))?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let d = Description::parse(&xml).with_context(name)?;
     let shown: Vec<&Variable> =
         d.variables.iter().filter(|v| args.causality.is_empty() || args.causality.contains(&v.causality)).collect();
     let platforms = platforms(&archive);
@@ -52,9 +66,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Platform folders with their files and the files' sizes in bytes.
+pub(super) type Platforms = Vec<(String, Vec<(String, u64)>)>;
+
 /// Platform folders with their binaries and sizes in bytes; `sources` for source code.
-fn platforms(archive: &Archive) -> Vec<(String, Vec<(String, u64)>)> {
-    let mut found: Vec<(String, Vec<(String, u64)>)> = Vec::new();
+fn platforms(archive: &Archive) -> Platforms {
+    let mut found = Platforms::new();
     for entry in archive.entries().iter().filter(|e| !e.is_dir) {
         let (folder, file) = match entry.name.strip_prefix("binaries/").and_then(|rest| rest.split_once('/')) {
             Some(parts) => parts,
@@ -122,7 +139,7 @@ fn show(value: &Value) -> String {
 }
 
 /// Control characters of an FMU's texts must not steer the terminal.
-fn plain(text: &str) -> String {
+pub(super) fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 

@@ -31,6 +31,7 @@ mod say;
 mod controlled;
 mod diagnosed;
 mod drives;
+mod info3;
 
 macro_rules! commands {
     ($($(#[$doc:meta])* $name:ident => $module:ident),* $(,)?) => {

@@ -83,6 +83,10 @@ fn record(outcome: Outcome, keep: &Host) -> Result<Record, SimulateError> {
     let refused = outcome.refused.map_or(String::new(), |what| {
         format!("; it asked for {what}, which the sandbox refuses: run it without --sandbox if you trust its maker")
     });
+    // Before the library is loaded, nothing of the FMU has run.
+    if outcome.last == host::abi::CALLS[0] && outcome.answer.is_none() {
+        return fail(format!("no process could be had to run the FMU in: {}", outcome.stderr.trim()));
+    }
     match &outcome.ended {
         Ended::Signal(signal) => {
             return fail(format!("the FMU crashed{within}: {}{said}{refused}", isolation::signal_name(*signal)));

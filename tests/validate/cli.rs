@@ -209,7 +209,7 @@ fn findings_of_one_cause_are_one_line_unless_all_are_asked_for() {
     let fmu = pack(&files(&description(&three)));
     let output = text(&eixo(&["--static", "--only", "variable-name"], &fmu));
     assert_eq!(output.matches("[variable-name]").count(), 1, "{output}");
-    assert!(output.contains("and 2 more like it") && output.contains("3 errors"), "{output}");
+    assert!(output.contains("and 2 more like it") && output.contains("3 warnings"), "{output}");
     assert!(!output.contains('\u{FFFD}'), "a tab is a blank: {output}");
     let output = text(&eixo(&["--static", "--only", "variable-name", "--all"], &fmu));
     assert_eq!(output.matches("[variable-name]").count(), 3, "{output}");
@@ -284,4 +284,49 @@ fn the_reference_fmus_have_no_error_and_no_warning() {
         count += 1;
     }
     assert!(count > 0, "no FMU in {}", folder.display());
+}
+
+#[test]
+fn info_reads_fmi_3_with_arrays_and_all_types() {
+    let xml = r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Three" instantiationToken="{1}">
+  <CoSimulation modelIdentifier="three" hasEventMode="true" fixedInternalStepSize="0.5" canGetAndSetFMUState="false"/>
+  <DefaultExperiment startTime="0" stopTime="10"/>
+  <ModelVariables>
+    <UInt64 name="n" valueReference="2" causality="structuralParameter" start="3"/>
+    <Float64 name="A" valueReference="4" causality="parameter" variability="tunable" start="1 0 0">
+      <Dimension valueReference="2"/><Dimension start="1"/>
+    </Float64>
+    <Float32 name="y" valueReference="5" causality="output" unit="m"/>
+    <Clock name="tick" valueReference="6" causality="input" intervalVariability="triggered"/>
+    <String name="s" valueReference="7" causality="parameter"><Start value="hello"/></String>
+  </ModelVariables>
+</fmiModelDescription>"#;
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = folder.path().join("three.fmu");
+    let archive =
+        vec![("modelDescription.xml".into(), xml.into()), ("binaries/x86_64-linux/three.so".into(), vec![0; 1500])];
+    std::fs::write(&fmu, pack(&archive)).unwrap();
+    let info = |args: &[&str]| {
+        let output = Command::new(corpus::program()).arg("info").arg(&fmu).args(args).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        text(&output)
+    };
+    let out = info(&[]);
+    for part in [
+        "FMI          3.0",
+        "hasEventMode, fixedInternalStepSize 0.5\n",
+        "x86_64-linux: three.so (2 kB)",
+        "Float64[n, 1]  parameter            tunable      1 0 0",
+        "Float32        output               continuous          m",
+        "hello",
+        "Clock          input                discrete",
+        "5 of 5",
+    ] {
+        assert!(out.contains(part), "{part}: {out}");
+    }
+    assert!(info(&["--causality", "output"]).contains("1 of 5"));
+    let json: serde_json::Value = serde_json::from_str(&info(&["--json"])).unwrap();
+    assert_eq!(json["variables"][1]["dimensions"], "[n, 1]");
+    assert_eq!(json["interfaces"]["CoSimulation"]["modelIdentifier"], "three");
 }

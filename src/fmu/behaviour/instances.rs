@@ -30,6 +30,10 @@ pub(super) fn repeated(p: &mut Probe) -> Tested {
     }
     let known = p.learned.clone();
     for (stimulus, observe_all) in [(true, true), (true, false), (false, true), (false, false)] {
+        if stimulus && known.tame {
+            continue;
+        }
+        let _venture = stimulus.then(super::super::host::venture);
         p.learn(Learned { stimulus, observe_all, ..known.clone() });
         let begin = Instant::now();
         if let Ok(taken) = trial(p) {

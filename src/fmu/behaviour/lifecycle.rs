@@ -233,6 +233,7 @@ pub(super) fn reset(p: &Probe) -> Tested {
 
 /// Runs an instance with other parameters and start values than its own.
 pub(super) fn detour(p: &Probe, instance: &mut Instance) -> Result<(), HostError> {
+    let _venture = super::super::host::venture();
     for v in &p.d.variables {
         if !matches!(v.causality, Causality::Parameter | Causality::Local | Causality::Output) {
             continue;

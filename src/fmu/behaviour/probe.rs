@@ -28,6 +28,8 @@ pub struct Learned {
     pub steps: usize,
     /// Wall time of a step, in s.
     pub cost: f64,
+    /// Whether inputs that vary end the FMU's process: they are left alone then.
+    pub tame: bool,
     /// A communication step that the FMU takes, where it declares none and refused the usual one, in s; 0 where not.
     pub step: f64,
 }

@@ -27,6 +27,7 @@ fn disturb(p: &Probe, instance: &mut Instance) {
 
 /// Whether the FMU takes such changes at all.
 fn takes_disturbance(p: &Probe) -> bool {
+    let _venture = super::super::host::venture();
     let attempt = || -> Result<(), HostError> {
         let mut instance = p.ready()?;
         p.run(&mut instance, 0, 2)?;

@@ -97,6 +97,7 @@ type Kept<'a> = (&'a str, &'static str, f64, f64);
 fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
     let mut instance = p.instantiate()?;
     let mut written = Vec::new();
+    let venture = super::super::host::venture();
     for v in p.d.variables.iter().filter(|v| v.causality == Causality::Parameter) {
         if let Some(value) = settable_real(p, v)
             && instance.set_real(&[v.value_reference], &[value]).is_ok()
@@ -111,6 +112,7 @@ fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
         instance.initialize(p.start, None)?;
         written.clear();
     }
+    drop(venture);
     let mut found = Vec::new();
     for (v, value) in written {
         found.push((v.name.as_str(), "parameter", value, instance.get_real(&[v.value_reference])?[0]));
@@ -204,6 +206,7 @@ pub(super) fn tunable_effect(p: &Probe) -> Tested {
         if Some(&value) == v.start.as_ref() {
             continue;
         }
+        let _venture = super::super::host::venture();
         let early = || -> Result<_, HostError> {
             let mut instance = p.instantiate()?;
             set(&mut instance, v, &value)?;

@@ -164,6 +164,29 @@ pub(crate) fn note(call: Call) {
     }
 }
 
+/// Notes that from now on the FMU has values that it did not choose itself, until the guard goes.
+pub(crate) fn venture() -> Venture {
+    mark_venture(1);
+    Venture
+}
+
+/// See [`venture`].
+pub(crate) struct Venture;
+
+impl Drop for Venture {
+    fn drop(&mut self) {
+        mark_venture(0);
+    }
+}
+
+fn mark_venture(on: u32) {
+    let slot = CALL_SLOT.load(Ordering::Relaxed);
+    if !slot.is_null() {
+        // SAFETY: the slot is set once to memory that lives as long as the process.
+        unsafe { &*slot }.venture.store(on, Ordering::Relaxed);
+    }
+}
+
 /// A loaded binary.
 pub struct Binary {
     pub(crate) functions: Functions,

@@ -61,6 +61,8 @@ pub(crate) struct Outcome {
     pub call: &'static str,
     /// The FMI function called last.
     pub last: &'static str,
+    /// Whether the FMU ended while it had values that the validator chose.
+    pub ventured: bool,
     /// Longest time that one call took, roughly.
     pub longest: Duration,
     /// What the sandbox refused first.

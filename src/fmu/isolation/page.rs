@@ -24,6 +24,8 @@ pub(crate) struct Page {
     pub count: AtomicU64,
     /// The first system call that the sandbox refused, plus one.
     pub refused: AtomicU32,
+    /// Whether values are in use that the validator chose: an FMU may not bear them.
+    pub venture: AtomicU32,
     /// How much of the sandbox stands: see [`super::sandbox::Strength`].
     pub strength: AtomicU32,
     /// Length of the answer.

@@ -91,11 +91,12 @@ fn outcome(streams: Streams, ended: Ended, longest: Duration, page: &Page, nonce
         answer = Some(left);
     }
     let (call, last) = page.call();
+    let ventured = page.venture.load(std::sync::atomic::Ordering::Relaxed) != 0;
     let refused = page.refused.load(std::sync::atomic::Ordering::Relaxed).checked_sub(1).map(wanted);
     let strength = Strength::from_number(page.strength.load(std::sync::atomic::Ordering::Relaxed));
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (stdout, stderr) = (text(&streams.printed[0].kept), text(&streams.printed[1].kept));
-    Outcome { ended, answer, call, last, longest, refused, strength, stdout, stderr }
+    Outcome { ended, answer, call, last, ventured, longest, refused, strength, stdout, stderr }
 }
 
 /// What a child printed: the beginning is kept, the rest read and dropped.

@@ -81,7 +81,7 @@ rules! {
         "Items of an enumeration are unique in name and value", "Give each item its own name and value.";
     "variable-name-unique" Error Conformance "2.2.7" Check::Static;
         "Variable names are unique", "Rename one of the variables.";
-    "variable-name" Error Conformance "2.2.9" Check::Static;
+    "variable-name" Warning Conformance "2.2.9" Check::Static;
         "Variable names follow the naming convention", "Quote unusual names as 'name', or declare variableNamingConvention=\"flat\".";
     "variability-type" Error Conformance "2.2.7" Check::Static;
         "Only a Real is continuous", "Declare variability=\"discrete\" (or fixed, tunable, constant); continuous is the default.";

@@ -120,6 +120,9 @@ pub fn validate(
                 findings.extend(found);
             }
             remarks.extend(bench.gap().map(str::to_owned));
+            if options.sandbox && bench::NEEDY.iter().any(|id| verdicts.get(id) == Some(&Verdict::Failed)) {
+                remarks.push("It failed in the sandbox; --no-sandbox, for an FMU that you trust, tells whether it does outside too.".into());
+            }
         }
         Err(why) => {
             if why.starts_with("this is a model exchange FMU") {
