@@ -59,7 +59,9 @@ pub fn simulate(path: &Path, inputs: &Inputs, options: &Options, keep: &Host) ->
     let child = |reason: std::io::Error| SimulateError::Child(format!("cannot start a process for the FMU: {reason}"));
     let scratch = temporary::folder().map_err(child)?;
     let fence = keep.sandbox.then(|| Fence { read: sandbox::configured(), write: vec![folder.path().to_owned()] });
-    let bounds = Bounds { call: keep.call, total: None, memory: keep.memory, disk: 1 << 30 };
+    // What an FMU writes for its user is its own matter, unless it is fenced.
+    let disk = if keep.sandbox { 1 << 30 } else { u64::MAX };
+    let bounds = Bounds { call: keep.call, total: None, memory: keep.memory, disk };
     let place = Place { program: &keep.program, scratch: scratch.path().to_owned(), fence, bounds, exact_heap: false };
     let task = RunTask { folder: folder.path().to_owned(), options: options.clone(), inputs: inputs.clone() };
     let outcome = isolation::run(&place, Job::Simulate(task)).map_err(child)?;

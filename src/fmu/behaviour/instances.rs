@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::super::host::{HostError, Status};
-use super::lifecycle::detour;
+use super::lifecycle::diverted;
 use super::probe::{Learned, Probe, STEPS, Tested, not_applicable, not_tested};
 
 /// Longest trial of what an FMU can be asked for.
@@ -78,11 +78,10 @@ pub(super) fn sequential(p: &Probe) -> Tested {
         Ok(record)
     };
     let expected = record(p)?;
-    let mut other = p.instantiate()?;
-    if detour(p, &mut other).is_err() {
-        return not_tested("the FMU does not run with other parameters and start values");
+    match diverted(p)? {
+        Some(other) => other.free(),
+        None => return not_tested("the FMU does not run with other parameters and start values"),
     }
-    other.free();
     let found = record(p)?;
     let what = p.difference_beyond_tolerance(&expected, &found, 0);
     Ok(what

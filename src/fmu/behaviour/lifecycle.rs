@@ -206,12 +206,14 @@ pub(super) fn reset(p: &Probe) -> Tested {
     expected.extend(p.run(&mut fresh, 0, n)?);
     fresh.free();
     // With other values if the FMU takes them, so that these must be restored too.
-    let mut instance = p.instantiate()?;
-    if detour(p, &mut instance).is_err() {
-        instance.free();
-        instance = p.ready()?;
-        p.run(&mut instance, 0, n / 2)?;
-    }
+    let mut instance = match diverted(p)? {
+        Some(instance) => instance,
+        None => {
+            let mut instance = p.ready()?;
+            p.run(&mut instance, 0, n / 2)?;
+            instance
+        }
+    };
     slopes(p, &mut instance);
     instance.reset()?;
     p.enter(&mut instance)?;
@@ -231,11 +233,25 @@ pub(super) fn reset(p: &Probe) -> Tested {
     Ok(what.map(|what| format!("a run after fmi2Reset is not that of a new instance: {what}")).into_iter().collect())
 }
 
-/// Runs an instance with other parameters and start values than its own.
-pub(super) fn detour(p: &Probe, instance: &mut Instance) -> Result<(), HostError> {
+/// An instance that has run with other parameters and start values than its own: all that can be set, else those that are
+/// not zero (which often switches something off that does not go with the rest); none where the FMU takes neither.
+pub(super) fn diverted(p: &Probe) -> Result<Option<Instance>, HostError> {
     let _venture = super::super::host::venture();
+    for zeros in [true, false] {
+        let mut instance = p.instantiate()?;
+        if detour(p, &mut instance, zeros).is_ok() {
+            return Ok(Some(instance));
+        }
+    }
+    Ok(None)
+}
+
+fn detour(p: &Probe, instance: &mut Instance, zeros: bool) -> Result<(), HostError> {
     for v in &p.d.variables {
         if !matches!(v.causality, Causality::Parameter | Causality::Local | Causality::Output) {
+            continue;
+        }
+        if !zeros && v.start == Some(Value::Real(0.0)) {
             continue;
         }
         if let Some(value) = settable_real(p, v).filter(|_| super::probe::settable(v)) {
