@@ -95,7 +95,7 @@ impl Default for Bounds {
 
 /// Where and how a child runs.
 pub(crate) struct Place<'a> {
-    /// This program, which answers to [`child`].
+    /// This program, which answers to [`child()`].
     pub program: &'a Path,
     /// A folder for this child alone, which the FMU cannot write to.
     pub scratch: PathBuf,
