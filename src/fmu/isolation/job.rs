@@ -108,7 +108,9 @@ impl Head {
 
 /// A column as bytes.
 fn bytes(column: &[f64]) -> Vec<u8> {
-    column.iter().flat_map(|x| x.to_ne_bytes()).collect()
+    let mut out = vec![0; 8 * column.len()];
+    out.as_chunks_mut().0.iter_mut().zip(column).for_each(|(eight, x)| *eight = x.to_ne_bytes());
+    out
 }
 
 impl Order {
@@ -186,6 +188,17 @@ pub(super) enum Received {
     Whole,
     /// No answer to this order.
     Forged,
+}
+
+/// How many bytes are still to come of a whole answer; 0 where that is not known yet.
+pub(super) fn rest(bytes: &[u8], nonce: &Nonce) -> u64 {
+    let length = |at: usize| bytes.get(at..at + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_ne_bytes);
+    match judge(bytes, nonce) {
+        Received::Part if bytes.len() >= 32 => {
+            length(16).saturating_add(length(24)).saturating_add(32).saturating_sub(bytes.len() as u64)
+        }
+        _ => 0,
+    }
 }
 
 /// Judges what has come.

@@ -10,7 +10,7 @@ use std::process::Command;
 use std::process::{Child, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use super::job::{Job, Nonce, Order, Received, judge};
+use super::job::{Job, Nonce, Order, Received, judge, rest};
 use super::page::{Mapped, Page};
 use super::sandbox::{Strength, wanted};
 use super::{Ended, Outcome, Place, temporary};
@@ -19,6 +19,8 @@ use super::{Ended, Outcome, Place, temporary};
 const MOST_OUTPUT: usize = 4096;
 /// Most that is read of an answer, in bytes: the largest record.
 const MOST_ANSWER: usize = 1 << 40;
+/// Most room that is made ahead for an answer, in bytes.
+const MOST_ROOM: u64 = 1 << 30;
 /// How often time is looked at, ms, and the disk.
 const TICK: i32 = 20;
 const DISK_EVERY: Duration = Duration::from_millis(60);
@@ -219,6 +221,8 @@ impl Streams {
             if judge(&self.answer, nonce) == Received::Forged {
                 return (Some(Ended::Forges), longest);
             }
+            // Room for all of it at once, within reason: growing by and by copies it again and again.
+            self.answer.reserve(rest(&self.answer, nonce).min(MOST_ROOM) as usize);
             if !matches!(child.try_wait(), Ok(None)) {
                 return (None, longest);
             }
