@@ -165,9 +165,11 @@ fn tube(time: &[f64], reference: &[f64], run_time: &[f64], run: &[f64], width: f
         for &v in &reference[inside] {
             band = (band.0.min(v), band.1.max(v));
         }
-        let distance = ((band.0 - value).max(value - band.1).max(0.0)) / range;
-        if distance > worst.0 || !distance.is_finite() {
-            worst = (if distance.is_finite() { distance } else { f64::INFINITY }, t);
+        // What is no number is nowhere near.
+        let outside = (band.0 - value).max(value - band.1).max(0.0);
+        let distance = if value.is_finite() { outside / range } else { f64::INFINITY };
+        if distance > worst.0 {
+            worst = (distance, t);
         }
     }
     worst
@@ -184,9 +186,12 @@ mod tests {
         assert_eq!(tube(&time, &jump(0.5), &time, &jump(0.509), 0.01).0, 0.0);
         assert!(tube(&time, &jump(0.5), &time, &jump(0.55), 0.01).0 > 0.9);
         let sine = |shift: f64| time.iter().map(|t| (6.0 * t).sin() + shift).collect::<Vec<f64>>();
-        // The distance is the offset less what the sine moves within the width: at most 6*0.01.
-        let (worst, _) = tube(&time, &sine(0.0), &time, &sine(0.2), 0.01);
-        assert!(((0.2 - 0.06) / 2.0..=0.1).contains(&worst), "{worst}");
+        // The distance is the offset less what the sine moves within the width, at most 6*0.01, over the samples' range.
+        let reference = sine(0.0);
+        let range = reference.iter().fold(0.0_f64, |m, v| m.max(*v)) - reference.iter().fold(0.0_f64, |m, v| m.min(*v));
+        let (worst, _) = tube(&time, &reference, &time, &sine(0.2), 0.01);
+        let rounding = 1e-12;
+        assert!(((0.2 - 0.06) / range..=0.2 / range + rounding).contains(&worst), "{worst}");
         let (worst, at) = tube(&time, &sine(0.0), &time, &vec![f64::NAN; 101], 0.01);
         assert!(worst.is_infinite() && at <= 1.0);
     }
