@@ -2,7 +2,7 @@
 //! and the diagnosis of the gap between the model and the machine.
 //!
 //! Imports run downward only: `cli -> fleet -> report -> diagnose -> identify -> trace -> axis -> effects`,
-//! `cli -> fmu -> variables -> axis` and `fmi2 -> variables`.
+//! `cli -> examine -> trace`, `cli -> fmu -> variables -> axis` and `fmi2 -> variables`.
 
 pub mod axis;
 pub mod drive;
@@ -17,6 +17,8 @@ pub mod circle;
 pub mod cli;
 #[cfg(feature = "cli")]
 pub mod diagnose;
+#[cfg(feature = "cli")]
+pub mod examine;
 #[cfg(feature = "cli")]
 pub mod fleet;
 #[cfg(feature = "cli")]

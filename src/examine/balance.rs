@@ -1,0 +1,535 @@
+//! Torque against motion, at the lines where the motion follows it:
+//!
+//! ```text
+//! T(t) = M1*a1 + M2*a2 + c*v1 + F*sign(v1) + k*x1      M1, M2, c, F >= 0; the motion may be late by tau
+//! ```
+//!
+//! M2 belongs to the table's encoder where there is one; else to a resonance `a1/(1 - (w/wa)^2)` whose frequency is tried.
+//! With the table's encoder alone the motor shows as `M2*a2''`. Least squares over the lines' averaged cross spectra, the
+//! coefficients kept from below zero (C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, ch. 23; here by
+//! coordinates, the problem has six).
+
+use rustfft::num_complex::Complex;
+
+use super::finding::{Finding, Severity};
+use super::pairs::factor;
+use super::robust::{quantile, span};
+use super::spectra::Spectra;
+use super::{Input, Nominal, Structure};
+
+/// Coherence from which a line tells something of the motion, where the averages do not ask for more.
+const COHERENT: f64 = 0.4;
+/// Share of the torque's power that the balance must explain for the record to be about this torque.
+const EXPLAINED: f64 = 0.2;
+/// From this share on the balance speaks of signs and delays.
+const CLEAR: f64 = 0.5;
+/// Delays that are tried, samples.
+const DELAYS: i32 = 64;
+/// Delay that is worth a word, samples.
+const LATE: i32 = 2;
+/// Motion before its torque by more than this, or behind it by more than [`BEHIND`], is a misaligned log, samples.
+const AHEAD: i32 = 3;
+/// Largest delay that a drive has, samples.
+const BEHIND: i32 = 48;
+
+/// Columns of the spectra.
+const T: usize = 0;
+const MAIN: usize = 1;
+const SIGN: usize = 2;
+const TABLE: usize = 3;
+
+/// Looks at torque and motion; gives the band in which the motion follows, Hz.
+pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
+    let torque = input.torque?;
+    let n = torque.len();
+    let rate = |x: Option<&[f64]>, v: Option<&[f64]>| -> Option<Vec<f64>> {
+        match (x, v) {
+            (Some(x), _) => Some((0..n - 1).map(|k| (x[k + 1] - x[k]) / input.dt).collect()),
+            (None, Some(v)) => Some((0..n - 1).map(|k| 0.5 * (v[k] + v[k + 1])).collect()),
+            (None, None) => None,
+        }
+    };
+    let one = rate(input.theta1, input.omega1);
+    let two = rate(input.theta2, input.omega2);
+    times(input, findings);
+    let collocated = one.is_some();
+    let (main, table) = match (&one, &two) {
+        (Some(a), b) => (a, b.as_ref()),
+        (None, Some(b)) => (b, None),
+        (None, None) => return None,
+    };
+    directions(main, findings);
+    let quiet = 0.02 * quantile(main.iter().copied(), 0.9);
+    let sign: Vec<f64> = main.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
+    let mut columns: Vec<&[f64]> = vec![&torque[..n - 1], main, &sign];
+    columns.extend(table.map(Vec::as_slice));
+    let lengths = [power_of_two((n - 1) / 8).clamp(32, 8192), power_of_two((n - 1) / 3).clamp(32, 65_536)];
+    let mut lines = None;
+    for length in lengths {
+        let spectra = Spectra::new(&columns, length, input.dt);
+        let found = coherent(&spectra);
+        if !found.is_empty() {
+            lines = Some((spectra, found));
+            break;
+        }
+    }
+    let Some((spectra, lines)) = lines else {
+        findings.push(Finding::new(
+            "not_followed",
+            Severity::Refuse,
+            "T",
+            "The motion does not follow the torque at any frequency.",
+            "The torque comes from another axis, another time or another quantity; or something else moves the axis.",
+            "Map the column of this axis' own torque or current in [signals], logged at the same times.",
+        ));
+        return None;
+    };
+    // A line that stands alone passed by chance.
+    let together: Vec<usize> = lines.windows(3).filter(|w| w[2] - w[0] == 2).map(|w| w[1]).collect();
+    let [first, last] = match (together.first(), together.last()) {
+        (Some(first), Some(last)) => [*first, *last],
+        _ => [lines[0], lines[lines.len() - 1]],
+    };
+    let band = [first, last].map(|f| spectra.omega(f) / std::f64::consts::TAU);
+    if table.is_some() {
+        encoders(input, &spectra, &lines, findings);
+    }
+    weigh(input, &spectra, &lines, collocated, findings);
+    excitation(input.nominal, band, findings);
+    Some(band)
+}
+
+fn power_of_two(n: usize) -> usize {
+    if n.is_power_of_two() { n } else { n.next_power_of_two() / 2 }
+}
+
+/// Lines at which the motion follows the torque; none where chance could make as many.
+fn coherent(spectra: &Spectra) -> Vec<usize> {
+    let least = spectra.by_chance().max(COHERENT);
+    let of = |f: usize| {
+        let table = if spectra.has(TABLE) { spectra.coherence(T, TABLE, f) } else { 0.0 };
+        spectra.coherence(T, MAIN, f).max(table)
+    };
+    let lines: Vec<usize> = (0..spectra.lines).filter(|f| of(*f) > least).collect();
+    // By chance one line of three hundred (two channels: of a hundred and fifty) passes; neighbours under one window pass
+    // together.
+    let chance = 3.0 + 0.02 * spectra.lines as f64;
+    // A band counts where it holds together: the best octave.
+    let mut best = 0.0_f64;
+    let mut low = 1;
+    while low <= spectra.lines {
+        let high = (2 * low).min(spectra.lines + 1);
+        if high - low >= 4 {
+            let inside = lines.iter().filter(|f| (low..high).contains(&(*f + 1))).count();
+            best = best.max(inside as f64 / (high - low) as f64);
+        }
+        low *= 2;
+    }
+    if (lines.len() as f64) > chance || best >= 0.5 { lines } else { Vec::new() }
+}
+
+/// Times that cannot belong to the nominal axis.
+fn times(input: &Input<'_>, findings: &mut Vec<Finding>) {
+    let Some(Nominal { structure: Structure::TwoInertia, parameters: p }) = input.nominal else { return };
+    let natural = (p.k * (1.0 / p.i1 + 1.0 / p.i2)).sqrt();
+    let duration = input.dt * input.len() as f64;
+    let say = |seen: String| {
+        Finding::new(
+            "units",
+            Severity::Refuse,
+            "time",
+            seen,
+            "The unit of the time column, or the nominal stiffness or inertia, is another than the files say.",
+            "Give the unit in the header, as in time [ms], or mend [parameters] of the axis file.",
+        )
+    };
+    if natural * input.dt > std::f64::consts::PI {
+        let hertz = natural / std::f64::consts::TAU;
+        findings.push(say(format!(
+            "The nominal axis swings at {hertz:.4} Hz, the record is sampled every {:.4} s: it could not show it.",
+            input.dt
+        )));
+    } else if natural * duration < 1.0 {
+        findings.push(say(format!(
+            "The whole record lasts {duration:.3e} s, a small part of one swing of the nominal axis."
+        )));
+    }
+}
+
+/// One direction only.
+fn directions(speed: &[f64], findings: &mut Vec<Finding>) {
+    let size = quantile(speed.iter().copied(), 0.9);
+    let smooth: Vec<f64> =
+        speed.chunks((speed.len() / 2000).max(1)).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
+    let forward = smooth.iter().filter(|v| **v > 0.1 * size).count() as f64;
+    let back = smooth.iter().filter(|v| **v < -0.1 * size).count() as f64;
+    if forward.min(back) < 0.01 * forward.max(back) && span(speed) > 0.0 {
+        findings.push(Finding::new(
+            "one_direction",
+            Severity::Warn,
+            "theta1",
+            "The axis moves in one direction only.",
+            "Coulomb friction and a constant load cannot be told from each other on this record.",
+            "Record a motion to and fro.",
+        ));
+    }
+}
+
+/// The two encoders against each other: sign, scale, and which one is the motor's.
+fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
+    let together: Vec<usize> =
+        (0..s.lines).filter(|f| s.coherence(MAIN, TABLE, *f) > s.by_chance().max(COHERENT)).collect();
+    if together.len() < 4 {
+        findings.push(Finding::new(
+            "foreign",
+            Severity::Refuse,
+            "theta2",
+            "theta2 does not follow theta1 at any frequency.",
+            "It comes from another axis or another time, or one of the encoders is broken.",
+            "Map the right columns in [signals], or leave theta2 out.",
+        ));
+        return;
+    }
+    // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
+    let total: f64 = together.iter().map(|f| s.power(MAIN, *f)).sum();
+    let mut sum = 0.0;
+    let low: Vec<usize> = together
+        .iter()
+        .copied()
+        .take_while(|f| {
+            let take = sum < 0.1 * total;
+            sum += s.power(MAIN, *f);
+            take
+        })
+        .collect();
+    let cross: Complex<f64> = low.iter().map(|f| s.of(MAIN, TABLE, *f)).sum();
+    let power: f64 = low.iter().map(|f| s.power(MAIN, *f)).sum();
+    let gain = cross / power;
+    let expected = input.nominal.filter(|n| n.structure == Structure::TwoInertia).map_or(1.0, |n| {
+        let p = n.parameters;
+        let w = s.omega(low[low.len() / 2]);
+        let spring = Complex::new(p.k, w * p.b);
+        (spring / (spring - p.i2 * w * w)).re
+    });
+    let ratio = gain.re / expected;
+    // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
+    if gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0 {
+        findings.push(Finding::new(
+            "sign",
+            Severity::Refuse,
+            "theta2",
+            "theta2 runs against theta1.",
+            "One of the two encoders counts the other way round.",
+            "Give its column scale = -1 in [signals] of the axis file.",
+        ));
+        return;
+    }
+    let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
+    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
+    let words = lead
+        .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
+        .or_else(|| factor(ratio).map(str::to_owned));
+    if let Some(words) = words.filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25) {
+        findings.push(Finding::new(
+            "units",
+            Severity::Refuse,
+            "theta2",
+            format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {words}."),
+            "One of the two columns is in another unit than the file says.",
+            "Give the unit in the header or in [signals] (unit = \"deg\"), or scale by the gear ratio.",
+        ));
+        return;
+    }
+    if !(0.6..1.67).contains(&ratio.abs()) {
+        findings.push(Finding::new(
+            "scale",
+            Severity::Warn,
+            "theta2",
+            format!("theta2 moves {ratio:.4} times as far as theta1 at the lowest frequencies."),
+            "A gear lies between the encoders, or the record holds no motion slow enough to tell.",
+            "Give theta2 the gear's ratio as scale in [signals], so that both count the same angle.",
+        ));
+    }
+    // The table is moved by the twist alone: I2*a2 = B*d' + K*d. Which of the two is?
+    let misfit = |of: usize, sense: f64| -> f64 {
+        let (mut aa, mut ad, mut dd, mut av, mut dv, mut vv) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        for &f in lines.iter().filter(|f| s.coherence(MAIN, TABLE, **f) > COHERENT) {
+            let w = s.omega(f);
+            let j = Complex::new(0.0, w);
+            // Spectra of a (of the channel), d = (v1 - v2)/(jw), d' = v1 - v2.
+            let twist_twist = s.power(MAIN, f) + s.power(TABLE, f) - 2.0 * s.of(MAIN, TABLE, f).re;
+            let own_twist = (s.of(of, MAIN, f) - s.of(of, TABLE, f)) * sense;
+            aa += w * w * s.power(of, f);
+            // conj(a)*d = conj(jw*v)*(v1 - v2)/(jw)
+            ad += (j.conj() * own_twist / j).re;
+            av += (j.conj() * own_twist).re;
+            dd += twist_twist / (w * w);
+            vv += twist_twist;
+            dv += (twist_twist / j.conj()).re;
+        }
+        if aa <= 0.0 || dd <= 0.0 {
+            return 1.0;
+        }
+        let gram = [vec![dd, dv], vec![dv, vv]];
+        1.0 - non_negative(&gram, &[ad, av]).1 / aa
+    };
+    let (as_given, exchanged) = (misfit(TABLE, 1.0), misfit(MAIN, -1.0));
+    if exchanged < 0.3 && as_given > 3.0 * exchanged {
+        findings.push(Finding::new(
+            "swapped",
+            Severity::Refuse,
+            "theta1, theta2",
+            "theta1 moves as a table does and theta2 as a motor: the twist drives theta1.",
+            "The two encoders' columns are exchanged.",
+            "Exchange them in [signals] of the axis file.",
+        ));
+    }
+}
+
+/// Least squares with coefficients of at least zero: `gram*x = right`; gives x and the energy explained, `2*x.right - x.gram.x`.
+fn non_negative(gram: &[Vec<f64>], right: &[f64]) -> (Vec<f64>, f64) {
+    let p = right.len();
+    let mut x = vec![0.0; p];
+    for _ in 0..400 {
+        let mut moved = 0.0_f64;
+        for i in 0..p {
+            if gram[i][i] <= 0.0 {
+                continue;
+            }
+            let rest: f64 = (0..p).filter(|j| *j != i).map(|j| gram[i][j] * x[j]).sum();
+            let new = ((right[i] - rest) / gram[i][i]).max(0.0);
+            moved = moved.max((new - x[i]).abs() * gram[i][i].sqrt());
+            x[i] = new;
+        }
+        let size = right
+            .iter()
+            .zip(gram)
+            .map(|(r, g)| r.abs() / g.iter().fold(0.0_f64, |m, v| m.max(*v)).sqrt())
+            .fold(0.0, f64::max);
+        if moved <= 1e-9 * size {
+            break;
+        }
+    }
+    let explained = (0..p).map(|i| x[i] * (2.0 * right[i] - (0..p).map(|j| gram[i][j] * x[j]).sum::<f64>())).sum();
+    (x, explained)
+}
+
+/// The balance of one record: regressors, lines and what they hold.
+struct Balance<'a> {
+    s: &'a Spectra,
+    lines: &'a [usize],
+    collocated: bool,
+    /// Frequency of the table's resonance against the motor, rad/s, where there is no encoder on the table.
+    table: Option<f64>,
+    total: f64,
+}
+
+/// What a balance found.
+struct Found {
+    /// M1, M2, c, F, k, -k.
+    x: Vec<f64>,
+    /// Share of the torque's power that is explained.
+    share: f64,
+    /// Share that the inertias alone explain of it.
+    inertial: f64,
+}
+
+impl Balance<'_> {
+    /// The regressors at a line: column and factor.
+    fn regressors(&self, f: usize) -> [(usize, Complex<f64>); 6] {
+        let w = self.s.omega(f);
+        let j = Complex::new(0.0, w);
+        let one = Complex::new(1.0, 0.0);
+        let second = if self.s.has(TABLE) {
+            (TABLE, j)
+        } else if self.collocated {
+            let wa = self.table.unwrap_or(f64::INFINITY);
+            let r = w / wa;
+            // A hundredth of the critical damping keeps the line at the resonance finite.
+            (MAIN, if wa.is_finite() { j / Complex::new(1.0 - r * r, 0.04 * r) } else { Complex::new(0.0, 0.0) })
+        } else {
+            (MAIN, j * j * j)
+        };
+        [(MAIN, j), second, (MAIN, one), (SIGN, one), (MAIN, one / j), (MAIN, -one / j)]
+    }
+
+    fn gram(&self) -> Vec<Vec<f64>> {
+        let mut gram = vec![vec![0.0; 6]; 6];
+        for &f in self.lines {
+            let of = self.regressors(f);
+            for i in 0..6 {
+                for k in 0..6 {
+                    gram[i][k] += (of[i].1.conj() * of[k].1 * self.s.of(of[i].0, of[k].0, f)).re;
+                }
+            }
+        }
+        gram
+    }
+
+    /// Right side for a motion that is late by `late` seconds, with the torque's sign as given.
+    fn right(&self, late: f64) -> Vec<f64> {
+        let mut right = vec![0.0; 6];
+        for &f in self.lines {
+            let turn = Complex::from_polar(1.0, -self.s.omega(f) * late);
+            for (r, (column, factor)) in right.iter_mut().zip(self.regressors(f)) {
+                *r += (factor.conj() * self.s.of(column, T, f) * turn).re;
+            }
+        }
+        right
+    }
+
+    fn solve(&self, gram: &[Vec<f64>], right: &[f64]) -> Found {
+        // Columns of unit size, so that one bound serves all.
+        let size: Vec<f64> = (0..6).map(|i| gram[i][i].sqrt().max(f64::MIN_POSITIVE)).collect();
+        let scaled: Vec<Vec<f64>> = (0..6).map(|i| (0..6).map(|k| gram[i][k] / size[i] / size[k]).collect()).collect();
+        let right: Vec<f64> = (0..6).map(|i| right[i] / size[i]).collect();
+        let (x, explained) = non_negative(&scaled, &right);
+        let inertia: f64 = (0..2).map(|i| (0..2).map(|k| x[i] * scaled[i][k] * x[k]).sum::<f64>()).sum();
+        Found {
+            x: (0..6).map(|i| x[i] / size[i]).collect(),
+            share: explained / self.total,
+            inertial: inertia / self.total,
+        }
+    }
+}
+
+/// Signs, delay and size of the torque.
+fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool, findings: &mut Vec<Finding>) {
+    let total: f64 = lines.iter().map(|f| s.power(T, *f)).sum();
+    let mut balance = Balance { s, lines, collocated, table: None, total };
+    if total <= 0.0 {
+        return;
+    }
+    let rigid = input.nominal.is_some_and(|n| n.structure == Structure::Rigid);
+    let negative = |right: &[f64]| right.iter().map(|r| -r).collect::<Vec<_>>();
+    if collocated && !s.has(TABLE) && !rigid {
+        // The frequency of the table against a held motor that explains most, with either sign.
+        let (low, high) = (s.omega(lines[0]), s.omega(lines[lines.len() - 1]));
+        let mut best = (0.0, None);
+        for i in 0..=24 {
+            let wa = low * (high / low).powf(f64::from(i) / 24.0);
+            balance.table = Some(wa);
+            let (gram, right) = (balance.gram(), balance.right(0.0));
+            let share = balance.solve(&gram, &right).share.max(balance.solve(&gram, &negative(&right)).share);
+            if share > best.0 {
+                best = (share, Some(wa));
+            }
+        }
+        balance.table = best.1;
+    }
+    let gram = balance.gram();
+    let at = |late: i32| balance.right(f64::from(late) * input.dt);
+    let mut shares: Vec<(i32, f64, f64)> = Vec::new();
+    for late in -DELAYS..=DELAYS {
+        let right = at(late);
+        shares.push((late, balance.solve(&gram, &right).share, balance.solve(&gram, &negative(&right)).share));
+    }
+    let best = |of: &dyn Fn(&(i32, f64, f64)) -> f64, within: i32| {
+        shares
+            .iter()
+            .filter(|s| s.0.abs() <= within)
+            .max_by(|a, b| of(a).total_cmp(&of(b)))
+            .map_or((0, 0.0), |s| (s.0, of(s)))
+    };
+    let plus = best(&|s| s.1, DELAYS);
+    let here = best(&|s| s.1, 1);
+    let turned = best(&|s| s.2, 1);
+    let turned_anywhere = best(&|s| s.2, DELAYS);
+    if turned.1 > CLEAR && 1.0 - turned.1 < 0.5 * (1.0 - plus.1) {
+        findings.push(Finding::new(
+            "sign",
+            Severity::Refuse,
+            "T",
+            format!(
+                "The motion follows the torque backwards: turned round, it explains {:.0} % of it, as it is {:.0} %.",
+                100.0 * turned.1,
+                100.0 * here.1.max(0.0)
+            ),
+            "Torque and position count in opposite directions: inertia and friction would come out negative.",
+            "Give the torque, or all motion, scale = -1 in [signals] of the axis file.",
+        ));
+        return;
+    }
+    if plus.1.max(turned_anywhere.1) < EXPLAINED {
+        findings.push(Finding::new(
+            "not_followed",
+            Severity::Refuse,
+            "T",
+            format!(
+                "No axis moves like this under this torque: inertia, friction and a spring explain {:.0} % of it.",
+                100.0 * plus.1.max(0.0)
+            ),
+            "The torque comes from another axis, another time or another quantity; or something else moves the axis.",
+            "Map the column of this axis' own torque or current in [signals], logged at the same times.",
+        ));
+        return;
+    }
+    let wide = s.omega(lines[lines.len() - 1]) > 2.0 * s.omega(lines[0]);
+    if wide && plus.0.abs() >= LATE && plus.1 > CLEAR && 1.0 - plus.1 < 0.6 * (1.0 - here.1) {
+        let late = f64::from(plus.0.abs()) * input.dt;
+        let (ahead, behind) = (plus.0 < -AHEAD, plus.0 > BEHIND);
+        findings.push(Finding::new(
+            "misaligned",
+            if ahead || behind { Severity::Refuse } else { Severity::Warn },
+            "T",
+            if plus.0 < 0 {
+                format!("The motion comes about {} samples ({late:.4e} s) before its torque.", -plus.0)
+            } else {
+                format!("The motion comes about {} samples ({late:.4e} s) behind its torque.", plus.0)
+            },
+            if plus.0 < 0 {
+                "No axis does that: torque and positions were logged at different instants."
+            } else {
+                "A delay of the drive, or torque and positions were logged at different instants."
+            },
+            "Log torque and positions in one task; a known delay of the drive belongs into [effects.delay] of the axis file.",
+        ));
+    }
+    let found = balance.solve(&gram, &at(plus.0));
+    let (Some(nominal), true) = (input.nominal, found.inertial > 0.3) else { return };
+    let mass = found.x[0] + if collocated { found.x[1] } else { 0.0 };
+    let p = nominal.parameters;
+    let ratio = mass / (p.i1 + p.i2);
+    if ratio <= 0.0 || !ratio.is_finite() || (0.2..5.0).contains(&ratio) {
+        return;
+    }
+    let unit = super::Motion::unit(input.motion, "kg.m2");
+    findings.push(match factor(ratio) {
+        Some(words) => Finding::new(
+            "units",
+            Severity::Refuse,
+            "T",
+            format!("The inertia that moves is {mass:.4e} {unit}, {ratio:.4e} times the nominal one, which looks like a factor of {words}."),
+            "Torque, angle or time is in another unit than the file says: every parameter is off by it.",
+            "Give the unit in the header or in [signals] (unit = \"mN.m\", \"deg\", \"ms\"), or mend [parameters].",
+        ),
+        None => Finding::new(
+            "inertia",
+            Severity::Warn,
+            "T",
+            format!("The inertia that moves is {mass:.4e} {unit}, {ratio:.4} times the nominal one."),
+            "The nominal inertia, a gear ratio, the torque constant or a unit is off.",
+            "Check [parameters] and the scale of T in [signals]; `eixo identify` reads the inertia from this record.",
+        ),
+    });
+}
+
+/// Parameters that the band cannot tell.
+fn excitation(nominal: Option<Nominal>, band: [f64; 2], findings: &mut Vec<Finding>) {
+    let Some(Nominal { structure: Structure::TwoInertia, parameters: p }) = nominal else { return };
+    let anti = (p.k / p.i2).sqrt() / std::f64::consts::TAU;
+    if band[1] < 0.3 * anti {
+        findings.push(Finding::new(
+            "no_excitation",
+            Severity::Warn,
+            "T",
+            format!(
+                "The motion follows the torque up to {:.4} Hz; the nominal coupling shows from some {:.4} Hz on.",
+                band[1],
+                0.3 * anti
+            ),
+            "Stiffness and damping of the coupling are not determined by this record, nor how the inertia is shared.",
+            format!("Excite up to {:.4} Hz (`eixo excite`), or describe the axis as rigid.", 1.5 * anti),
+        ));
+    }
+}

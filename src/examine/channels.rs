@@ -1,0 +1,326 @@
+//! Each channel by itself, and what the others do meanwhile: constant, stuck, clipped, jumps, spikes, held samples, counters
+//! that wrapped.
+
+use std::ops::Range;
+
+use super::finding::{Finding, Severity, runs};
+use super::robust::{deviation, quantile, rms, span, step};
+use super::{Channel, Input};
+
+/// Least samples of a stretch that counts as stuck.
+const STUCK: usize = 20;
+/// A braking so many times harder than nearly all others (the 99.9th percentile) is no braking: the sensor stopped, not the axis.
+const ABRUPT: f64 = 3.0;
+/// A step so many times larger than nearly all others (the 98th percentile), with none like it beside it, is a jump.
+const JUMP: f64 = 8.0;
+/// Share of samples that repeat the one before from which a channel counts as held.
+const HELD: f64 = 0.3;
+
+/// Looks at every channel. Gives the stretches that no use can be made of.
+pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
+    let mut bad = Vec::new();
+    let n = input.len();
+    for channel in input.channels() {
+        if span(channel.values) <= 1e-12 * channel.values[0].abs() {
+            findings.push(constant(channel));
+            continue;
+        }
+        let position = channel.name.starts_with("theta");
+        if position {
+            bad.extend(jumps(input, channel, findings));
+        }
+        let stuck = if channel.name == "T" { stuck_torque(input, channel) } else { stuck_motion(input, channel) };
+        if !stuck.is_empty() {
+            let total: usize = stuck.iter().map(Range::len).sum();
+            findings.push(
+                Finding::new(
+                    "stuck",
+                    Severity::Refuse,
+                    channel.name,
+                    format!(
+                        "{} keeps one value for {total} samples ({:.1} % of the record) while the axis moves.",
+                        channel.name,
+                        100.0 * total as f64 / n as f64
+                    ),
+                    "The sensor, its cable or the logger stopped; the axis did not.",
+                    "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
+                )
+                .at(input, stuck.clone()),
+            );
+            bad.extend(stuck);
+        }
+        held(channel, findings);
+        clipped(input, channel, findings);
+    }
+    bad
+}
+
+fn constant(channel: Channel<'_>) -> Finding {
+    let value = channel.values[0];
+    let (means, remedy) = if channel.name == "T" {
+        (
+            "A torque that never changes excites nothing: no parameter can be read from this record.",
+            "Log the drive's torque or current command while it moves the axis, or map another column in [signals].",
+        )
+    } else {
+        (
+            "The sensor is dead, not connected, or the column is another one than it is taken for.",
+            "Leave the column out of [signals] of the axis file, or map the right one.",
+        )
+    };
+    let name = channel.name;
+    Finding::new("constant", Severity::Refuse, name, format!("{name} is {value:e} in every sample."), means, remedy)
+}
+
+/// Runs of one and the same value, at least `least` samples.
+fn flat(values: &[f64], least: usize) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    let mut start = 0;
+    for k in 1..=values.len() {
+        if k == values.len() || values[k] != values[start] {
+            if k - start >= least {
+                out.push(start..k);
+            }
+            start = k;
+        }
+    }
+    out
+}
+
+/// Stretches where a motion channel keeps its value though the axis does not stand.
+fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
+    let x = channel.values;
+    let n = x.len();
+    let runs = flat(x, STUCK);
+    if runs.is_empty() {
+        return runs;
+    }
+    let position = channel.name.starts_with("theta");
+    let d = |k: usize| if k + 1 < n { x[k + 1] - x[k] } else { 0.0 };
+    let inside = |k: usize| runs.iter().any(|r| r.start <= k + 2 && k < r.end + 1);
+    let moving: Vec<usize> = (0..n.saturating_sub(2)).step_by((n / 200_000).max(1)).filter(|k| !inside(*k)).collect();
+    if moving.len() < 16 {
+        return Vec::new();
+    }
+    let braking = quantile(moving.iter().map(|k| d(k + 1) - d(*k)), 0.999).max(step(x));
+    let usual = quantile(moving.iter().map(|k| d(*k)), 0.5);
+    // The other channels that tell of the same motion.
+    let others: Vec<(&[f64], f64)> = input
+        .channels()
+        .filter(|c| c.name != channel.name && c.name != "T" && span(c.values) > 0.0)
+        .map(|c| (c.values, deviation(c.values)))
+        .collect();
+    let same_side = |name: &str| name.ends_with('1') == channel.name.ends_with('1');
+    let twin = input.channels().find(|c| c.name != channel.name && c.name != "T" && same_side(c.name));
+    runs.into_iter()
+        .filter(|r| {
+            let by_twin = twin.is_some_and(|c| moves(c, r, input.dt, position, step(x)));
+            let by_other = others.iter().any(|(v, size)| {
+                let part = &v[r.clone()];
+                r.len() >= 2 * STUCK && deviation(part) > 0.5 * size && flat(part, part.len() / 4).is_empty()
+            });
+            // A position that runs at full speed until one sample and stands from the next on.
+            let before = if r.start >= 2 {
+                d(r.start - 2).abs().min(d(r.start - 1).abs().max(d(r.start - 2).abs()))
+            } else {
+                0.0
+            };
+            let after = if r.end < n { d(r.end - 1).abs() } else { 0.0 };
+            let abrupt = position && before.max(after) > ABRUPT * braking && before.max(after) > usual;
+            by_twin || by_other || abrupt
+        })
+        .collect()
+}
+
+/// Whether the other channel of the same side moves during a stretch by much more than the stuck one's step.
+fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position: bool, step: f64) -> bool {
+    let part = &other.values[stretch.clone()];
+    if stuck_is_position {
+        // The speed says how far the position went.
+        let way = part.iter().scan(0.0, |sum, v| {
+            *sum += v * dt;
+            Some(*sum)
+        });
+        let way: Vec<f64> = way.collect();
+        rms(part) > 0.3 * rms(other.values) && span(&way) > 20.0 * step
+    } else {
+        // A speed that stands while the position accelerates.
+        let speed =
+            |p: &[f64]| -> Vec<f64> { p.chunks_exact((p.len() / 8).max(1)).map(|c| c[c.len() - 1] - c[0]).collect() };
+        let here = deviation(&speed(part));
+        let usual: Vec<f64> =
+            other.values.chunks_exact(part.len().max(8)).take(64).map(|c| deviation(&speed(c))).collect();
+        here > 0.5 * quantile(usual.into_iter(), 0.5) && here > 0.0
+    }
+}
+
+/// Stretches where the torque keeps a value inside its range though the motion goes on as elsewhere.
+fn stuck_torque(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
+    let x = channel.values;
+    let n = x.len();
+    let repeats = x.windows(2).filter(|w| w[0] == w[1]).count() as f64 / n as f64;
+    let runs = flat(x, (n / 50).max(2 * STUCK));
+    let long: usize = runs.iter().map(Range::len).sum();
+    // A torque of steps is flat by nature.
+    if runs.is_empty() || repeats - long as f64 / n as f64 > 0.2 {
+        return Vec::new();
+    }
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let Some(motion) = input.channels().find(|c| c.name != "T" && span(c.values) > 0.0) else { return Vec::new() };
+    let speed: Vec<f64> = if motion.name.starts_with("theta") {
+        motion.values.windows(2).map(|w| w[1] - w[0]).collect()
+    } else {
+        motion.values.to_vec()
+    };
+    let usual = deviation(&speed);
+    runs.into_iter()
+        .filter(|r| x[r.start] > low && x[r.start] < high)
+        .filter(|r| {
+            let late = r.start + r.len() / 2..r.end.min(speed.len());
+            late.len() >= STUCK && deviation(&speed[late]) > 0.5 * usual
+        })
+        .collect()
+}
+
+/// Positions that jump and stay, go out and come back, or wrap; gives the samples at which they jump.
+fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
+    let x = channel.values;
+    let n = x.len();
+    let d = |k: usize| x[k + 1] - x[k];
+    let usual = quantile((0..n - 1).map(d), 0.98).max(3.0 * step(x));
+    let mut lone: Vec<(usize, f64)> = Vec::new();
+    let mut spikes = Vec::new();
+    for k in 2..n.saturating_sub(4) {
+        let size = d(k);
+        if size.abs() <= JUMP * usual {
+            continue;
+        }
+        // Beside it nothing of the kind: neither a fast motion nor the way back.
+        let near = [k - 2, k - 1, k + 1, k + 2].map(|i| d(i).abs()).into_iter().fold(0.0, f64::max);
+        if near < 0.4 * size.abs() {
+            lone.push((k + 1, size));
+        } else if (d(k + 1) + size).abs() < 0.4 * size.abs() {
+            spikes.push(k + 1..k + 2);
+        }
+    }
+    let unit = super::Motion::unit(input.motion, "rad");
+    if !spikes.is_empty() {
+        findings.push(
+            Finding::new(
+                "spikes",
+                Severity::Warn,
+                channel.name,
+                format!("{} has {} samples far off their neighbours.", channel.name, spikes.len()),
+                "Lost bits of a bus or a disturbed cable; each reads as a blow to the axis.",
+                "Screen the cable; a fit weighs them like any sample, so use a part without them where there are many.",
+            )
+            .at(input, spikes),
+        );
+    }
+    if lone.is_empty() {
+        return Vec::new();
+    }
+    let sizes: Vec<f64> = lone.iter().map(|(_, s)| s.abs()).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let alike = lone.len() >= 2 && sizes.iter().all(|s| *s > 0.9 * largest);
+    let at: Vec<Range<usize>> = lone.iter().map(|(k, _)| *k..*k + 1).collect();
+    let first = lone[0];
+    let finding = if alike {
+        Finding::new(
+            "wrapped",
+            Severity::Refuse,
+            channel.name,
+            format!("{} jumps {} times by {largest:.6} {unit}.", channel.name, lone.len()),
+            "A counter of limited width, or an angle within one turn, that starts anew.",
+            "Unwrap the column, or log the position that counts turns.",
+        )
+    } else {
+        Finding::new(
+            "jump",
+            Severity::Refuse,
+            channel.name,
+            format!(
+                "{} jumps by {:.6} {unit} at {:.6} s{}.",
+                channel.name,
+                first.1,
+                input.time(first.0),
+                if lone.len() > 1 { format!(", and {} times more", lone.len() - 1) } else { String::new() }
+            ),
+            "Counts were lost or the zero was set anew: no torque moved the axis there.",
+            "Use the part before or after (--from, --to).",
+        )
+    };
+    findings.push(finding.at(input, at.clone()));
+    at
+}
+
+/// Channels that a slower loop writes: most samples repeat the one before, while the record goes on.
+fn held(channel: Channel<'_>, findings: &mut Vec<Finding>) {
+    let x = channel.values;
+    let n = x.len();
+    let changes: Vec<usize> = (1..n).filter(|k| x[*k] != x[k - 1]).collect();
+    let repeats = 1.0 - changes.len() as f64 / (n - 1) as f64;
+    if changes.len() < 16 || repeats < HELD {
+        return;
+    }
+    // Quantisation repeats where the motion is slow and changes by one step; a held channel changes by many.
+    let size = quantile(changes.iter().map(|k| x[*k] - x[k - 1]), 0.5);
+    let steps = size / step(x);
+    let gaps: Vec<f64> = changes.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
+    let usual = quantile(gaps.iter().copied(), 0.5);
+    let regular = gaps.iter().filter(|g| (**g - usual).abs() < 0.5).count() as f64 / gaps.len() as f64;
+    if usual >= 2.0 && regular > 0.8 && steps > 3.0 {
+        findings.push(Finding::new(
+            "held",
+            Severity::Warn,
+            channel.name,
+            format!("{} changes only every {usual:.0} samples.", channel.name),
+            "It was sampled more slowly than the record: on average it is late by half as much.",
+            "Log all channels at one rate, or keep every so many-th row.",
+        ));
+    }
+}
+
+/// Channels that end at one value time and again.
+fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) {
+    let x = channel.values;
+    let n = x.len();
+    if !(channel.name == "T" || channel.name.starts_with("omega")) {
+        return;
+    }
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let at_end: Vec<Range<usize>> =
+        [low, high].into_iter().flat_map(|end| runs(n, |k| x[k] == end)).filter(|r| r.len() >= 3).collect();
+    let count: usize = at_end.iter().map(Range::len).sum();
+    let levels = x.windows(2).filter(|w| w[0] != w[1]).count();
+    // A channel of a few levels (a torque of steps) ends at one by nature.
+    if at_end.len() < 3 || count * 200 < n || levels * 2 < n {
+        return;
+    }
+    let (severity, means, remedy) = if channel.name == "T" {
+        (
+            Severity::Note,
+            "The drive's limit is reached.",
+            "A model of the machine needs that limit: see `eixo effects saturation`.",
+        )
+    } else {
+        (
+            Severity::Warn,
+            "The sensor or its converter reached the end of its range; the speed went on.",
+            "Widen its range, or leave the column out of [signals].",
+        )
+    };
+    let mut at_end = at_end;
+    at_end.sort_by_key(|r| r.start);
+    findings.push(
+        Finding::new(
+            "clipped",
+            severity,
+            channel.name,
+            format!("{} stands at its largest or smallest value for {count} samples.", channel.name),
+            means,
+            remedy,
+        )
+        .at(input, at_end),
+    );
+}

@@ -1,0 +1,256 @@
+//! Examination of a record before it is believed: what is wrong with its channels, its units and its time stamps, and which
+//! pieces of it may be used.
+//!
+//! It knows a record as plain columns and, where there is one, the nominal model; it reads no file and fits no model of the
+//! axis. What it asks of the columns holds for every axis that this library has a law for:
+//!
+//! ```text
+//! omega = d theta/dt                            a speed is the derivative of its angle
+//! theta2/theta1 -> 1 below the antiresonance    both encoders turn together where the coupling is stiff to the motion
+//! T = M1*a1 + M2*a2 + c*v1 + F*sign(v1) + k*x1  momentum: M1, M2, c, F >= 0, k of either sign (a spring, gravity)
+//! ```
+//!
+//! A finding of severity [`Severity::Refuse`] says that a verdict from this record would be about its defect.
+
+mod balance;
+mod channels;
+mod finding;
+mod pairs;
+mod robust;
+mod spectra;
+mod stamps;
+mod usable;
+
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+pub use finding::{Finding, Severity};
+
+use crate::axis::{Motion, Parameters, Structure};
+use crate::trace::{Machine, Signal, Trace};
+
+/// The nominal model, where one is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nominal {
+    /// One inertia or two.
+    pub structure: Structure,
+    /// Its parameters, SI units.
+    pub parameters: Parameters,
+}
+
+/// A record as plain columns, all of one length, SI units as the user declared them.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Input<'a> {
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// The time stamps as they were logged, s, where they are known; the columns may have been resampled since.
+    pub stamps: Option<&'a [f64]>,
+    /// Torque (force) on the motor side.
+    pub torque: Option<&'a [f64]>,
+    /// Motor angle.
+    pub theta1: Option<&'a [f64]>,
+    /// Motor speed.
+    pub omega1: Option<&'a [f64]>,
+    /// Table angle.
+    pub theta2: Option<&'a [f64]>,
+    /// Table speed.
+    pub omega2: Option<&'a [f64]>,
+    /// The nominal model, where one is known: units are checked against it.
+    pub nominal: Option<Nominal>,
+    /// Rotary or linear, for the units in the sentences.
+    pub motion: Motion,
+}
+
+/// A channel of the record.
+#[derive(Debug, Clone, Copy)]
+struct Channel<'a> {
+    name: &'static str,
+    values: &'a [f64],
+}
+
+impl<'a> Input<'a> {
+    /// The columns of a trace; `stamps` are the time stamps as they were logged, where they are known.
+    #[must_use]
+    pub fn of(trace: &'a Trace, stamps: Option<&'a [f64]>) -> Self {
+        Self {
+            start: trace.start,
+            dt: trace.dt,
+            stamps,
+            torque: trace.get(Signal::T),
+            theta1: trace.get(Signal::Theta1),
+            omega1: trace.get(Signal::Omega1),
+            theta2: trace.get(Signal::Theta2),
+            omega2: trace.get(Signal::Omega2),
+            ..Self::default()
+        }
+    }
+
+    /// The same beside a machine: of a rigid one the motor's channels alone, and its nominal parameters to check units
+    /// against where they are `known` and not a guess.
+    #[must_use]
+    pub fn against(self, machine: &Machine, known: bool) -> Self {
+        let nominal = Nominal { structure: machine.structure, parameters: machine.parameters };
+        let rigid = machine.structure == Structure::Rigid && (self.theta1.is_some() || self.omega1.is_some());
+        Self {
+            nominal: known.then_some(nominal),
+            motion: machine.signals.motion,
+            theta2: self.theta2.filter(|_| !rigid),
+            omega2: self.omega2.filter(|_| !rigid),
+            ..self
+        }
+    }
+
+    /// Samples of the record.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.channels().map(|c| c.values.len()).min().unwrap_or(0)
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The channels that are there.
+    fn channels(&self) -> impl Iterator<Item = Channel<'a>> {
+        [
+            ("T", self.torque),
+            ("theta1", self.theta1),
+            ("omega1", self.omega1),
+            ("theta2", self.theta2),
+            ("omega2", self.omega2),
+        ]
+        .into_iter()
+        .filter_map(|(name, values)| values.map(|values| Channel { name, values }))
+    }
+
+    /// Time of a sample, s.
+    fn time(&self, k: usize) -> f64 {
+        self.start + k as f64 * self.dt
+    }
+}
+
+/// What an examination found.
+#[derive(Debug, Clone, Default, serde::Serialize)]
+pub struct Examination {
+    /// What was found, the gravest first.
+    pub findings: Vec<Finding>,
+    /// The pieces where the drive is on and the axis is not merely standing; ascending, apart from each other. The whole
+    /// record where nothing speaks against it.
+    pub usable: Vec<Range<usize>>,
+    /// Band in which the motion follows the torque, Hz; None where there is none.
+    pub band: Option<[f64; 2]>,
+}
+
+impl Examination {
+    /// Whether no verdict may be given on this record.
+    #[must_use]
+    pub fn refuses(&self) -> bool {
+        self.findings.iter().any(|f| f.severity == Severity::Refuse)
+    }
+
+    /// The finding of an id.
+    #[must_use]
+    pub fn find(&self, id: &str) -> Option<&Finding> {
+        self.findings.iter().find(|f| f.id == id)
+    }
+
+    /// The longest usable piece; None where no sample is usable.
+    #[must_use]
+    pub fn longest(&self) -> Option<Range<usize>> {
+        self.usable.iter().max_by_key(|r| r.len()).cloned()
+    }
+}
+
+/// Largest size that is taken for a measurement: its fourth power is still finite.
+const LARGEST: f64 = 1e60;
+
+/// Examines a record. All columns must be as long as each other; a shorter one limits what is looked at.
+#[must_use]
+pub fn examine(input: &Input<'_>) -> Examination {
+    let n = input.len();
+    let mut findings = Vec::new();
+    stamps::examine(input, &mut findings);
+    if !numbers(input, &mut findings) || n < 16 {
+        finding::sort(&mut findings);
+        return Examination { findings, usable: std::iter::once(0..n).filter(|r| !r.is_empty()).collect(), band: None };
+    }
+    let input = &cut(input, n);
+    let bad = channels::examine(input, &mut findings);
+    let usable = usable::examine(input, &bad, &mut findings);
+    // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.
+    let piece = usable.iter().max_by_key(|r| r.len()).cloned().unwrap_or(0..n);
+    let mut band = None;
+    if piece.len() >= 64 {
+        let mut part = slice(input, &piece);
+        part.torque = part.torque.filter(|v| robust::span(v) > 0.0);
+        for channel in [&mut part.theta1, &mut part.omega1, &mut part.theta2, &mut part.omega2] {
+            *channel = channel.filter(|v| robust::span(v) > 0.0);
+        }
+        pairs::speeds(&part, &mut findings);
+        band = balance::examine(&part, &mut findings);
+    }
+    finding::sort(&mut findings);
+    Examination { findings, usable, band }
+}
+
+/// Numbers that can be computed with; says so where they cannot.
+fn numbers(input: &Input<'_>, findings: &mut Vec<Finding>) -> bool {
+    let mut sound = true;
+    if !(input.dt > 1e-9 && input.dt < 1e6) {
+        sound = false;
+        findings.push(Finding::new(
+            "interval",
+            Severity::Refuse,
+            "time",
+            format!("The sampling interval is {:e} s.", input.dt),
+            "No drive is logged at such a rate: the unit of the time column is another than the file says.",
+            "Give the unit in the header, as in time [ms], or the interval as dt in [signals] of the axis file.",
+        ));
+    }
+    for channel in input.channels() {
+        let wrong = |v: &f64| !v.is_finite() || v.abs() > LARGEST || (*v != 0.0 && v.abs() < 1.0 / LARGEST);
+        let concerned = finding::runs(channel.values.len(), |k| wrong(&channel.values[k]));
+        if !concerned.is_empty() {
+            sound = false;
+            let first = channel.values[concerned[0].start];
+            findings.push(
+                Finding::new(
+                    "magnitude",
+                    Severity::Refuse,
+                    channel.name,
+                    format!("{} holds numbers that no sensor gives, the first {first:e}.", channel.name),
+                    "They are marks of missing values, or the column is not what it is taken for.",
+                    "Cut the record before or after them (--from, --to), or map another column in [signals].",
+                )
+                .at(input, concerned),
+            );
+        }
+    }
+    sound
+}
+
+/// The first `n` samples of every channel.
+fn cut<'a>(input: &Input<'a>, n: usize) -> Input<'a> {
+    slice(input, &(0..n))
+}
+
+/// The samples of a range, of every channel.
+fn slice<'a>(input: &Input<'a>, range: &Range<usize>) -> Input<'a> {
+    let part = |v: Option<&'a [f64]>| v.map(|v| &v[range.clone()]);
+    Input {
+        start: input.time(range.start),
+        stamps: input.stamps.filter(|s| s.len() >= range.end).map(|s| &s[range.clone()]),
+        torque: part(input.torque),
+        theta1: part(input.theta1),
+        omega1: part(input.omega1),
+        theta2: part(input.theta2),
+        omega2: part(input.omega2),
+        ..*input
+    }
+}

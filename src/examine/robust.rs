@@ -1,0 +1,45 @@
+//! Sizes of columns that a few wild samples do not rule.
+
+/// Largest less smallest.
+pub(super) fn span(values: &[f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    if high > low { high - low } else { 0.0 }
+}
+
+/// Root mean square about the mean.
+pub(super) fn deviation(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+/// Root mean square.
+pub(super) fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Most values that a quantile is taken of: of a longer column every so many-th.
+const SAMPLED: usize = 100_000;
+
+/// Quantile (0 to 1) of the sizes of a column's values, of at most [`SAMPLED`] of them.
+pub(super) fn quantile(values: impl ExactSizeIterator<Item = f64>, share: f64) -> f64 {
+    let step = (values.len() / SAMPLED).max(1);
+    let mut sizes: Vec<f64> = values.step_by(step).map(f64::abs).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let index = ((sizes.len() - 1) as f64 * share).round() as usize;
+    *sizes.select_nth_unstable_by(index, f64::total_cmp).1
+}
+
+/// The step in which a column is counted: its smallest difference that is not zero nor rounding.
+pub(super) fn step(values: &[f64]) -> f64 {
+    let large = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let n = values.len().min(SAMPLED);
+    values[..n]
+        .windows(2)
+        .map(|w| (w[1] - w[0]).abs())
+        .filter(|d| *d > 1e-12 * large)
+        .fold(f64::INFINITY, f64::min)
+        .min(large.max(f64::MIN_POSITIVE))
+}

@@ -1,0 +1,316 @@
+//! Sound records pass, broken ones are refused by the name of their defect.
+
+use std::path::PathBuf;
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::axis::{Hold, Scheme, SimulateOptions, simulate};
+use crate::effects::{EFFECTS, Effect, Settings};
+use crate::identify::excitation::{Kind, Multisine};
+use crate::trace::{Column, Machine, Mapping, Signal, load};
+
+/// Torque, theta1, omega1, theta2, omega2.
+#[derive(Clone)]
+pub(crate) struct Columns {
+    dt: f64,
+    v: [Vec<f64>; 5],
+}
+
+const NOMINAL: Nominal = Nominal { structure: Structure::TwoInertia, parameters: Parameters::PAPER };
+
+impl Columns {
+    fn input(&self) -> Input<'_> {
+        let [t, x1, w1, x2, w2] = &self.v;
+        Input {
+            dt: self.dt,
+            torque: Some(t),
+            theta1: Some(x1),
+            omega1: Some(w1),
+            theta2: Some(x2),
+            omega2: Some(w2),
+            ..Input::default()
+        }
+    }
+
+    fn positions(&self) -> Input<'_> {
+        Input { omega1: None, omega2: None, ..self.input() }
+    }
+
+    fn motor_only(&self) -> Input<'_> {
+        Input { theta2: None, ..self.positions() }
+    }
+}
+
+fn effect(id: &str, values: &[(&str, f64)]) -> Settings {
+    let mut settings = Settings::default();
+    let effect = Effect::from_id(id).unwrap();
+    for (name, value) in values {
+        settings.of_mut(effect)[effect.parameter(name).unwrap()] = *value;
+    }
+    settings
+}
+
+fn noise(seed: u64, size: f64) -> impl FnMut() -> f64 {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    move || {
+        let e: f64 = StandardNormal.sample(&mut rng);
+        size * e
+    }
+}
+
+/// The paper's axis under a multisine, with effects and noise on its encoders.
+fn axis(kind: Kind, samples: usize, periods: usize, settings: &Settings, sigma: f64) -> Columns {
+    let dt = 1e-3;
+    let high = (samples as f64 * dt * 90.0) as usize;
+    let torque = Multisine::new(kind, samples, 1, high, 0.03, 0.0, 5).unwrap().period().repeat(periods);
+    let options = SimulateOptions { start: 0.0, dt, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 4 };
+    let run = simulate(&Parameters::PAPER, Structure::TwoInertia, settings, [0.0; 4], &torque, &options);
+    let mut e = noise(3, 1.0);
+    let mut of = |f: &dyn Fn(usize) -> f64, size: f64| (0..torque.len()).map(|k| f(k) + size * e()).collect::<Vec<_>>();
+    let r = &run.readings;
+    let columns = [
+        of(&|k| r[k].theta1, sigma),
+        of(&|k| r[k].omega1, 50.0 * sigma),
+        of(&|k| r[k].theta2, sigma),
+        of(&|k| r[k].omega2, 50.0 * sigma),
+    ];
+    let [a, b, c, d] = columns;
+    Columns { dt, v: [torque, a, b, c, d] }
+}
+
+fn plain() -> Columns {
+    axis(Kind::RandomPhase, 4096, 2, &Settings::default(), 1e-4)
+}
+
+fn refused(input: &Input<'_>) -> Vec<&'static str> {
+    let found = examine(input);
+    found.findings.iter().filter(|f| f.severity == Severity::Refuse).map(|f| f.id).collect()
+}
+
+fn sound(input: &Input<'_>, name: &str) {
+    let found = examine(input);
+    assert!(!found.refuses(), "{name}: {:#?}", found.findings);
+}
+
+#[test]
+fn the_papers_axis_is_sound_with_every_effect_and_few_or_many_channels() {
+    for (kind, samples, periods) in [(Kind::Schroeder, 2048, 1), (Kind::RandomPhase, 4096, 2), (Kind::Odd, 1024, 8)] {
+        for sigma in [0.0, 1e-5, 1e-3] {
+            let c = axis(kind, samples, periods, &Settings::default(), sigma);
+            for (input, name) in [(c.input(), "all"), (c.positions(), "positions"), (c.motor_only(), "motor")] {
+                for nominal in [None, Some(NOMINAL)] {
+                    sound(&Input { nominal, ..input }, &format!("{kind:?} {sigma} {name} {nominal:?}"));
+                }
+            }
+            let table = Input { theta1: None, ..c.positions() };
+            sound(&Input { nominal: Some(NOMINAL), ..table }, &format!("{kind:?} {sigma} table"));
+        }
+    }
+    for &one in EFFECTS {
+        let info = one.info();
+        let mut settings = Settings::default();
+        for (k, p) in info.parameters.iter().enumerate() {
+            let size = p.off + 0.3 * p.nominal;
+            settings.of_mut(one)[k] = size.clamp(p.min, p.max);
+        }
+        let c = axis(Kind::RandomPhase, 4096, 2, &settings, 1e-5);
+        sound(&Input { nominal: Some(NOMINAL), ..c.positions() }, info.id);
+    }
+}
+
+#[test]
+fn friction_quantisation_a_bias_a_dead_end_and_stops_are_no_reason_to_refuse() {
+    let coulomb = effect("coulomb_motor", &[("level", 0.02)]);
+    let c = axis(Kind::RandomPhase, 4096, 3, &coulomb, 0.0);
+    sound(&c.positions(), "friction");
+    let rounded = |c: &Columns, step: f64| {
+        let mut c = c.clone();
+        for k in [1, 3] {
+            c.v[k].iter_mut().for_each(|v| *v = (*v / step).round() * step);
+        }
+        c
+    };
+    let swing = robust::span(&c.v[1]);
+    for steps in [40.0, 400.0, 4e4] {
+        sound(&rounded(&c, swing / steps).positions(), &format!("{steps} steps"));
+        sound(
+            &rounded(&plain(), robust::span(&plain().v[1]) / steps).positions(),
+            &format!("{steps} steps, no friction"),
+        );
+    }
+    let mut biased = c.clone();
+    biased.v[0].iter_mut().for_each(|v| *v += 0.05);
+    biased.v[1].iter_mut().for_each(|v| *v += 40.0);
+    sound(&biased.positions(), "bias");
+    let mut spiky = plain();
+    for k in (100..8000).step_by(371) {
+        spiky.v[1][k] += 0.7;
+    }
+    sound(&spiky.positions(), "spikes");
+    assert!(examine(&spiky.positions()).find("spikes").is_some());
+    let mut slow = plain();
+    for k in [1, 3] {
+        slow.v[k] = (0..slow.v[k].len()).map(|i| slow.v[k][i - i % 4]).collect();
+    }
+    sound(&slow.positions(), "held");
+    assert!(examine(&slow.positions()).find("held").is_some());
+}
+
+#[test]
+fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
+    let settings = effect("coulomb_motor", &[("level", 0.004)]);
+    let dt = 1e-3;
+    let mut torque = Multisine::new(Kind::RandomPhase, 4000, 1, 300, 0.03, 0.0, 5).unwrap().period().repeat(2);
+    torque.extend(vec![0.0; 4000]);
+    let options = SimulateOptions { start: 0.0, dt, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 4 };
+    let run = simulate(&Parameters::PAPER, Structure::TwoInertia, &settings, [0.0; 4], &torque, &options);
+    let mut e = noise(4, 1e-6);
+    let x1: Vec<f64> = run.readings.iter().map(|r| r.theta1 + e()).collect();
+    let x2: Vec<f64> = run.readings.iter().map(|r| r.theta2 + e()).collect();
+    let input = Input { dt, torque: Some(&torque), theta1: Some(&x1), theta2: Some(&x2), ..Input::default() };
+    let found = examine(&input);
+    assert!(!found.refuses(), "{:#?}", found.findings);
+    assert!(found.find("drive_off").is_some(), "{:#?}", found.findings);
+    let longest = found.longest().unwrap();
+    assert!(longest.start == 0 && (7900..8600).contains(&longest.end), "{longest:?}");
+}
+
+fn data() -> Option<PathBuf> {
+    let folder = std::env::var_os("EIXO_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    if !folder.is_dir() {
+        eprintln!("skipped: no {} (EIXO_DATA names the folder)", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+#[test]
+fn real_records_are_sound() {
+    let Some(data) = data() else { return };
+    let machine =
+        |name: &str| Machine::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)).unwrap();
+    let mapped = |t: &str, x: &str| Mapping {
+        time: Column::named("t_s"),
+        signals: vec![(Signal::T, Column::named(t)), (Signal::Theta1, Column::named(x))],
+        ..Mapping::default()
+    };
+    let cases = [
+        ("emps/train.csv", machine("emps.toml").signals),
+        ("two_inertia_bench/schroeder.csv", machine("two_inertia_bench.toml").signals),
+        ("qube/prbs_1.csv", mapped("plant_input_V", "theta_rad")),
+        ("qube/prbs_2.csv", mapped("plant_input_V", "theta_rad")),
+    ];
+    for (file, mapping) in cases {
+        let trace = load(&data.join(file), &mapping).unwrap().trace;
+        let input = Input { motion: mapping.motion, ..Input::of(&trace, None) };
+        let found = examine(&input);
+        println!("{file}: {:?} {:?}", found.usable, found.band);
+        for f in &found.findings {
+            println!("   {:?} {} {}", f.severity, f.id, f.sentence());
+        }
+        assert!(!found.refuses(), "{file}");
+    }
+}
+
+/// A record, what is wrong with it, and the id of the finding that must refuse it.
+fn broken() -> Vec<(&'static str, Columns, &'static [&'static str])> {
+    let base = plain();
+    let n = base.v[0].len();
+    let other = axis(Kind::Odd, 4096, 2, &Settings::default(), 1e-4);
+    let mut e = noise(11, 0.03);
+    let mut cases: Vec<(&'static str, Columns, &'static [&'static str])> = Vec::new();
+    let mut add = |name, change: &mut dyn FnMut(&mut Columns), ids| {
+        let mut c = base.clone();
+        change(&mut c);
+        cases.push((name, c, ids));
+    };
+    add("dead torque", &mut |c| c.v[0].fill(0.0), &["constant"]);
+    add("dead theta1", &mut |c| c.v[1].fill(0.3), &["constant"]);
+    add("dead omega2", &mut |c| c.v[4].fill(0.0), &["constant"]);
+    add("dead theta2", &mut |c| c.v[3].fill(0.0), &["constant"]);
+    add(
+        "stuck theta1",
+        &mut |c| {
+            let v = c.v[1][3000];
+            c.v[1][3000..4500].fill(v)
+        },
+        &["stuck"],
+    );
+    add(
+        "stuck theta2 to the end",
+        &mut |c| {
+            let v = c.v[3][5000];
+            c.v[3][5000..].fill(v)
+        },
+        &["stuck"],
+    );
+    add(
+        "stuck omega1",
+        &mut |c| {
+            let v = c.v[2][2000];
+            c.v[2][2000..4000].fill(v)
+        },
+        &["stuck", "foreign"],
+    );
+    add(
+        "stuck torque",
+        &mut |c| {
+            let v = c.v[0][2000];
+            c.v[0][2000..5000].fill(v)
+        },
+        &["stuck"],
+    );
+    add(
+        "encoders exchanged",
+        &mut |c| {
+            c.v.swap(1, 3);
+            c.v.swap(2, 4)
+        },
+        &["swapped"],
+    );
+    add("angle and speed exchanged", &mut |c| c.v.swap(1, 2), &["swapped", "foreign"]);
+    add("speeds exchanged", &mut |c| c.v.swap(2, 4), &["swapped", "foreign", "sign"]);
+    add("torque turned", &mut |c| c.v[0].iter_mut().for_each(|v| *v = -*v), &["sign"]);
+    add("theta2 turned", &mut |c| c.v[3].iter_mut().for_each(|v| *v = -*v), &["sign"]);
+    add("omega1 turned", &mut |c| c.v[2].iter_mut().for_each(|v| *v = -*v), &["sign"]);
+    add("foreign torque", &mut |c| c.v[0].clone_from(&other.v[0]), &["not_followed"]);
+    add("white torque", &mut |c| c.v[0] = (0..n).map(|_| e()).collect(), &["not_followed"]);
+    add("torque reversed in time", &mut |c| c.v[0].reverse(), &["not_followed"]);
+    add("foreign theta2", &mut |c| c.v[3].clone_from(&other.v[3]), &["foreign"]);
+    add("degrees", &mut |c| [1, 3].iter().for_each(|k| c.v[*k].iter_mut().for_each(|v| *v *= 57.295_78)), &["units"]);
+    add(
+        "all in degrees",
+        &mut |c| c.v[1..].iter_mut().for_each(|c| c.iter_mut().for_each(|v| *v *= 57.295_78)),
+        &["units"],
+    );
+    add("one angle in degrees", &mut |c| c.v[3].iter_mut().for_each(|v| *v *= 57.295_78), &["units"]);
+    add("mN.m", &mut |c| c.v[0].iter_mut().for_each(|v| *v *= 1e3), &["units"]);
+    add("milliseconds", &mut |c| c.dt = 1.0, &["units"]);
+    add(
+        "turns",
+        &mut |c| c.v[1..].iter_mut().for_each(|c| c.iter_mut().for_each(|v| *v /= std::f64::consts::TAU)),
+        &["units"],
+    );
+    add("omega in rpm", &mut |c| c.v[2].iter_mut().for_each(|v| *v *= 9.5493), &["units"]);
+    add("theta1 jumps", &mut |c| c.v[1][4000..].iter_mut().for_each(|v| *v += 2.0), &["jump"]);
+    add("theta1 within a turn", &mut |c| c.v[1].iter_mut().for_each(|v| *v = v.rem_euclid(1.0)), &["wrapped"]);
+    add("torque late", &mut |c| c.v[0].rotate_right(12), &["misaligned"]);
+    add("1e308", &mut |c| c.v[1][17] = 1e308, &["magnitude"]);
+    add("dt of 1e300", &mut |c| c.dt = 1e300, &["interval"]);
+    cases
+}
+
+#[test]
+fn a_broken_record_is_refused_by_the_name_of_its_defect() {
+    let mut missed = Vec::new();
+    for (name, columns, ids) in broken() {
+        let found = refused(&Input { nominal: Some(NOMINAL), ..columns.input() });
+        if !found.iter().any(|id| ids.contains(id)) {
+            missed.push(format!("{name}: {found:?}, not {ids:?}"));
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
+}
