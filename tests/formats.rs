@@ -186,3 +186,94 @@ fn a_small_file_that_unfolds_to_gigabytes_is_refused_before_it_does() {
     let error = Table::parse(&bytes, "bomb.mat").unwrap_err().to_string();
     assert!(error.contains("bomb.mat") && error.contains("unfolds"), "{error}");
 }
+
+/// The trace of a file of `scripts/fixtures/machine_logs.py`, its columns named as in that form.
+fn log(name: &str, mapping: &Mapping) -> eixo::trace::Loaded {
+    load(&data("logs").join(name), mapping).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+#[test]
+fn logs_of_machines_and_programs_hold_the_same_motion_in_every_form() {
+    let mapped = |t: &str, x: &str| Mapping {
+        signals: vec![(Signal::T, Column::named(t)), (Signal::Theta1, Column::named(x))],
+        ..Mapping::default()
+    };
+    let own = Mapping::default();
+    let sampler = Mapping { dt: Some(1e-3), ..mapped("column 2", "column 3") };
+    for (name, mapping) in [
+        ("sheet.xlsx", &own),
+        ("arrays.npz", &own),
+        ("lines.jsonl", &own),
+        ("utf16.csv", &own),
+        ("stamps.csv", &own),
+        ("halscope.log", &mapped("pid.0.output", "joint.0.pos-fb")),
+        ("halsampler.txt", &sampler),
+        ("twincat.csv", &mapped("Torque", "ActPos")),
+    ] {
+        let trace = log(name, mapping).trace;
+        assert_eq!(trace.len(), 200, "{name}");
+        assert!((trace.dt() - 1e-3).abs() < 1e-9, "{name}: {}", trace.dt());
+        for k in 0..200 {
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
+            assert!(near(trace.get(Signal::T).unwrap()[k], row(k)[1]), "{name}, T, row {k}");
+            assert!(near(trace.get(Signal::Theta1).unwrap()[k], row(k)[2]), "{name}, theta1, row {k}");
+        }
+    }
+}
+
+#[test]
+fn forms_that_are_not_read_say_how_to_save_them() {
+    for (bytes, says) in [
+        (&b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1rest"[..], ".xlsx or CSV"),
+        (b"\x89HDF\r\n\x1a\n", "-v7"),
+        (b"PK\x03\x04 not an archive", "copy it again"),
+    ] {
+        let error = Table::parse(bytes, "log").unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    }
+}
+
+#[test]
+fn counters_that_wrap_go_on_and_calendar_stamps_count_from_the_first() {
+    let text: String = (0..400_i64)
+        .map(|k| {
+            let torque = ((k as f64 * 0.07).sin() * 30.0).round() as i64;
+            let count = (k * k * 3) % 65_536;
+            format!("{},{},{count}\n", 1_700_000_000_000_i64 + 2 * k, (torque + 65_536) % 65_536)
+        })
+        .collect();
+    let table = Table::parse(format!("timestamp,T,theta1\n{text}").as_bytes(), "log.csv").unwrap();
+    let loaded = eixo::trace::from_table(&table, &Mapping::default()).unwrap();
+    assert!((loaded.trace.dt() - 2e-3).abs() < 1e-12 && loaded.trace.start == 0.0);
+    for k in 0..400_i64 {
+        let at = k as usize;
+        assert_eq!(loaded.trace.get(Signal::T).unwrap()[at], ((k as f64 * 0.07).sin() * 30.0).round());
+        assert_eq!(loaded.trace.get(Signal::Theta1).unwrap()[at], (k * k * 3) as f64);
+    }
+    let said = loaded.warnings.join(" ");
+    assert!(said.contains("milliseconds of a calendar") && said.contains("unwrapped"), "{said}");
+}
+
+#[test]
+fn the_longest_piece_between_gaps_is_used_and_from_and_to_take_another() {
+    let rows: String = (0..300)
+        .map(|k| {
+            let t = f64::from(k) * 1e-3 + if k >= 100 { 0.5 } else { 0.0 };
+            format!("{t:.6},{},{k}\n", k % 7)
+        })
+        .collect();
+    let table = Table::parse(format!("time,T,theta1\n{rows}").as_bytes(), "log.csv").unwrap();
+    let loaded = eixo::trace::from_table(&table, &Mapping::default()).unwrap();
+    assert_eq!((loaded.trace.len(), loaded.trace.get(Signal::Theta1).unwrap()[0]), (200, 100.0));
+    assert!(loaded.warnings[0].contains("2 pieces") && loaded.warnings[0].contains("row 102"), "{:?}", loaded.warnings);
+    let first = Mapping { to: Some(0.0991), ..Mapping::default() };
+    assert_eq!(eixo::trace::from_table(&table, &first).unwrap().trace.len(), 100);
+    let none = Mapping { from: Some(9.0), ..Mapping::default() };
+    let error = eixo::trace::from_table(&table, &none).unwrap_err().to_string();
+    assert!(error.contains("--from and --to leave 0 samples of 300"), "{error}");
+    // A bad cell in the part that is left out is none of the record's.
+    let bad = rows.replacen("0.002000,2,2", "0.002000,x,2", 1);
+    let table = Table::parse(format!("time,T,theta1\n{bad}").as_bytes(), "log.csv").unwrap();
+    assert!(eixo::trace::from_table(&table, &Mapping::default()).is_ok());
+    assert!(eixo::trace::from_table(&table, &first).unwrap_err().to_string().contains("row 4, column T"));
+}

@@ -238,7 +238,8 @@ fn bad_traces_are_refused_with_file_row_column_and_the_way_out() {
     let nan = rows(40, |k| if k == 7 { "0.007,nan,1,1".to_owned() } else { good(k) });
     refused(&(head.to_owned() + &nan), &["row 9", "column T", "nan"]);
     refused(&("time,T,theta1\n".to_owned() + &rows(40, |k| format!("{k},1,{k}"))), &["theta2", "[signals]"]);
-    refused(&("t,torque\n".to_owned() + &rows(40, |k| format!("{k},1"))), &["time"]);
+    refused(&("t,torque\n".to_owned() + &rows(40, |k| format!("{k},1"))), &["no column has a signal's name", "torque"]);
+    refused(&("n,T,theta1,theta2\n".to_owned() + &rows(40, good)), &["no column \"time\"", "[signals]"]);
     refused(&(head.to_owned() + &rows(5, good)), &["5 samples", "record longer"]);
     refused(&(head.to_owned() + &rows(40, good) + "0.04,1\n"), &["row 42", "2 fields where the header has 4"]);
     refused(&rows(40, good), &["header row"]);
@@ -252,7 +253,11 @@ fn a_record_that_does_not_move_names_what_it_cannot_determine() {
     let path = folder.path().join("still.csv");
     std::fs::write(&path, "time,T,theta1,theta2\n".to_owned() + &still).unwrap();
     let out = eixo(&["identify", text(&path), "--method", "ls"]);
-    assert_eq!(out.status.code(), Some(2));
+    assert_eq!(out.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(said.contains("theta1 is 0e0 in every sample") && said.contains("No verdict is given"), "{said}");
+    let out = eixo(&["identify", text(&path), "--method", "ls", "--trust"]);
+    assert_eq!(out.status.code(), Some(1));
     let said = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
     assert!(said.contains("does not determine K, B") && said.contains("Excite the axis"), "{said}");
 }

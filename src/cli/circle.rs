@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use super::say::say;
 use super::diagnosed;
+use super::outputs;
 use super::drives::{Drives, ideal, machine};
 use crate::circle::roundness::{Roundness, bidirectional};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
@@ -73,6 +74,8 @@ impl Default for Test {
 /// # Errors
 /// When an axis file cannot be read, the test cannot be run or a file cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let inputs = [&args.axis, &args.y, &args.diagnosed, &args.diagnosed_y].into_iter().filter_map(Option::as_deref);
+    outputs::check(inputs, [args.output.as_ref(), args.report.as_ref()])?;
     let x = machine(args.axis.as_deref())?;
     let y = machine(args.y.as_deref().or(args.axis.as_deref()))?;
     let found = match &args.diagnosed {

@@ -149,7 +149,7 @@ fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Step
     let mut machine = Machine { name: "a machine with hidden friction".to_owned(), parameters, ..Machine::default() };
     write_text(&file("nominal.toml"), machine.to_toml().as_bytes())?;
 
-    let super::diagnose::Recorded { record, noise, .. } = super::diagnose::record(&file("machine.csv"), &machine)?;
+    let super::diagnose::Recorded { record, noise, .. } = super::diagnose::record(&file("machine.csv"), &machine, super::examined::Believed::default())?;
     let case = Case {
         machine: machine.name.clone(),
         nominal: Model::new(machine.parameters, machine.structure, machine.effects),

@@ -9,7 +9,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::say::{say, say_line};
+use super::examined::{Believed, Examined, examined};
 use super::many::Many;
+use super::outputs;
 use crate::axis::Structure;
 use crate::diagnose::{CHANNELS, Case, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise};
 use crate::effects::{EFFECTS, Effect};
@@ -21,7 +23,7 @@ use crate::report::{html, terminal};
 use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Setting};
-use crate::trace::{Machine, Signal, Trace, load, write_text};
+use crate::trace::{Machine, Signal, Trace, nearest, write_text};
 
 /// Arguments of `eixo diagnose`.
 #[derive(Debug, clap::Args)]
@@ -51,6 +53,8 @@ pub struct Args {
     /// Write the improved model as an FMU, and run it on held-out data through the import host
     #[arg(long, value_name = "FILE", conflicts_with = "output")]
     fmu: Option<PathBuf>,
+    #[command(flatten)]
+    believed: Believed,
     #[command(flatten)]
     many: Many,
 }
@@ -96,11 +100,14 @@ fn examine(
     axis: &Path,
     holdout: Option<&Path>,
     suspects: Vec<Effect>,
+    believed: Believed,
     progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
     let machine = Machine::read(axis)?;
-    let Recorded { record: train, noise, mut warnings, reference, command } = record(trace, &machine)?;
-    let holdout = holdout.map(|p| record(p, &machine).map(|r| (r, p))).transpose()?;
+    let Recorded { record: train, noise, mut warnings, reference, command } = record(trace, &machine, believed)?;
+    // The part is that of the first record; the second one is used from its start to its end.
+    let whole = Believed { trust: believed.trust, ..Believed::default() };
+    let holdout = holdout.map(|p| record(p, &machine, whole).map(|r| (r, p))).transpose()?;
     warnings.extend(holdout.iter().flat_map(|(r, _)| r.warnings.iter().cloned()));
     let case = Case {
         machine: machine.name.clone(),
@@ -143,15 +150,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let suspects = library(&args.without)?;
     if args.many.is_wanted(&args.traces)? {
         let ids: Vec<&str> = suspects.iter().map(|e| e.info().id).collect();
-        return args.many.run("diagnose", &FACTS, ids.join(","), &args.traces, args.axis.as_deref(), &|item| {
+        return args.many.run("diagnose", &FACTS, format!("{} {:?}", ids.join(","), args.believed), &args.traces, args.axis.as_deref(), &|item| {
             let axis = item.axis.as_deref().context("no axis.toml in its folder or above, and no --axis")?;
-            Ok(found(&examine(&item.path, axis, None, suspects.clone(), &|_| ())?))
+            Ok(found(&examine(&item.path, axis, None, suspects.clone(), args.believed, &|_| ())?))
         });
     }
+    let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref()).chain(args.holdout.as_deref());
+    outputs::check(inputs, [args.json.as_ref(), args.report.as_ref(), args.fmu.as_ref()])?;
     let trace = args.traces.first().context("no trace given")?;
     let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {elapsed} {msg}")?);
-    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, &|what| {
+    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| {
         bar.set_message(what.to_owned());
         bar.tick();
     })?;
@@ -248,9 +257,13 @@ fn replayed(path: &Path, replay: &Replay) -> anyhow::Result<String> {
 fn library(without: &[String]) -> anyhow::Result<Vec<Effect>> {
     let without: Vec<Effect> = without
         .iter()
-        .map(|id| Effect::from_id(id.trim()))
-        .collect::<Result<_, _>>()
-        .context("--without names effects of `eixo effects`")?;
+        .map(|id| {
+            Effect::from_id(id.trim()).map_err(|_| {
+                let near = nearest(id.trim(), EFFECTS.iter().map(|e| e.info().id));
+                anyhow::anyhow!("--without {}: there is no such effect{near}; `eixo effects` lists them", id.trim())
+            })
+        })
+        .collect::<anyhow::Result<_>>()?;
     Ok(EFFECTS.iter().copied().filter(|e| !without.contains(e)).collect())
 }
 
@@ -269,10 +282,9 @@ pub(super) struct Recorded {
 }
 
 /// Reads a trace as the diagnosis needs it.
-pub(super) fn record(path: &Path, machine: &Machine) -> anyhow::Result<Recorded> {
-    let loaded = load(path, &machine.signals)?;
-    let mut warnings = loaded.warnings;
-    let trace = &loaded.trace;
+pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyhow::Result<Recorded> {
+    let Examined { trace, mut warnings, .. } = examined(path, machine, true, believed)?;
+    let trace = &trace;
     let torque = trace.require(Signal::T).with_context(|| path.display().to_string())?.to_vec();
     let mut channels =
         [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(|s| trace.get(s).map(<[f64]>::to_vec));

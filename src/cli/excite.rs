@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::limits;
+use super::outputs;
 use super::say::say_line;
 use crate::identify::excitation::{Kind, Multisine};
 use crate::report::format::{Medium, number};
@@ -85,6 +87,7 @@ fn band(text: &str) -> Result<(f64, f64), String> {
 /// # Errors
 /// When the signal cannot be made or the file cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    outputs::check([], [Some(&args.output)])?;
     let kind = match args.kind {
         Signals::Schroeder => Kind::Schroeder,
         Signals::RandomPhase => Kind::RandomPhase,
@@ -95,6 +98,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let total = total.with_context(|| {
         format!("{} periods of {} samples are more than {MAX_SAMPLES} samples", args.periods, args.samples)
     })?;
+    limits::bearable(total as f64, 2)?;
     anyhow::ensure!(args.dt.is_finite() && args.dt > 0.0, "--dt is {}: it must be greater than zero", args.dt);
     let signal = match args.band {
         Some((low, high)) => {

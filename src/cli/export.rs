@@ -5,13 +5,16 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::outputs;
 use super::say::{say, say_line};
 use super::drives::Drives;
 use crate::fmu::isolation;
 use crate::fmu::output;
 use crate::fmu::package::{Package, XyTable};
+use crate::fmu::archive::{Archive, Limits};
+use crate::fmu::description::Description;
 use crate::fmu::validation::{Options, validate};
-use crate::trace::Machine;
+use crate::trace::{Machine, write_text};
 
 /// Arguments of `eixo export`.
 #[derive(Debug, clap::Args)]
@@ -44,6 +47,7 @@ pub struct Args {
 /// # Errors
 /// When the axis file cannot be used, or the FMU cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    outputs::check(args.axis.as_deref().into_iter().chain(args.y.as_deref()), [Some(&args.fmu)])?;
     let x = args.axis.as_deref().map(Machine::read).transpose()?;
     if args.fmu.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
         anyhow::ensure!(!args.drive, "--drive writes an FMU: give {} the end .fmu", args.fmu.display());
@@ -62,7 +66,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Package::drive("drive", &gains, rho, args.drives.dt, motion).with_context(file)?
         }
     };
-    package.write(&args.fmu)?;
+    let bytes = package.archive()?;
+    read_back(&bytes, "modelDescription.xml").with_context(file)?;
+    write_text(&args.fmu, &bytes)?;
     let platforms: Vec<&str> = Package::platforms().collect();
     say_line!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
     if args.check { check(&args.fmu) } else { Ok(ExitCode::SUCCESS) }
@@ -79,6 +85,26 @@ fn check(fmu: &Path) -> anyhow::Result<ExitCode> {
     Ok(if report.passes(false) { ExitCode::SUCCESS } else { ExitCode::from(super::FINDINGS) })
 }
 
+/// Reads an archive back before it has its name: every part whole, the description one that a tool can read.
+fn read_back(bytes: &[u8], description: &str) -> anyhow::Result<()> {
+    let read = || -> anyhow::Result<()> {
+        let mut archive = Archive::from_bytes(bytes.to_vec(), Limits::default())?;
+        archive.test()?;
+        let text = archive.read(description)?;
+        if description == "modelDescription.xml" {
+            Description::parse(&text)?;
+            return Ok(());
+        }
+        for entry in archive.entries().iter().map(|e| e.name.clone()).collect::<Vec<_>>() {
+            if entry.ends_with(".fmu") {
+                read_back(&archive.read(&entry)?, "modelDescription.xml")?;
+            }
+        }
+        Ok(())
+    };
+    read().context("what was made does not read back; nothing is written. Is there an odd character in its name?")
+}
+
 /// The XY table: X carries Y.
 fn table(args: &Args, x: Machine) -> anyhow::Result<ExitCode> {
     let y = args.y.as_deref().map(Machine::read).transpose()?.unwrap_or_else(|| x.clone());
@@ -86,7 +112,9 @@ fn table(args: &Args, x: Machine) -> anyhow::Result<ExitCode> {
     let name = if x.name == y.name { x.name.clone() } else { format!("{} and {}", x.name, y.name) };
     let axes = [(of_x, x.signals.motion), (of_y, y.signals.motion)];
     let table = XyTable { name, axes, dt: args.drives.dt, connectors: !args.bare };
-    table.write(&args.fmu)?;
+    let bytes = table.archive()?;
+    read_back(&bytes, "SystemStructure.ssd")?;
+    write_text(&args.fmu, &bytes)?;
     let step = args.drives.dt;
     say_line!("{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s", args.fmu.display(), table.name)?;
     Ok(ExitCode::SUCCESS)

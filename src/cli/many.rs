@@ -65,8 +65,11 @@ impl Many {
         let output = self.output.as_deref().context("no --output folder")?;
         let mut items = find(traces, axis, output)?;
         // A summary that was written among the traces is none of them.
-        let summary = self.summary.as_deref().and_then(|path| path.canonicalize().ok());
+        let summary = self.summary.as_deref().filter(|path| is_summary(path)).and_then(|path| path.canonicalize().ok());
         items.retain(|item| summary.is_none() || item.path.canonicalize().ok() != summary);
+        let inputs =
+            items.iter().map(|item| item.path.as_path()).chain(items.iter().filter_map(|item| item.axis.as_deref()));
+        super::outputs::check(inputs, [self.summary.as_ref()])?;
         for wanted in &self.part {
             anyhow::ensure!(
                 items.iter().any(|item| item.path == *wanted),
@@ -121,6 +124,26 @@ impl Many {
             _ => ExitCode::from(FINDINGS),
         })
     }
+}
+
+/// Whether a file is a summary of an earlier run, by its header or the name of its schema: only that is left out of the traces.
+fn is_summary(path: &Path) -> bool {
+    use std::io::{Read, Seek, SeekFrom};
+    let look = || -> std::io::Result<bool> {
+        let mut file = std::fs::File::open(path)?;
+        let mut first = Vec::new();
+        (&mut file).take(14).read_to_end(&mut first)?;
+        if first == b"machine,trace," {
+            return Ok(true);
+        }
+        // The schema of a Parquet file stands at its end.
+        let length = file.metadata()?.len();
+        file.seek(SeekFrom::Start(length.saturating_sub(1 << 16)))?;
+        let mut last = Vec::new();
+        file.take(1 << 16).read_to_end(&mut last)?;
+        Ok(first.starts_with(b"PAR1") && memchr::memmem::find(&last, b"\x07summary").is_some())
+    };
+    look().unwrap_or(false)
 }
 
 fn progress(traces: u64) -> ProgressBar {

@@ -32,6 +32,9 @@ mod controlled;
 mod diagnosed;
 mod drives;
 mod info3;
+mod examined;
+mod limits;
+mod outputs;
 
 macro_rules! commands {
     ($($(#[$doc:meta])* $name:ident => $module:ident),* $(,)?) => {
@@ -68,6 +71,10 @@ commands! {
     Validate => validate,
     /// List platforms, capabilities, variables and units of any FMU
     Info => info,
+    /// Look at a foreign log and write the axis.toml that reads it
+    Init => init,
+    /// Examine a record before it is believed: dead, stuck, swapped or turned sensors, units, time stamps
+    Inspect => inspect,
     /// Identify the axis from a trace
     Identify => identify,
     /// Diagnose the gap between the model and a measured trace: where, which effect, how far it shrinks
@@ -86,10 +93,17 @@ commands! {
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    outputs::survive_limits();
     match cli.command.run() {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            if let Some(refused) = error.downcast_ref::<examined::Refused>() {
+                let colour = std::io::IsTerminal::is_terminal(&std::io::stdout());
+                let layout = crate::report::terminal::Layout { colour, ..Default::default() };
+                let said = say::say!("{}", crate::report::terminal::blocks(&refused.blocks(), layout));
+                return ExitCode::from(if said.is_ok() { FINDINGS } else { COULD_NOT_RUN });
+            }
+            eprintln!("error: {}", crate::report::format::printable(&format!("{error:#}")));
             ExitCode::from(COULD_NOT_RUN)
         }
     }

@@ -9,6 +9,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::limits;
+use super::outputs;
 use super::say::say_line;
 use crate::fmu::contained::{self, Host, simulate};
 use crate::fmu::isolation;
@@ -167,6 +169,8 @@ fn open(path: &Path) -> anyhow::Result<Model> {
 /// # Errors
 /// When the FMU or the input cannot be used, the FMU stops, or the trace cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let inputs = std::iter::once(args.model.as_path()).chain(args.input.as_deref());
+    outputs::check(inputs, [Some(&args.output)])?;
     if args.controlled {
         return controlled(args);
     }
@@ -197,6 +201,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         outputs: args.outputs,
         rows: if args.step_end { Rows::StepEnd } else { Rows::InputsSet },
     };
+    // What the run would be, where that is asked for: the run itself says what is wrong with it otherwise.
+    let stop = options.stop.or(inputs.time.last().copied());
+    if let (Some(stop), Some(step)) = (stop, options.step.or(inputs.dt))
+        && step > 0.0
+    {
+        let start = options.start.or(inputs.time.first().copied()).unwrap_or(0.0);
+        limits::bearable(((stop - start) / step).max(0.0), 2 + options.outputs.len().max(8))?;
+    }
     let host = Host::new().context("cannot find this program's own file")?;
     let host = Host { sandbox: args.sandbox, call: args.timeout.map(Duration::from_secs_f64), ..host };
     isolation::adopt_orphans();

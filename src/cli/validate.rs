@@ -8,6 +8,7 @@ use std::time::Duration;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::outputs;
 use super::say::say;
 use crate::fmu::contained::Host;
 use crate::fmu::isolation;
@@ -132,6 +133,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let fmu = args.fmu.as_ref().context("no FMU given")?;
+    outputs::check([fmu.as_path()], [args.output.as_ref()])?;
     anyhow::ensure!(args.timeout > 0.0 && args.timeout < 1e6, "--timeout {}: must be above 0", args.timeout);
     anyhow::ensure!(args.budget > 0.0 && args.budget < 1e6, "--budget {}: must be above 0", args.budget);
     for path in &args.allow {

@@ -38,8 +38,9 @@ const MAIN: usize = 1;
 const SIGN: usize = 2;
 const TABLE: usize = 3;
 
-/// Looks at torque and motion; gives the band in which the motion follows, Hz.
-pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
+/// Looks at torque and motion; gives the band in which the motion follows, Hz, and puts down the inertia that moves where it
+/// shows.
+pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
     let torque = input.torque?;
     let n = torque.len();
     let rate = |x: Option<&[f64]>, v: Option<&[f64]>| -> Option<Vec<f64>> {
@@ -74,14 +75,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Option<
         }
     }
     let Some((spectra, lines)) = lines else {
-        findings.push(Finding::new(
-            "not_followed",
-            Severity::Refuse,
-            "T",
-            "The motion does not follow the torque at any frequency.",
-            "The torque comes from another axis, another time or another quantity; or something else moves the axis.",
-            "Map the column of this axis' own torque or current in [signals], logged at the same times.",
-        ));
+        alone(input, &columns, collocated, inertia, findings);
         return None;
     };
     // A line that stands alone passed by chance.
@@ -94,10 +88,50 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Option<
     if table.is_some() {
         encoders(input, &spectra, &lines, findings);
     }
-    weigh(input, &spectra, &lines, collocated, findings);
+    *inertia = weigh(input, &spectra, &lines, collocated, findings);
     excitation(input.nominal, band, findings);
     Some(band)
 }
+
+/// A record without lines that averages could show: too short for its slow motion, or of a foreign torque. The balance is
+/// asked of the record as a whole, at the lines that hold the motion; few lines say nothing.
+fn alone(
+    input: &Input<'_>,
+    columns: &[&[f64]],
+    collocated: bool,
+    inertia: &mut Option<f64>,
+    findings: &mut Vec<Finding>,
+) {
+    let spectra = Spectra::new(columns, columns[0].len() / 2 * 2, input.dt);
+    // Acceleration is noise above the motion's band: the lines that hold nearly all of the speed.
+    let total: f64 = (0..spectra.lines).map(|f| spectra.power(MAIN, f)).sum();
+    let mut sum = 0.0;
+    let lines: Vec<usize> = (0..spectra.lines)
+        .take_while(|f| {
+            let take = sum < 0.98 * total;
+            sum += spectra.power(MAIN, *f);
+            take
+        })
+        .collect();
+    if lines.len() < LEAST_LINES {
+        findings.push(Finding::new(
+            "too_short",
+            Severity::Note,
+            "T",
+            format!(
+                "The motion is so slow, or the record so short, that {} lines of its spectrum hold it.",
+                lines.len()
+            ),
+            "Whether the torque is this axis' own cannot be told from so few.",
+            "Record longer, with more reversals.",
+        ));
+        return;
+    }
+    *inertia = weigh(input, &spectra, &lines, collocated, findings);
+}
+
+/// Lines below which the balance of a record as a whole says nothing: each of its six coefficients takes half a line.
+const LEAST_LINES: usize = 12;
 
 fn power_of_two(n: usize) -> usize {
     if n.is_power_of_two() { n } else { n.next_power_of_two() / 2 }
@@ -393,12 +427,21 @@ impl Balance<'_> {
     }
 }
 
-/// Signs, delay and size of the torque.
-fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool, findings: &mut Vec<Finding>) {
+/// Averages from which a delay is told from the phase of a slow motion.
+const AVERAGED: f64 = 3.0;
+
+/// Signs, delay and size of the torque; gives the inertia that moves, where it makes a part of the torque.
+fn weigh(
+    input: &Input<'_>,
+    s: &Spectra,
+    lines: &[usize],
+    collocated: bool,
+    findings: &mut Vec<Finding>,
+) -> Option<f64> {
     let total: f64 = lines.iter().map(|f| s.power(T, *f)).sum();
     let mut balance = Balance { s, lines, collocated, table: None, total };
     if total <= 0.0 {
-        return;
+        return None;
     }
     let rigid = input.nominal.is_some_and(|n| n.structure == Structure::Rigid);
     let negative = |right: &[f64]| right.iter().map(|r| -r).collect::<Vec<_>>();
@@ -448,9 +491,11 @@ fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool, find
             "Torque and position count in opposite directions: inertia and friction would come out negative.",
             "Give the torque, or all motion, scale = -1 in [signals] of the axis file.",
         ));
-        return;
+        return None;
     }
-    if plus.1.max(turned_anywhere.1) < EXPLAINED {
+    // Six coefficients explain some of any torque: each half a line of a single spectrum, less of an averaged one.
+    let by_chance = 3.0 / (lines.len() as f64 * s.averages);
+    if plus.1.max(turned_anywhere.1) < EXPLAINED + by_chance {
         findings.push(Finding::new(
             "not_followed",
             Severity::Refuse,
@@ -462,10 +507,11 @@ fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool, find
             "The torque comes from another axis, another time or another quantity; or something else moves the axis.",
             "Map the column of this axis' own torque or current in [signals], logged at the same times.",
         ));
-        return;
+        return None;
     }
     let wide = s.omega(lines[lines.len() - 1]) > 2.0 * s.omega(lines[0]);
-    if wide && plus.0.abs() >= LATE && plus.1 > CLEAR && 1.0 - plus.1 < 0.6 * (1.0 - here.1) {
+    let clocked = wide && s.averages >= AVERAGED;
+    if clocked && plus.0.abs() >= LATE && plus.1 > CLEAR && 1.0 - plus.1 < 0.6 * (1.0 - here.1) {
         let late = f64::from(plus.0.abs()) * input.dt;
         let (ahead, behind) = (plus.0 < -AHEAD, plus.0 > BEHIND);
         findings.push(Finding::new(
@@ -485,13 +531,15 @@ fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool, find
             "Log torque and positions in one task; a known delay of the drive belongs into [effects.delay] of the axis file.",
         ));
     }
-    let found = balance.solve(&gram, &at(plus.0));
-    let (Some(nominal), true) = (input.nominal, found.inertial > 0.3) else { return };
+    let found = balance.solve(&gram, &at(if clocked { plus.0 } else { here.0 }));
     let mass = found.x[0] + if collocated { found.x[1] } else { 0.0 };
+    // Shares of the torque from which the inertia shows at all, and from which it speaks of units.
+    let shown = (found.inertial > 0.05 && mass > 0.0 && mass.is_finite()).then_some(mass);
+    let (Some(nominal), true) = (input.nominal, found.inertial > 0.3) else { return shown };
     let p = nominal.parameters;
     let ratio = mass / (p.i1 + p.i2);
     if ratio <= 0.0 || !ratio.is_finite() || (0.2..5.0).contains(&ratio) {
-        return;
+        return shown;
     }
     let unit = super::Motion::unit(input.motion, "kg.m2");
     findings.push(match factor(ratio) {
@@ -512,6 +560,7 @@ fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool, find
             "Check [parameters] and the scale of T in [signals]; `eixo identify` reads the inertia from this record.",
         ),
     });
+    shown
 }
 
 /// Parameters that the band cannot tell.

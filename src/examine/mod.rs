@@ -145,6 +145,8 @@ pub struct Examination {
     pub usable: Vec<Range<usize>>,
     /// Band in which the motion follows the torque, Hz; None where there is none.
     pub band: Option<[f64; 2]>,
+    /// The inertia (mass) that moves, roughly; None where it does not show.
+    pub inertia: Option<f64>,
 }
 
 impl Examination {
@@ -178,14 +180,15 @@ pub fn examine(input: &Input<'_>) -> Examination {
     stamps::examine(input, &mut findings);
     if !numbers(input, &mut findings) || n < 16 {
         finding::sort(&mut findings);
-        return Examination { findings, usable: std::iter::once(0..n).filter(|r| !r.is_empty()).collect(), band: None };
+        let usable = std::iter::once(0..n).filter(|r| !r.is_empty()).collect();
+        return Examination { findings, usable, ..Examination::default() };
     }
     let input = &cut(input, n);
     let bad = channels::examine(input, &mut findings);
     let usable = usable::examine(input, &bad, &mut findings);
     // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.
     let piece = usable.iter().max_by_key(|r| r.len()).cloned().unwrap_or(0..n);
-    let mut band = None;
+    let (mut band, mut inertia) = (None, None);
     if piece.len() >= 64 {
         let mut part = slice(input, &piece);
         part.torque = part.torque.filter(|v| robust::span(v) > 0.0);
@@ -193,10 +196,10 @@ pub fn examine(input: &Input<'_>) -> Examination {
             *channel = channel.filter(|v| robust::span(v) > 0.0);
         }
         pairs::speeds(&part, &mut findings);
-        band = balance::examine(&part, &mut findings);
+        band = balance::examine(&part, &mut inertia, &mut findings);
     }
     finding::sort(&mut findings);
-    Examination { findings, usable, band }
+    Examination { findings, usable, band, inertia }
 }
 
 /// Numbers that can be computed with; says so where they cannot.

@@ -162,7 +162,7 @@ pub(super) fn speeds(input: &Input<'_>, findings: &mut Vec<Finding>) {
             add(
                 findings,
                 "filtered",
-                Severity::Warn,
+                Severity::Note,
                 format!("{speed} follows the derivative of {angle} to {:.0} %.", 100.0 * alike),
                 "It is filtered, late, or coarse.",
                 "It is of little use beside the angle: leave it out of [signals] where estimates with and without it differ.",

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::FleetError;
 
 /// Extensions of traces in a folder; a file that is named is taken whatever its name.
-const EXTENSIONS: [&str; 6] = ["csv", "tsv", "txt", "parquet", "pq", "mat"];
+const EXTENSIONS: [&str; 9] = ["csv", "tsv", "txt", "parquet", "pq", "mat", "xlsx", "npz", "jsonl"];
 /// Most traces of a run.
 const MOST: usize = 1_000_000;
 /// Deepest folder below the one that is named.

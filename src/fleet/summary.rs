@@ -13,6 +13,7 @@ use parquet::schema::types::Type;
 use serde_json::Value;
 
 use super::{FleetError, Placed, store};
+use crate::report::format::printable;
 use crate::trace::{append_number, write_text};
 
 /// A column of the summary.
@@ -83,14 +84,18 @@ pub(super) fn write(path: &Path, facts: &[&str], rows: &[Placed]) -> Result<(), 
     Ok(())
 }
 
+/// Text from outside as a cell: nothing in it steers a terminal or the direction of text, and no spreadsheet takes it for a
+/// formula (OWASP, CSV Injection: an apostrophe before `=`, `+`, `-`, `@`).
+fn plain(text: &str) -> String {
+    let text = printable(text);
+    if text.starts_with(['=', '+', '-', '@', '\u{fffd}']) { format!("'{text}") } else { text.into_owned() }
+}
+
 /// RFC 4180.
 fn csv(columns: &[(String, Column)], rows: usize) -> String {
     let quoted = |text: &str| {
-        if text.contains([',', '"', '\n', '\r']) {
-            format!("\"{}\"", text.replace('"', "\"\""))
-        } else {
-            text.to_owned()
-        }
+        let text = plain(text);
+        if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
     };
     let mut out = columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",");
     out.push('\n');

@@ -1,13 +1,16 @@
 //! What a method's estimates are worth: a simulation against the record, and the torque that they make of the motion.
 
 use super::methods::Run;
-use super::output_error::Free;
+use super::output_error::{Free, OutputError};
 use super::parameters::Estimated;
 use super::result::{ExcitationEstimate, MethodResult, OutputFit, Series};
-use super::run::{Method, torque_unit};
+use super::run::{Method, NOISE_FREE, torque_unit};
 use super::statistics::{deviation, rms, spectrum, whiteness};
-use crate::axis::{Scheme, Structure};
+use crate::axis::{Parameters, Scheme, Structure};
 use crate::trace::{Motion, Signal, Trace};
+
+/// Least samples of a record of which a part is held out.
+const LEAST_PARTED: usize = 192;
 
 impl Run<'_> {
     /// The integration that fits the record: as output error found it, else as asked for.
@@ -40,6 +43,35 @@ impl Run<'_> {
         for ((signal, measured), (_, residual)) in self.outputs.outputs().zip(residuals) {
             result.outputs.push(output_fit(signal, measured, &residual, self.compared, self.machine.signals.motion));
         }
+    }
+
+    /// How well a fit to the first two thirds of the record, started from `p`, follows the last third in free run: the worst
+    /// output, per cent; None for a record too short to be parted.
+    pub fn held_out(&self, p: &Parameters, scheme: Scheme) -> Option<f64> {
+        let n = self.compared.len();
+        if n < LEAST_PARTED || p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
+            return None;
+        }
+        let (rho, structure, effects) = (self.machine.parameters.rho, self.machine.structure, self.machine.effects);
+        let free = Free {
+            parameters: true,
+            offset: self.record.zero_offset != 0.0,
+            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
+        };
+        let (first, rest) = (self.compared.slice(0..2 * n / 3), self.compared.slice(2 * n / 3..n));
+        let fitted = OutputError::new(&first, rho, structure, effects).ok()?.fit(p, scheme, free);
+        let p = fitted.estimated.parameters(rho);
+        if p.check(Structure::TwoInertia).is_err() {
+            return Some(f64::NEG_INFINITY);
+        }
+        let judge = OutputError::new(&rest, rho, structure, effects).ok()?;
+        let residuals = judge.residuals(&judge.fit(&p, scheme, Free { parameters: false, ..free }));
+        // Against the whole record's size: a part in which one output hardly moves says nothing of the fit.
+        let fits = self.outputs.outputs().zip(residuals).map(|((_, measured), (_, r))| {
+            let size = deviation(measured);
+            if rms(&r) <= NOISE_FREE * size { 100.0 } else { 100.0 * (1.0 - rms(&r) / size) }
+        });
+        fits.reduce(f64::min)
     }
 
     /// The torque from the motion (Inverse Problem 2): `I1*a1 + I2*a2` with measured accelerations, else row 1 of (2)

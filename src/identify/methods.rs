@@ -1,5 +1,7 @@
 //! Each method on a record: what it starts from, what it is called, how it ended.
 
+use nalgebra::Matrix4;
+
 use super::frequency::Measured;
 use super::instrumental::instrumental;
 use super::output_error::{Fit, Free, OutputError};
@@ -9,7 +11,7 @@ use super::record::Record;
 use super::regression::{NOISE_ORDER, RegressionError, extended_batch, extended_recursive, least_squares, recursive};
 use super::result::{History, MethodResult};
 use super::run::{Method, Request, hold_name, torque_unit};
-use super::statistics::rms;
+use super::statistics::{rms, whiteness};
 use crate::axis::{Parameters, Scheme, Structure};
 use crate::trace::{Machine, Trace};
 
@@ -146,6 +148,19 @@ impl Run<'_> {
             let with = self.outputs.fit(&best.estimated.parameters(rho), best.scheme, Free { bias: true, ..plain });
             if likelihood(&with, n) - likelihood(&best, n) > (n as f64).ln() + 10.0 {
                 best = with;
+            }
+        }
+        // Where the model leaves something out, the plain standard errors are those of a record of many more samples.
+        let white = || self.outputs.residuals(&best).iter().all(|(_, r)| whiteness(r).white);
+        if !exact
+            && !white()
+            && let (Some(plain), Some(coloured)) = (best.estimated.covariance, self.outputs.coloured(&best))
+        {
+            let factor = |i: usize| (plain[(i, i)] / coloured[(i, i)]).max(1.0).sqrt();
+            let wide = Matrix4::from_fn(|i, j| coloured[(i, j)] * factor(i) * factor(j));
+            if wide.iter().all(|v| v.is_finite()) {
+                best.estimated.covariance = Some(wide);
+                result.notes.push("the residual is not white: the standard errors allow for its colour".to_owned());
             }
         }
         let integration = match best.scheme {

@@ -1,5 +1,6 @@
 //! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
 
+pub mod earned;
 pub mod excitation;
 pub mod frequency;
 pub mod instrumental;

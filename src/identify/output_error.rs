@@ -10,6 +10,8 @@
 //!
 //! Source: L. Ljung, System Identification, 2nd ed., 7.4 (prediction error with an output-error model); paper eq. 2.
 
+mod coloured;
+
 use std::borrow::Cow;
 
 use nalgebra::{DVector, Matrix4, Vector4};

@@ -122,6 +122,15 @@ impl LeastSquares {
         self.count += count;
     }
 
+    /// Share of the accelerations' squares that the equations explain, motor and table; zero where they cannot be solved.
+    pub fn explained(&self) -> [f64; 2] {
+        let of = |triangle: &Triangle, column: usize| {
+            let size = triangle.rms(column).powi(2);
+            triangle.solve().map_or(0.0, |s| if size > 0.0 { 1.0 - s.variance(0) / size } else { 0.0 })
+        };
+        [of(&self.motor, 3), of(&self.table, 2)]
+    }
+
     /// The estimates.
     pub fn rows(&self) -> Result<Rows, RegressionError> {
         long_enough(self.count, 5)?;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::earned::Earned;
 use super::levenberg::Termination;
 use super::parameters::Estimated;
 use super::run::NOISE_FREE;
@@ -26,6 +27,8 @@ pub struct Identification {
     pub methods: Vec<MethodResult>,
     /// Index of the method to trust, and why.
     pub recommended: Option<Recommendation>,
+    /// Whether the record identifies the axis, and what speaks against it.
+    pub earned: Earned,
     /// The measured torque, for plotting, and its spectrum.
     pub torque: Series,
     /// Amplitude spectrum of the measured torque.
@@ -255,8 +258,10 @@ impl MethodResult {
     pub(super) fn judge(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion) {
         self.parameters = estimated.estimates(reference, motion);
         if !estimated.is_physical() {
-            self.notes.push(
-                "the estimates are not physical (an inertia or the stiffness is not positive): noise or an unmodelled \
+            // Numbers of no axis are not shown: they would be read.
+            self.parameters.clear();
+            self.failure = Some(
+                "the estimates are not those of an axis (an inertia or the stiffness is not positive): noise or an unmodelled \
                  effect rules this regression; use OE, or diagnose the record"
                     .to_owned(),
             );

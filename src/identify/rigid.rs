@@ -17,6 +17,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector4};
 
+use super::earned::{Earned, Evidence, SMALL_TORQUE};
 use super::judge::output_fit;
 use super::lsq::triangularise;
 use super::result::{
@@ -65,6 +66,8 @@ pub struct Rigid {
     pub half: usize,
     /// Times of the windows' centres, measured and modelled mean torque.
     pub fit: (Vec<f64>, Vec<f64>, Vec<f64>),
+    /// The regression's rows: regressors of I, D, F, L, then the mean torque.
+    rows: Vec<[f64; 5]>,
 }
 
 /// Why a rigid axis could not be identified.
@@ -156,6 +159,7 @@ fn in_windows(torque: &[f64], theta: &[f64], dt: f64, start: f64, half: usize) -
         std,
         half,
         fit: (centres.iter().map(|k| start + *k as f64 * dt).collect(), rows.iter().map(|r| r[4]).collect(), modelled),
+        rows,
     })
 }
 
@@ -188,6 +192,53 @@ fn units(motion: Motion) -> [&'static str; 4] {
     }
 }
 
+/// Torques at one unit of viscous friction, dry friction and load, as shares of the torque's size.
+fn shares(torque: &[f64], theta: &[f64], dt: f64) -> [f64; 3] {
+    let size = rms(torque).max(f64::MIN_POSITIVE);
+    let span = 8.min(theta.len() - 1).max(1);
+    let speed: Vec<f64> = theta.windows(span + 1).map(|w| (w[span] - w[0]) / (span as f64 * dt)).collect();
+    [rms(&speed) / size, 1.0 / size, 1.0 / size]
+}
+
+/// The estimates, where they are those of an axis. A friction that is negative within its error is none.
+fn physical(mut found: Rigid) -> Result<Rigid, String> {
+    let (v, s) = (&found.values, &found.std);
+    if !v.iter().chain(s.iter()).all(|v| v.is_finite()) || v[0] <= 0.0 {
+        return Err("the inertia comes out negative or without bound: the torque of this record does not accelerate this axis, or \
+                    another torque that the model lacks (gravity, a spring, a second inertia) rules it. Look at the record \
+                    (`eixo inspect`), or diagnose it"
+            .to_owned());
+    }
+    let size = rms(&found.fit.1);
+    for (i, name) in [(1, "viscous friction"), (2, "dry friction")] {
+        // A friction of a share of the torque that counts, in units of the torque where the regressor is a sign.
+        let material = i == 1 || -v[i] > SMALL_TORQUE * size;
+        if v[i] + 3.0 * s[i] < 0.0 && material {
+            return Err(format!(
+                "the {name} comes out negative: something else moves the axis with its motion (gravity, a spring, another drive), \
+                 or torque and position are not of the same instant. Look at the record (`eixo inspect`), or diagnose it"
+            ));
+        }
+    }
+    for i in [1, 2] {
+        found.values[i] = found.values[i].max(0.0);
+    }
+    Ok(found)
+}
+
+/// How well a fit to the first two thirds makes the torque of the last third, per cent.
+fn held_out(torque: &[f64], theta: &[f64], dt: f64) -> Option<f64> {
+    let n = theta.len();
+    let cut = 2 * n / 3;
+    let first = weak_least_squares(&torque[..cut], &theta[..cut], dt, 0.0).ok()?;
+    // The same windows on the rest: the regression's rows there, with the first part's estimates.
+    let rest = in_windows(&torque[cut..], &theta[cut..], dt, 0.0, first.half).ok()?;
+    let error: Vec<f64> =
+        rest.rows.iter().map(|r| r[4] - (0..4).map(|j| r[j] * first.values[j]).sum::<f64>()).collect();
+    let size = rms(&rest.fit.1);
+    (size > 0.0).then(|| 100.0 * (1.0 - rms(&error) / size))
+}
+
 /// `eixo identify` for a rigid axis.
 pub(super) fn identify(
     trace: &Trace,
@@ -204,13 +255,20 @@ pub(super) fn identify(
     result.formulation = "T = I*a + D*w + F*sign(w) + L".to_owned();
     let unit = Signal::T.unit(motion);
     let mut recommended = None;
-    match weak_least_squares(torque, theta, trace.dt, trace.start) {
+    let mut evidence = Evidence::default();
+    let found = weak_least_squares(torque, theta, trace.dt, trace.start).map_err(|e| e.to_string());
+    match found.and_then(physical) {
         Ok(found) => {
             let window = (2 * found.half + 1) as f64 * trace.dt;
             result.formulation =
                 format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
+            evidence = Evidence {
+                held_out: held_out(torque, theta, trace.dt),
+                shares: Some(shares(torque, theta, trace.dt)),
+                explained: None,
+            };
             for (i, name) in names.into_iter().enumerate() {
                 let r = if i == 0 { reference } else { None };
                 result.parameters.push(Estimate::new(name, units(motion)[i], found.values[i], Some(found.std[i]), r));
@@ -236,8 +294,9 @@ pub(super) fn identify(
                     .to_owned(),
             });
         }
-        Err(e) => result.failure = Some(e.to_string()),
+        Err(why) => result.failure = Some(why),
     }
+    let earned = Earned::of(recommended.as_ref().map(|_| &result), evidence);
     Ok(Identification {
         schema: SCHEMA,
         machine: machine.name.clone(),
@@ -245,6 +304,7 @@ pub(super) fn identify(
         trace: summary(trace, file, None),
         methods: vec![result],
         recommended,
+        earned,
         torque: Series::over_time("T", unit, trace.start, trace.dt, torque),
         torque_spectrum: spectrum("T", unit, trace.dt, torque),
         frequency_response: None,

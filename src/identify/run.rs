@@ -1,5 +1,6 @@
 //! One identification from start to finish: every method asked for, its fit, and which one to trust.
 
+use super::earned::{Earned, Evidence};
 use super::frequency;
 use super::methods::Run;
 use super::output_error::OutputError;
@@ -215,6 +216,15 @@ pub fn identify(
         run.judge(result, scheme);
     }
     let recommended = recommend(&methods, record.omega.is_some());
+    progress("held-out part");
+    let held_out =
+        recommended.as_ref().filter(|r| methods[r.method].method != Method::Frequency.name()).and_then(|r| {
+            let name = methods[r.method].method;
+            let p = run.estimates.iter().find(|(n, _)| *n == name)?.1.parameters(machine.parameters.rho);
+            run.held_out(&p, scheme)
+        });
+    let best = recommended.as_ref().map(|r| &methods[r.method]);
+    let earned = Earned::of(best, Evidence { held_out, ..Evidence::default() });
     let frequency_response = measured.as_ref().and_then(|m| {
         let index = recommended.as_ref()?.method;
         let p = run.estimates.iter().find(|(name, _)| *name == methods[index].method)?.1.parameters(1.0);
@@ -229,6 +239,7 @@ pub fn identify(
         trace: summary(trace, file, samples.filter(|_| measured.is_some())),
         methods,
         recommended,
+        earned,
         torque: Series::over_time("T", unit, trace.start, trace.dt, whole.torque),
         torque_spectrum: spectrum("T", unit, trace.dt, whole.torque),
         frequency_response,
@@ -302,8 +313,8 @@ fn recommend(methods: &[MethodResult], speeds: bool) -> Option<Recommendation> {
         let why = if white {
             "its residuals are white: the model explains the record down to the noise"
         } else {
-            "it follows the record best; its residuals are not white, so its standard errors are too small: diagnose \
-             the record for what the model leaves out"
+            "it follows the record best; its residuals are not white, which its standard errors allow for: diagnose the \
+             record for what the model leaves out"
         };
         return Some(Recommendation { method: *index, why: why.to_owned() });
     }

@@ -10,6 +10,7 @@
 
 use std::borrow::Cow;
 
+use super::earned::{Earned, Evidence};
 use super::lsq::BLOCK;
 use super::parameters::Estimated;
 use super::record::{DIFFERENT_ZEROS, Record};
@@ -178,6 +179,8 @@ pub fn identify(
         methods.push(judged(method, found, machine, request, &frame));
     }
     let best = methods.iter().position(|m| !m.modal.is_empty());
+    let explained = Some(squares.explained());
+    let earned = Earned::of(best.map(|k| &methods[k]), Evidence { explained, ..Evidence::default() });
     let unit = Signal::T.unit(motion);
     let at = stream.frame();
     Ok(Identification {
@@ -201,6 +204,7 @@ pub fn identify(
                   (--method oe) on a part cut out with --from and --to, without --stream"
                 .to_owned(),
         }),
+        earned,
         torque: Series {
             name: "T".to_owned(),
             x_unit: "s",

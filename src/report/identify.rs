@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, Shape};
 use super::format::{self, Medium};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
+use crate::identify::earned::FOLLOWS;
 use crate::identify::result::{
     Estimate, FrequencyResponse, Identification, MethodResult, OutputFit, ResponseOf, Series as Curve,
 };
@@ -95,7 +96,7 @@ fn recommended(found: &Identification) -> Option<&MethodResult> {
 }
 
 fn verdict(found: &Identification) -> Verdict {
-    let Some(best) = recommended(found) else {
+    let Some(best) = recommended(found).filter(|m| !m.parameters.is_empty()) else {
         return Verdict {
             tone: Tone::Unsure,
             sentence: "No method could identify the axis from this trace.".to_owned(),
@@ -126,19 +127,35 @@ fn verdict(found: &Identification) -> Verdict {
         ),
         None => format!("{} identifies the axis.", best.title),
     };
-    let poor = worst.filter(|o| o.fit_percent < 50.0);
-    let tone = if poor.is_some() { Tone::Unsure } else { Tone::Neutral };
-    let sentence = poor.map_or(sentence, |o| {
-        format!(
+    let earned = &found.earned;
+    let tone = if earned.identified { Tone::Neutral } else { Tone::Unsure };
+    let poor = worst.filter(|o| o.fit_percent < FOLLOWS);
+    let sentence = match poor {
+        _ if earned.identified => sentence,
+        Some(o) if o.fit_percent > 0.0 => format!(
             "The model does not follow the machine: with the estimates of {} its simulation follows {} to {} only.",
             best.title,
             o.signal.name(),
             fit_percent(o.fit_percent)
-        )
-    });
+        ),
+        Some(o) => format!(
+            "The model does not follow the machine: with the estimates of {} its simulation is further from {} than its mean.",
+            best.title,
+            o.signal.name()
+        ),
+        None => format!("{} does not identify the axis from this record.", best.title),
+    };
+    let known = best.modal.iter().chain(best.parameters.iter()).filter(|e| is_shown(e));
     let figures =
-        best.modal.iter().chain(best.parameters.iter()).take(4).map(|e| (e.name.to_owned(), value(e))).collect();
-    let detail = found.recommended.as_ref().map_or_else(String::new, |r| sentence_of(&r.why));
+        if earned.identified { known.take(4).map(|e| (e.name.to_owned(), value(e))).collect() } else { Vec::new() };
+    let detail = if earned.identified {
+        found.recommended.as_ref().map_or_else(String::new, |r| sentence_of(&r.why))
+    } else {
+        let mut words = earned.doubts.clone();
+        words.push(earned.advice.clone());
+        words.retain(|w| !w.is_empty());
+        words.join(" ")
+    };
     Verdict { tone, sentence, detail, figures }
 }
 
@@ -154,7 +171,15 @@ fn fit_percent(fit: f64) -> String {
     format::percent(fit / 100.0, Medium::Page)
 }
 
+/// Whether an estimate is one: finite, and larger than its standard error.
+fn is_shown(e: &Estimate) -> bool {
+    e.value.is_finite() && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
+}
+
 fn value(e: &Estimate) -> Cell {
+    if !is_shown(e) {
+        return Cell::text("not determined");
+    }
     match e.std {
         Some(std) => Cell::Estimate(e.value, std, e.unit.to_owned()),
         None => Cell::Number(e.value, 5, e.unit.to_owned()),
@@ -171,8 +196,11 @@ fn estimates(m: &MethodResult) -> Table {
     }
     let mut table = Table::new(format!("Estimates of {} ({})", m.title, m.formulation), columns);
     for e in all {
-        let mut cells =
-            vec![Cell::text(e.name), value(e), e.std.map_or(Cell::Empty, |s| Cell::Percent((s / e.value).abs()))];
+        let mut cells = vec![
+            Cell::text(e.name),
+            value(e),
+            e.std.filter(|_| is_shown(e) && e.value != 0.0).map_or(Cell::Empty, |s| Cell::Percent((s / e.value).abs())),
+        ];
         if reference {
             cells.push(e.reference.map_or(Cell::Empty, |r| Cell::Number(r, 5, e.unit.to_owned())));
             cells.push(e.error_percent.map_or(Cell::Empty, |p| Cell::Percent(p / 100.0)));
@@ -201,7 +229,13 @@ fn fits(found: &Identification) -> Table {
         let mut cells = vec![Cell::text(&*m.title)];
         for s in &signals {
             let fit = m.outputs.iter().find(|o| o.signal == *s);
-            cells.push(fit.map_or(Cell::Empty, |o| Cell::Percent(o.fit_percent / 100.0)));
+            cells.push(fit.map_or(Cell::Empty, |o| {
+                if o.fit_percent >= -100.0 {
+                    Cell::Percent(o.fit_percent / 100.0)
+                } else {
+                    Cell::text("does not follow")
+                }
+            }));
         }
         let coloured: Vec<&str> =
             m.outputs.iter().filter(|o| !o.whiteness.white && !o.is_rounding()).map(|o| o.signal.name()).collect();

@@ -9,6 +9,7 @@ pub mod chart;
 pub mod circle;
 pub mod demo;
 pub mod diagnose;
+pub mod examine;
 pub mod format;
 pub mod html;
 pub mod identify;

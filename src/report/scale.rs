@@ -24,7 +24,8 @@ pub(super) struct Scale {
 impl Scale {
     /// The scale for finite `values`, with about `wanted` ticks. `pad` widens automatic limits on both sides.
     pub fn new(axis: &Axis, values: impl Iterator<Item = f64> + Clone, wanted: usize, pad: f64) -> Self {
-        let usable = values.filter(|v| v.is_finite() && (!axis.log || *v > 0.0));
+        // Numbers near the ends of the floating point have no room for ticks around them.
+        let usable = values.filter(|v| v.abs() < 1e150 && (!axis.log || *v > 1e-150));
         let mut low = f64::INFINITY;
         let mut high = f64::NEG_INFINITY;
         match axis.range {

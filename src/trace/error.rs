@@ -25,6 +25,21 @@ pub enum TraceError {
         /// Why.
         reason: std::io::Error,
     },
+    /// A result that is no number.
+    #[error(
+        "{path}: column {column}, row {row} would be {value}: nothing is written. A value without bound comes from a model \
+             that ran away, or from settings too large for it"
+    )]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// Row of data, from 1.
+        row: usize,
+        /// What it would be.
+        value: f64,
+    },
     /// There is no header row, or no data.
     #[error("{file}: {what}")]
     NoTable {
@@ -43,8 +58,12 @@ pub enum TraceError {
     },
     /// A row has too few or too many fields.
     #[error(
-        "{file}: row {line}: {found} fields where the header has {expected}; complete or delete the row (a logger \
-         that was stopped often leaves its last row cut off)"
+        "{file}: row {line}: {found} fields where the header has {expected}; {}",
+        if *found > *expected {
+            "take the extra separators out, or, where numbers have decimal commas, separate the columns with semicolons"
+        } else {
+            "complete or delete the row (a logger that was stopped often leaves its last row cut off)"
+        }
     )]
     Ragged {
         /// The file.
@@ -59,7 +78,7 @@ pub enum TraceError {
     /// A cell of a column in use is not a finite number.
     #[error(
         "{file}: row {line}, column {column}: {text:?} is not a finite number; cut the trace before or after that \
-         row, or mend the value"
+         row (--from, --to), or mend the value"
     )]
     Cell {
         /// The file.
@@ -190,10 +209,24 @@ pub enum TraceError {
         /// Samples needed.
         needed: usize,
     },
+    /// What `--from` and `--to` leave is too short.
+    #[error(
+        "{file}: --from and --to leave {found} samples of {rows}, at least {needed} are needed; take a longer part"
+    )]
+    Cut {
+        /// The file.
+        file: String,
+        /// Samples that are left.
+        found: usize,
+        /// Samples of the file.
+        rows: usize,
+        /// Samples needed.
+        needed: usize,
+    },
     /// A signal that the caller cannot do without.
     #[error(
-        "the trace has no signal {signal} (it has: {present}); add the column, or map one to it in [signals] of the \
-         axis file"
+        "the trace has no signal {signal} (it has: {present}); add the column, map one to it in [signals] of the axis file, or, \
+         with one encoder alone, describe the axis as structure = \"rigid\""
     )]
     MissingSignal {
         /// The signal.

@@ -1,4 +1,5 @@
-//! Traces of the axis: sampled signals in memory, their files (CSV, Parquet, MATLAB 5), and the machine description `axis.toml`.
+//! Traces of the axis: sampled signals in memory, their files (CSV, Excel, Parquet, MATLAB 5, NumPy,
+//! JSON, logs of LinuxCNC and TwinCAT), and the machine description `axis.toml`.
 //!
 //! A [`Trace`] is one uniformly sampled record: `time(k) = start + k*dt`, never accumulated. Everything is SI: T in N.m
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
@@ -6,9 +7,12 @@
 
 mod csv;
 mod error;
+mod forms;
+pub mod guess;
 mod load;
 pub mod machine;
 mod mat;
+mod packed;
 mod parquet;
 mod sampling;
 mod signal;
@@ -29,7 +33,7 @@ pub use signal::{Motion, Quantity, Signal};
 pub use table::{Header, Table};
 pub use units::Unit;
 pub(crate) use write::append_number;
-pub use write::{write_columns, write_csv, write_text};
+pub use write::{writable, write_columns, write_csv, write_text};
 
 /// One uniformly sampled record of the axis, SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,6 +78,11 @@ impl Trace {
                 Ok(())
             }
         }
+    }
+
+    /// Puts a signal in whatever its length: the others follow.
+    fn put(&mut self, signal: Signal, values: Vec<f64>) {
+        self.columns[signal.index()] = Some(values);
     }
 
     /// Takes a signal out of the record.

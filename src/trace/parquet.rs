@@ -5,13 +5,16 @@
 //! number. A unit stands in brackets behind the column's name, as in CSV.
 
 use std::fs::File;
+use std::sync::Arc;
 
-use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
+use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::DataType;
+use parquet::data_type::{DataType, DoubleType};
 use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use parquet::schema::types::ColumnDescriptor;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::{ColumnDescriptor, Type as SchemaType};
 
 use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table, header};
@@ -278,4 +281,34 @@ fn numbers<T: DataType>(
         fault = values.iter().position(|v| !v.is_finite()).map(|row| (row, values[row].to_string()));
     }
     Ok(Batch { values, fault })
+}
+/// Columns of numbers as a file, one row group, shorter columns ending in nulls.
+pub(super) fn pack(columns: &[(&str, &[f64])], path: &std::path::Path) -> Result<Vec<u8>, TraceError> {
+    let rows = columns.iter().map(|(_, v)| v.len()).max().unwrap_or(0);
+    let made = || -> Result<Vec<u8>, ParquetError> {
+        let mut fields = Vec::with_capacity(columns.len());
+        for (name, _) in columns {
+            let field = SchemaType::primitive_type_builder(name, Type::DOUBLE).with_repetition(Repetition::OPTIONAL);
+            fields.push(Arc::new(field.build()?));
+        }
+        let schema = Arc::new(SchemaType::group_type_builder("trace").with_fields(fields).build()?);
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_created_by(format!("eixo {}", env!("CARGO_PKG_VERSION")))
+            .build();
+        let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
+        let mut group = writer.next_row_group()?;
+        for (_, values) in columns {
+            let Some(mut own) = group.next_column()? else { break };
+            let levels: Vec<i16> = (0..rows).map(|k| i16::from(k < values.len())).collect();
+            own.typed::<DoubleType>().write_batch(values, Some(&levels), None)?;
+            own.close()?;
+        }
+        group.close()?;
+        writer.into_inner()
+    };
+    made().map_err(|e| TraceError::Format {
+        file: path.display().to_string(),
+        what: format!("cannot make the Parquet file: {e}"),
+    })
 }

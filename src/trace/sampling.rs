@@ -143,6 +143,42 @@ impl Decimals {
     }
 }
 
+/// Values at the `samples` times of a grid that the stamps lie anyhow to. A smooth signal by the cubic through the four
+/// samples around each time (Lagrange); a held one keeps the value of the last stamp.
+#[must_use]
+pub fn resample_far(time: &[f64], values: &[f64], grid: &Grid, samples: usize, held: bool) -> Vec<f64> {
+    let n = time.len();
+    let mut below = 0;
+    (0..samples)
+        .map(|k| {
+            let t = grid.start + k as f64 * grid.dt;
+            while below + 1 < n && time[below + 1] <= t {
+                below += 1;
+            }
+            if held {
+                return values[below];
+            }
+            let first = below.saturating_sub(1).min(n.saturating_sub(4));
+            lagrange(time, values, first..(first + 4).min(n), t)
+        })
+        .collect()
+}
+
+/// The polynomial through the points of a range, at time `t`.
+fn lagrange(time: &[f64], values: &[f64], points: std::ops::Range<usize>, t: f64) -> f64 {
+    let mut sum = 0.0;
+    for i in points.clone() {
+        let mut weight = 1.0;
+        for j in points.clone() {
+            if i != j {
+                weight *= (t - time[j]) / (time[i] - time[j]);
+            }
+        }
+        sum += weight * values[i];
+    }
+    sum
+}
+
 /// Values of a smooth signal on the grid, by the cubic through the four samples around each grid time (Lagrange).
 ///
 /// `time` and `values` have the same length, at least four; the time stamps lie within half an interval of the grid.
@@ -154,18 +190,7 @@ pub fn resample(time: &[f64], values: &[f64], grid: &Grid) -> Vec<f64> {
             let t = grid.start + k as f64 * grid.dt;
             let below = if time[k] <= t { k } else { k.saturating_sub(1) };
             let first = below.saturating_sub(1).min(n.saturating_sub(4));
-            let points = first..(first + 4).min(n);
-            let mut sum = 0.0;
-            for i in points.clone() {
-                let mut weight = 1.0;
-                for j in points.clone() {
-                    if i != j {
-                        weight *= (t - time[j]) / (time[i] - time[j]);
-                    }
-                }
-                sum += weight * values[i];
-            }
-            sum
+            lagrange(time, values, first..(first + 4).min(n), t)
         })
         .collect()
 }

@@ -58,13 +58,12 @@ impl Rows {
                 open.rewind().and_then(|()| open.take(BLOCK as u64).read_to_end(&mut bytes)).map_err(failed)?;
                 csv::Head::find(csv::unmarked(&bytes), &file)?.headers
             }
-            Kind::Mat => {
+            Kind::Mat | Kind::Packed => {
                 return Err(TraceError::Format {
                     file,
-                    what:
-                        "a MATLAB file holds its columns one behind the other and is not streamed; leave --stream out \
-                           (it is at most 2 GiB), or write it as Parquet or CSV"
-                            .to_owned(),
+                    what: "a file of this form is not streamed; leave --stream out (it is at most 2 GiB), or write it as Parquet \
+                           or CSV"
+                        .to_owned(),
                 });
             }
         };
@@ -234,6 +233,38 @@ impl Stream {
     /// The signals of the record.
     pub fn signals(&self) -> impl Iterator<Item = Signal> + '_ {
         self.signals.iter().map(|(s, _)| *s)
+    }
+
+    /// The first `most` samples of the record, or all of a shorter one.
+    ///
+    /// # Errors
+    /// As [`Self::each`].
+    pub fn head(&self, most: usize) -> Result<Trace, TraceError> {
+        let mut head: Option<Trace> = None;
+        let mut whole = false;
+        let read = self.each(|_, piece| {
+            head = Some(match head.take() {
+                None => piece,
+                Some(mut all) => {
+                    for signal in Signal::ALL {
+                        if let (Some(mut values), Some(more)) = (all.remove(signal), piece.get(signal)) {
+                            values.extend_from_slice(more);
+                            all.put(signal, values);
+                        }
+                    }
+                    all
+                }
+            });
+            whole = head.as_ref().is_some_and(|h| h.len() >= most);
+            // What follows is not read: the error ends the pass and goes no further.
+            if whole { Err(TraceError::Length { signal: "", found: 0, expected: 0 }) } else { Ok(()) }
+        });
+        match (head, read) {
+            (Some(head), Ok(())) => Ok(head),
+            (Some(head), Err(_)) if whole => Ok(head.slice(0..most.min(head.len()))),
+            (_, Err(error)) => Err(error),
+            (None, Ok(())) => Ok(self.empty.clone()),
+        }
     }
 
     /// The record from its first sample to its last: `take(index of the first sample, samples)`.

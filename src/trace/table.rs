@@ -1,16 +1,23 @@
-//! A file of named numeric columns: CSV, Parquet or MATLAB 5, told apart by its first bytes and not by its name.
+//! A file of named numeric columns, whatever its form: told by its first bytes and not by its name.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use super::error::TraceError;
-use super::{csv, mat, parquet};
+use super::forms::Form;
+use super::signal::Signal;
+use super::units::Unit;
+use super::{csv, forms, guess, mat, packed, parquet};
 
 /// Most columns a file may have.
 pub(super) const MAX_COLUMNS: usize = 4096;
 /// Most numbers that a packed file may unfold to (2 GiB of them): a small file can claim any size.
 pub(super) const MAX_CELLS: usize = 1 << 28;
+/// Most bytes that are read from standard input.
+const MAX_INPUT: u64 = 4 << 30;
+/// What standard input is called.
+const INPUT: &str = "standard input";
 pub(super) const EXAMPLE: &str =
     "a trace file begins with a header row such as: time [s],T [N.m],theta1 [rad],theta2 [rad]";
 
@@ -23,6 +30,8 @@ pub(super) enum Kind {
     Parquet,
     /// MATLAB 5 to 7.2.
     Mat,
+    /// An archive of NumPy arrays, or an Excel workbook.
+    Packed,
 }
 
 impl Kind {
@@ -30,6 +39,15 @@ impl Kind {
     pub fn of(first: &[u8], file: &str) -> Result<Self, TraceError> {
         if first.starts_with(b"PAR1") {
             return Ok(Self::Parquet);
+        }
+        if first.starts_with(b"PK\x03\x04") {
+            return Ok(Self::Packed);
+        }
+        if first.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1") {
+            return Err(TraceError::Format {
+                file: file.to_owned(),
+                what: "an old Excel workbook (.xls); save it as .xlsx or CSV".to_owned(),
+            });
         }
         if first.starts_with(b"\x89HDF\r\n\x1a\n") || first.starts_with(b"MATLAB 7.3") {
             return Err(TraceError::Format {
@@ -93,29 +111,51 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads a file: CSV, Parquet or MATLAB 5.
+    /// Reads a file of any form; `-` is standard input.
     ///
     /// # Errors
     /// When it cannot be read, has no header, or a row has too few or too many fields.
     pub fn read(path: &Path) -> Result<Self, TraceError> {
         let file = path.display().to_string();
         let failed = |reason| TraceError::Read { path: path.to_owned(), reason };
+        if path == Path::new("-") {
+            let mut bytes = Vec::new();
+            std::io::stdin().lock().take(MAX_INPUT + 1).read_to_end(&mut bytes).map_err(failed)?;
+            if bytes.len() as u64 > MAX_INPUT {
+                let what = format!("more than {MAX_INPUT} bytes; give the record as a file");
+                return Err(TraceError::Format { file: INPUT.to_owned(), what });
+            }
+            return Self::parse(&bytes, INPUT);
+        }
+        let no_record = |what: &str| Err(TraceError::Format { file: file.clone(), what: what.to_owned() });
+        if path.is_dir() {
+            return no_record(
+                "it is a folder; give a trace in it, or all of them to identify or diagnose with --output",
+            );
+        }
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            return no_record("it is an axis file, not a record; it goes behind --axis");
+        }
         let (kind, open) = Kind::open(path)?;
         match kind {
             Kind::Parquet => parquet::read(open, &file),
-            Kind::Csv => csv::parse(&std::fs::read(path).map_err(failed)?, &file),
-            Kind::Mat => mat::parse(&std::fs::read(path).map_err(failed)?, &file),
+            _ => Self::parse(&std::fs::read(path).map_err(failed)?, &file),
         }
     }
 
-    /// Reads the bytes of a CSV or MATLAB 5 file; `file` names it in messages.
+    /// Reads the bytes of a file that is no Parquet; `file` names it in messages.
     ///
     /// # Errors
     /// When there is no header, or a row has too few or too many fields.
     pub fn parse(bytes: &[u8], file: &str) -> Result<Self, TraceError> {
         match Kind::of(&bytes[..bytes.len().min(128)], file)? {
-            Kind::Csv => csv::parse(bytes, file),
+            Kind::Csv => match forms::of(bytes, file)? {
+                Form::Plain => csv::parse(bytes, file),
+                Form::Csv(text) => csv::parse(&text, file),
+                Form::Table(table) => Ok(table),
+            },
             Kind::Mat => mat::parse(bytes, file),
+            Kind::Packed => packed::read(bytes, file),
             Kind::Parquet => Err(TraceError::Format {
                 file: file.to_owned(),
                 what: "a Parquet file where text is expected; give it by its path".to_owned(),
@@ -136,10 +176,27 @@ impl Table {
         last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
     }
 
-    /// The column of that name.
+    /// The column of that name; with its unit behind it, as the file writes it, it is the same.
     #[must_use]
     pub fn position(&self, name: &str) -> Option<usize> {
-        self.headers.iter().position(|h| h.name == name)
+        let at = |name: &str| self.headers.iter().position(|h| h.name == name);
+        at(name).or_else(|| {
+            let parsed = header(name);
+            parsed.unit.as_ref()?;
+            at(&parsed.name)
+        })
+    }
+
+    /// The column that has a signal's own name, a unit behind it or not: `theta1`, `Theta1`, `theta1_deg`.
+    #[must_use]
+    pub(super) fn own(&self, signal: Signal) -> Option<usize> {
+        let name = signal.name();
+        self.position(name).or_else(|| {
+            // T and t are two things; a longer name is one however it is written.
+            let alike = |given: &str| given == name || (name.len() > 1 && given.eq_ignore_ascii_case(name));
+            let with_unit = |h: &Header| guess::suffix(&h.name).is_some_and(|(stem, _)| alike(stem));
+            self.headers.iter().position(|h| alike(&h.name) || with_unit(h))
+        })
     }
 
     /// The values of a column, all finite.
@@ -153,6 +210,19 @@ impl Table {
         }
     }
 
+    /// The values of some rows of a column, all finite.
+    ///
+    /// # Errors
+    /// [`TraceError::Cell`] when a cell among them is no finite number.
+    pub(super) fn part(&self, index: usize, rows: &std::ops::Range<usize>) -> Result<&[f64], TraceError> {
+        let values = &self.columns[index][rows.clone()];
+        let Some(fault) = &self.faults[index] else { return Ok(values) };
+        let Some(first) = values.iter().position(|v| !v.is_finite()) else { return Ok(values) };
+        let line = self.line(rows.start + first);
+        let text = if line == fault.line { fault.text.clone() } else { "that cell".to_owned() };
+        Err(Fault { line, text }.named(&self.file, &self.headers[index].name))
+    }
+
     /// The names of all columns, for a message.
     #[must_use]
     pub fn names(&self) -> String {
@@ -160,9 +230,27 @@ impl Table {
     }
 }
 
-/// `theta1 [rad]` into name and unit.
+/// `theta1 [rad]` into name and unit; `theta1 (rad)` and `theta1/rad` where what is behind is a unit.
 pub(super) fn header(field: &str) -> Header {
     let field = field.trim();
+    let parted = |name: &str, unit: &str| Header { name: name.trim().to_owned(), unit: Some(unit.trim().to_owned()) };
+    let inner =
+        |text: &str| text.trim().strip_prefix('(').and_then(|t| t.strip_suffix(')')).unwrap_or(text.trim()).to_owned();
+    if let Some((name, rest)) = field.split_once('(')
+        && let Some(unit) = rest.trim_end().strip_suffix(')')
+        && !name.trim().is_empty()
+        && Unit::parse(unit).is_some()
+    {
+        return parted(name.trim_end().trim_end_matches('/'), unit);
+    }
+    if let Some((name, unit)) = field.split_once('/')
+        && !field.contains('[')
+        && Unit::parse(name).is_none()
+        && !name.trim().is_empty()
+        && Unit::parse(&inner(unit)).is_some()
+    {
+        return parted(name, &inner(unit));
+    }
     if let Some((name, rest)) = field.split_once('[')
         && let Some(unit) = rest.trim_end().strip_suffix(']')
     {

@@ -32,6 +32,21 @@ pub fn write_csv(path: &Path, trace: &Trace, motion: Motion) -> Result<(), Trace
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
 pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), TraceError> {
+    // A number without bound is no result: a reader would refuse the file, a spreadsheet would not say why.
+    for (name, values) in columns {
+        if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+            return Err(TraceError::NotFinite {
+                path: path.to_owned(),
+                column: (*name).to_owned(),
+                row: row + 1,
+                value: values[row],
+            });
+        }
+    }
+    let end = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if matches!(end.as_str(), "parquet" | "pq") {
+        return write_text(path, &super::parquet::pack(columns, path)?);
+    }
     let rows = columns.iter().map(|(_, v)| v.len()).max().unwrap_or(0);
     let mut text = String::with_capacity((rows + 1) * columns.len() * 20);
     text.push_str(&columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(","));
@@ -62,14 +77,82 @@ pub(crate) fn append_number(text: &mut String, value: f64) {
 /// Writes a whole file at once: beside the target first, then renamed. A file that stands under the final name is complete,
 /// or as it was before, whenever the process ends; what an ended process left beside it is taken away by the next one.
 ///
+/// `-` is standard output. A device or a pipe is written through; a symbolic link is followed; a file that is there keeps its
+/// mode.
+///
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
 pub fn write_text(path: &Path, bytes: &[u8]) -> Result<(), TraceError> {
     let failed = |reason| TraceError::Write { path: path.to_owned(), reason };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let mut pending = Pending::in_folder(folder).map_err(failed)?;
-    pending.file.write_all(bytes).map_err(failed)?;
-    pending.persist(path).map_err(failed)
+    match Target::of(path).map_err(failed)? {
+        Target::Output => {
+            let mut out = std::io::stdout().lock();
+            out.write_all(bytes).and_then(|()| out.flush()).map_err(failed)
+        }
+        Target::Through(to) => {
+            let mut file = std::fs::OpenOptions::new().write(true).open(to).map_err(failed)?;
+            file.write_all(bytes).and_then(|()| file.flush()).map_err(failed)
+        }
+        Target::File(to) => {
+            let mut pending = Pending::in_folder(folder_of(&to)).map_err(failed)?;
+            pending.file.write_all(bytes).map_err(failed)?;
+            if let Ok(before) = std::fs::metadata(&to) {
+                pending.file.as_file().set_permissions(before.permissions()).map_err(failed)?;
+            }
+            pending.persist(&to).map_err(failed)
+        }
+    }
+}
+
+/// Whether an output could be written: its folder is there and takes a file, and it is no folder itself. Nothing is changed.
+///
+/// # Errors
+/// [`TraceError::Write`].
+pub fn writable(path: &Path) -> Result<(), TraceError> {
+    let failed = |reason| TraceError::Write { path: path.to_owned(), reason };
+    match Target::of(path).map_err(failed)? {
+        Target::Output => Ok(()),
+        Target::Through(to) => std::fs::OpenOptions::new().write(true).open(to).map(|_| ()).map_err(failed),
+        Target::File(to) => Pending::in_folder(folder_of(&to)).map(Pending::forget).map_err(failed),
+    }
+}
+
+/// Where an output goes.
+#[derive(Debug, PartialEq, Eq)]
+enum Target {
+    /// Standard output.
+    Output,
+    /// A device, a pipe, an open file of this process: written through.
+    Through(PathBuf),
+    /// A file, links followed.
+    File(PathBuf),
+}
+
+impl Target {
+    fn of(path: &Path) -> std::io::Result<Self> {
+        if path == Path::new("-") {
+            return Ok(Self::Output);
+        }
+        let mut at = path.to_owned();
+        // As many links as Linux follows.
+        for _ in 0..40 {
+            let Ok(link) = std::fs::read_link(&at) else { break };
+            // /dev/stdout and its like: what the shell opened must not be replaced by another file of that name.
+            if at.starts_with("/proc") || at.starts_with("/dev/fd") {
+                return Ok(Self::Through(path.to_owned()));
+            }
+            at = folder_of(&at).join(link);
+        }
+        match std::fs::metadata(&at) {
+            Ok(there) if there.is_dir() => Err(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder")),
+            Ok(there) if !there.is_file() => Ok(Self::Through(at)),
+            _ => Ok(Self::File(at)),
+        }
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
 /// What begins the name of a file on its way.
@@ -101,6 +184,14 @@ impl Pending {
         let file = builder.prefix(&prefix).tempfile_in(folder)?;
         all.push(file.path().to_owned());
         Ok(Self { file })
+    }
+
+    /// Takes the file away again.
+    fn forget(self) {
+        let temporary = self.file.path().to_owned();
+        let mut all = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(self.file);
+        all.retain(|p| *p != temporary);
     }
 
     fn persist(self, path: &Path) -> std::io::Result<()> {
@@ -209,6 +300,48 @@ mod tests {
         write_text(&folder.path().join("result.csv"), b"whole").unwrap();
         assert!(!gone.exists());
         kept.iter().for_each(|path| assert!(path.exists(), "{}", path.display()));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_modes_stay_and_devices_are_written_through() {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("real.csv"), "old").unwrap();
+        std::fs::set_permissions(at("real.csv"), std::fs::Permissions::from_mode(0o640)).unwrap();
+        symlink("real.csv", at("link.csv")).unwrap();
+        symlink("not-yet.csv", at("dangling.csv")).unwrap();
+        write_text(&at("link.csv"), b"new").unwrap();
+        write_text(&at("dangling.csv"), b"new").unwrap();
+        assert!(std::fs::symlink_metadata(at("link.csv")).unwrap().is_symlink());
+        assert_eq!(std::fs::read(at("real.csv")).unwrap(), b"new");
+        assert_eq!(std::fs::read(at("not-yet.csv")).unwrap(), b"new");
+        assert_eq!(std::fs::metadata(at("real.csv")).unwrap().mode() & 0o777, 0o640);
+        write_text(Path::new("/dev/null"), b"gone").unwrap();
+        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+        if Path::new("/dev/full").exists() {
+            let full = write_text(Path::new("/dev/full"), b"x").unwrap_err().to_string();
+            assert!(full.contains("/dev/full"), "{full}");
+        }
+        assert!(write_text(folder.path(), b"x").unwrap_err().to_string().contains("folder"));
+        writable(&at("fresh.csv")).unwrap();
+        assert!(!at("fresh.csv").exists() && writable(&at("no/fresh.csv")).is_err());
+        let names = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(names, 4, "no file of its own is left");
+    }
+
+    #[test]
+    fn numbers_without_bound_are_not_written_and_a_parquet_name_makes_parquet() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let error = write_columns(&at("a.csv"), &[("T", &[1.0, f64::NAN])]).unwrap_err().to_string();
+        assert!(error.contains("column T") && error.contains("row 2"), "{error}");
+        assert!(!at("a.csv").exists());
+        let values: Vec<f64> = (0..40).map(f64::from).collect();
+        write_columns(&at("a.parquet"), &[("time [s]", &values), ("T [N.m]", &values)]).unwrap();
+        let trace = load(&at("a.parquet"), &Mapping::default()).unwrap().trace;
+        assert_eq!(trace.get(Signal::T).unwrap(), values);
     }
 
     #[test]

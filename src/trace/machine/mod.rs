@@ -113,7 +113,17 @@ impl Machine {
             "axis file",
         )?;
         let name = match root.get("name") {
-            Some(value) => reader.text(value, "name")?.to_owned(),
+            Some(value) => {
+                let name = reader.text(value, "name")?;
+                // It goes into XML, file names and the terminal.
+                if name.chars().any(|c| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')) {
+                    return Err(reader.error(
+                        root.line("name"),
+                        "name holds a control character, which XML does not allow; write plain text",
+                    ));
+                }
+                name.to_owned()
+            }
             None => Path::new(file).file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
         };
         let Some(parameters) = root.table(&reader, "parameters")? else {
@@ -296,6 +306,7 @@ fn column(
     torque: bool,
 ) -> Result<(Column, Option<Hold>), MachineError> {
     if value.as_ref().is_str() {
+        // An empty name: the log has no such signal, whatever its columns are called.
         return Ok((Column::named(reader.text(value, name)?), None));
     }
     let table = reader.table(value, name)?;

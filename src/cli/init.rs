@@ -1,0 +1,356 @@
+//! `eixo init`: from a foreign log to the axis.toml that reads it.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, IsTerminal, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use super::outputs;
+use super::say::{say, say_line};
+use crate::axis::Structure;
+use crate::examine::{Examination, Input, examine};
+use crate::identify::run::{Request, identify};
+use crate::report::examine::{Inspected, findings, report, verdict};
+use crate::report::{Block, Cell, Table as Shown, html, terminal};
+use crate::trace::guess::{Guess, Role, SURE, guess};
+use crate::trace::{Machine, Motion, Quantity, Signal, Table, Trace, from_table, write_text};
+
+/// Arguments of `eixo init`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  eixo init log.csv
+  eixo init servo.xlsx --yes -o x.toml")]
+pub struct Args {
+    /// The log: CSV, Excel, Parquet, MATLAB, NumPy, JSON Lines, halscope, ...
+    log: PathBuf,
+    /// The axis file to write; axis.toml beside the log without
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The plot of the log to write; beside the axis file without
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Ask nothing: take what the names, units and numbers say
+    #[arg(long, short)]
+    yes: bool,
+    /// Write over files that are there
+    #[arg(long)]
+    force: bool,
+}
+
+/// What was made of a log.
+struct Made {
+    guesses: Vec<Guess>,
+    motion: Motion,
+    dt: Option<f64>,
+    /// From the drive's unit to the torque.
+    torque_scale: f64,
+}
+
+impl Made {
+    fn of(&self, signal: Signal) -> Option<&Guess> {
+        self.guesses.iter().find(|g| g.role == Role::Signal(signal))
+    }
+
+    fn is_rigid(&self) -> bool {
+        self.of(Signal::Theta1).is_none() || (self.of(Signal::Theta2).is_none() && self.of(Signal::X2).is_none())
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the log cannot be read, holds no torque and position, or the axis file cannot be written.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let folder = args.log.parent().unwrap_or(Path::new(""));
+    let axis = args.output.clone().unwrap_or_else(|| folder.join("axis.toml"));
+    let page = args.report.clone().unwrap_or_else(|| axis.with_extension("html"));
+    outputs::check([args.log.as_path()], [Some(&axis), Some(&page)])?;
+    for path in [&axis, &page] {
+        anyhow::ensure!(
+            args.force || !path.is_file(),
+            "{}: it is there already; give another name (-o, --report) or say --force to write over it",
+            path.display()
+        );
+    }
+    let table = Table::read(&args.log)?;
+    let file = args.log.display().to_string();
+    let mut asker = Asker { yes: args.yes };
+    let made = make(&table, &mut asker)?;
+    let text = write(&made, &table, None, &file);
+    let machine = Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
+    let loaded = from_table(&table, &machine.signals)?;
+    // A first idea of the parameters, from the log itself: it says whether units and signs are right.
+    let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
+    let rough = rough(&loaded.trace, &machine, &examination);
+    let text = write(&made, &table, rough, &file);
+    let machine = Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
+    let seen = Inspected {
+        examination: &examination,
+        trace: &loaded.trace,
+        file: &file,
+        motion: machine.signals.motion,
+        warnings: &loaded.warnings,
+    };
+    write_text(&axis, text.as_bytes())?;
+    write_text(&page, html::page(&report(&seen)).as_bytes())?;
+
+    let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Verdict(verdict(&examination))];
+    blocks.extend(loaded.warnings.iter().cloned().map(Block::Warning));
+    blocks.extend(findings(&examination).into_iter().filter(|b| !matches!(b, Block::Table(_))));
+    let colour = std::io::stdout().is_terminal();
+    say!("{}", terminal::blocks(&blocks, terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    say_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
+    say_line!("{}: the log, drawn", page.display())?;
+    say_line!("next: eixo identify {} --axis {}", quoted(&file), quoted(&axis.display().to_string()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A name as a shell takes it.
+fn quoted(name: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
+    if name.chars().all(plain) && !name.is_empty() { name.to_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
+}
+
+/// Asks a person, or takes the answer that is offered.
+struct Asker {
+    yes: bool,
+}
+
+impl Asker {
+    fn ask(&mut self, question: &str, offered: &str) -> String {
+        if self.yes {
+            return offered.to_owned();
+        }
+        let shown = if offered.is_empty() { "none".to_owned() } else { offered.to_owned() };
+        eprint!("{question} [{shown}] ");
+        let _ = std::io::stderr().flush();
+        let mut answer = String::new();
+        match std::io::stdin().lock().read_line(&mut answer) {
+            Ok(n) if n > 0 && !answer.trim().is_empty() => answer.trim().to_owned(),
+            Ok(0) => {
+                // Nobody answers: not asked again.
+                self.yes = true;
+                eprintln!();
+                offered.to_owned()
+            }
+            _ => offered.to_owned(),
+        }
+    }
+
+    /// A column by name; none for an empty answer or "none".
+    fn column(&mut self, question: &str, offered: Option<&str>, table: &Table) -> Option<String> {
+        loop {
+            let answer = self.ask(question, offered.unwrap_or_default());
+            if answer.is_empty() || answer == "none" || answer == "-" {
+                return None;
+            }
+            if table.position(&answer).is_some() {
+                return Some(answer);
+            }
+            if self.yes {
+                return None;
+            }
+            eprintln!("there is no column {answer:?}; the columns are: {}", table.names());
+        }
+    }
+}
+
+/// What the columns are, asking where names and units do not say it.
+fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
+    let mut guesses = guess(table);
+    for (role, question) in [
+        (Role::Signal(Signal::T), "Which column is the torque, force or motor current?"),
+        (Role::Signal(Signal::Theta1), "Which column is the position of the motor?"),
+    ] {
+        let there = guesses.iter().position(|g| g.role == role);
+        let table_side = guesses.iter().any(|g| matches!(g.role, Role::Signal(Signal::Theta2 | Signal::X2)));
+        if there.is_some_and(|k| guesses[k].score >= SURE) || (role == Role::Signal(Signal::Theta1) && there.is_none() && table_side) {
+            continue;
+        }
+        let offered = there.map(|k| guesses[k].column.clone());
+        match asker.column(question, offered.as_deref(), table) {
+            Some(column) => {
+                guesses.retain(|g| g.role != role && g.column != column);
+                let unit = crate::trace::guess::suffix(&column).map(|(_, u)| u);
+                guesses.push(Guess { role, column, unit, score: SURE });
+            }
+            None => guesses.retain(|g| g.role != role),
+        }
+    }
+    let has = |s: Signal| guesses.iter().any(|g| g.role == Role::Signal(s));
+    anyhow::ensure!(
+        has(Signal::T),
+        "{}: no column looks like a torque, a force or a current; the columns are: {}. Name it when asked (without --yes), or \
+         write T = \"...\" into [signals] of an axis file",
+        table.file,
+        table.names()
+    );
+    anyhow::ensure!(
+        has(Signal::Theta1) || has(Signal::Theta2) || has(Signal::X2),
+        "{}: no column looks like a position; the columns are: {}. Name it when asked (without --yes), or write theta1 = \"...\" \
+         into [signals] of an axis file",
+        table.file,
+        table.names()
+    );
+    let quantity = |s: Signal| guesses.iter().find(|g| g.role == Role::Signal(s)).and_then(|g| g.unit).map(|u| u.quantity);
+    let length = quantity(Signal::Theta1) == Some(Quantity::Length)
+        || (!has(Signal::Theta1) && quantity(Signal::Theta2) == Some(Quantity::Length))
+        || quantity(Signal::T) == Some(Quantity::Force);
+    let motion = if length { Motion::Linear } else { Motion::Rotary };
+    // The position of a table in metres beside a motor in radians is x2.
+    if motion == Motion::Rotary {
+        for g in &mut guesses {
+            if g.role == Role::Signal(Signal::Theta2) && g.unit.is_some_and(|u| u.quantity == Quantity::Length) {
+                g.role = Role::Signal(Signal::X2);
+            }
+        }
+    }
+    // A column in a unit that its signal cannot have is none of it.
+    let fits = |g: &Guess| match (g.role, g.unit) {
+        (Role::Signal(s), Some(u)) => {
+            let needed = s.quantity(motion);
+            u.quantity == needed || (u.quantity == Quantity::Drive && matches!(needed, Quantity::Torque | Quantity::Force))
+        }
+        (Role::Time, Some(u)) => u.quantity == Quantity::Time,
+        (_, None) => true,
+    };
+    guesses.retain(fits);
+    let mut dt = None;
+    if !guesses.iter().any(|g| g.role == Role::Time) {
+        let answer = asker.ask("No column is a time. What is the sampling interval in seconds?", "0.001");
+        let given = answer.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
+        dt = Some(given.with_context(|| format!("the sampling interval is {answer:?}: give seconds, as in 0.001"))?);
+    }
+    let mut torque_scale = 1.0;
+    let torque = guesses.iter().find(|g| g.role == Role::Signal(Signal::T)).context("no torque")?;
+    if !torque.unit.is_some_and(|u| matches!(u.quantity, Quantity::Torque | Quantity::Force)) {
+        let unit = Signal::T.unit(motion);
+        let answer = asker.ask(
+            &format!("{} is no torque by its unit. How many {unit} is one of it (the torque constant)?", torque.column),
+            "1",
+        );
+        let given = answer.parse::<f64>().ok().filter(|v| v.is_finite() && *v != 0.0);
+        torque_scale = given.with_context(|| format!("the torque constant is {answer:?}: give a number, as in 0.52"))?;
+    }
+    Ok(Made { guesses, motion, dt, torque_scale })
+}
+
+/// Inertias, damping and stiffness as the log has them, roughly; None where it says nothing.
+fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<[f64; 4]> {
+    let piece = examination.longest().map(|p| trace.slice(p));
+    let found = identify(piece.as_ref().unwrap_or(trace), machine, &Request::default(), "", &mut |_| ()).ok();
+    let best = found.as_ref().and_then(|f| Some(&f.methods[f.recommended.as_ref()?.method]));
+    let value = |name: &str| {
+        let e = best?.parameters.iter().find(|e| e.name == name)?;
+        (e.value > 0.0 && e.value.is_finite() && e.std.is_none_or(|s| s < 0.5 * e.value)).then_some(e.value)
+    };
+    if machine.structure == Structure::Rigid {
+        return value("I").or(examination.inertia).map(|i| [i, 0.0, 0.0, 0.0]);
+    }
+    if let (Some(i1), Some(i2), Some(k)) = (value("I1"), value("I2"), value("K")) {
+        return Some([i1, i2, value("B").unwrap_or(0.02 * (k * i2).sqrt()), k]);
+    }
+    // Where noise rules the coupling, the inertia is still known: half to each side, a coupling that swings at a fiftieth of
+    // the sampling rate, 2 % of the critical damping.
+    let half = 0.5 * examination.inertia?;
+    let w = std::f64::consts::TAU / (50.0 * trace.dt);
+    let k = 0.5 * half * w * w;
+    Some([half, half, 0.02 * (k * half).sqrt(), k])
+}
+
+/// Number with four digits, as a person would write it into the file.
+fn four(value: f64) -> String {
+    let text = format!("{value:.3e}");
+    text.parse::<f64>().map_or(text, |v| if (1e-3..1e4).contains(&v.abs()) || v == 0.0 { v.to_string() } else { format!("{v:e}") })
+}
+
+/// The axis file, with comments.
+fn write(made: &Made, table: &Table, rough: Option<[f64; 4]>, file: &str) -> String {
+    let mut out = String::new();
+    let text = |s: &str| toml::Value::String(s.to_owned()).to_string();
+    let plain = |s: &str| s.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
+    let name = Path::new(file).file_stem().map_or_else(|| "axis".to_owned(), |s| plain(&s.to_string_lossy()));
+    let linear = made.motion == Motion::Linear;
+    let [inertia, damping, stiffness, torque] =
+        if linear { ["kg", "N.s/m", "N/m", "N"] } else { ["kg.m2", "N.m.s/rad", "N.m/rad", "N.m"] };
+    let _ = writeln!(out, "# Made by `eixo init` from {}.", plain(file));
+    let _ = writeln!(out, "name = {}", text(&name));
+    let [i1, i2, b, k] = rough.unwrap_or([1.0, 1.0, 1.0, 1000.0]);
+    let origin = if rough.is_some() {
+        "# Rough values, read from the log itself: put in those of the data sheet where you have them."
+    } else {
+        "# Placeholders: the log did not say. Put in the values of the data sheet, or those that `eixo identify` finds."
+    };
+    if made.is_rigid() {
+        let _ = writeln!(out, "structure = \"rigid\"               # one encoder: the flexible mode is out of its reach");
+        let _ = writeln!(out, "\n[parameters]\n{origin}\nI1 = {}    # {inertia}, motor and all that it moves", four(i1));
+    } else {
+        let _ = writeln!(out, "\n[parameters]\n{origin}");
+        let _ = writeln!(out, "I1 = {}    # {inertia}, motor side", four(i1));
+        let _ = writeln!(out, "I2 = {}    # {inertia}, table side", four(i2));
+        let _ = writeln!(out, "B = {}     # {damping}, damping of the coupling", four(b));
+        let _ = writeln!(out, "K = {}     # {stiffness}, stiffness of the coupling", four(k));
+    }
+    if made.of(Signal::X2).is_some() {
+        let _ = writeln!(out, "rho = 1.0    # m/rad, the lead of the screw over 2*pi: x2 = rho*theta2. PUT IT IN");
+    }
+    let _ = writeln!(out, "\n[units]\nmotion = \"{}\"", if linear { "linear" } else { "rotary" });
+    let _ = writeln!(out, "\n[signals]                          # column of the log for each signal; \"\" for none");
+    match (made.guesses.iter().find(|g| g.role == Role::Time), made.dt) {
+        (Some(time), _) => {
+            let _ = writeln!(out, "time = {}", entry(time, table, 1.0, &text, ""));
+        }
+        (None, dt) => {
+            let _ = writeln!(out, "dt = {}                         # s, sampling interval", dt.unwrap_or(1e-3));
+        }
+    }
+    for signal in Signal::ALL {
+        let Some(g) = made.of(signal) else { continue };
+        if signal == Signal::Reference {
+            let _ = writeln!(out, "# {} looks like the reference of the drive: with its gains it belongs into [controller].", g.column);
+            continue;
+        }
+        let scale = if signal == Signal::T { made.torque_scale } else { 1.0 };
+        let hold = if signal == Signal::T { ", hold = \"zoh\"" } else { "" };
+        let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, hold));
+        if signal == Signal::T && g.unit.is_none_or(|u| u.quantity == Quantity::Drive) && scale == 1.0 {
+            let _ = writeln!(out, "# scale is 1: all inertias and stiffnesses come out in units of {} instead of {torque}.", g.column);
+        }
+    }
+    out
+}
+
+/// The entry of one column.
+fn entry(g: &Guess, table: &Table, scale: f64, text: &dyn Fn(&str) -> String, hold: &str) -> String {
+    let in_header = table.position(&g.column).and_then(|k| table.headers[k].unit.as_ref()).is_some();
+    let column = text(&g.column);
+    let needs_unit = g.unit.filter(|u| !in_header && u.factor != 1.0);
+    if needs_unit.is_none() && scale == 1.0 && hold.is_empty() {
+        return column;
+    }
+    let unit = needs_unit.map_or_else(String::new, |u| format!(", unit = {}", text(u.symbol)));
+    let scale = if scale == 1.0 { String::new() } else { format!(", scale = {scale}") };
+    format!("{{ column = {column}{unit}{scale}{hold} }}")
+}
+
+/// The table of what was made of the columns.
+fn chosen(made: &Made, table: &Table) -> Shown {
+    let mut shown = Shown::new("What the columns are taken for", ["signal", "column", "unit", ""]);
+    let mut used = Vec::new();
+    for g in &made.guesses {
+        let name = match g.role {
+            Role::Time => "time",
+            Role::Signal(s) => s.name(),
+        };
+        used.push(g.column.as_str());
+        let unit = g.unit.map_or("not given: SI", |u| u.symbol);
+        let sure = if g.score >= SURE { "" } else { "please check" };
+        shown.row(vec![Cell::text(name), Cell::text(g.column.as_str()), Cell::text(unit), Cell::text(sure)]);
+    }
+    for header in table.headers.iter().filter(|h| !used.contains(&h.name.as_str())) {
+        shown.row(vec![Cell::text("not used"), Cell::text(header.name.as_str()), Cell::Empty, Cell::Empty]);
+    }
+    shown
+}

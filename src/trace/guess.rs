@@ -1,0 +1,284 @@
+//! Which column of a foreign log is which signal: by its name, its unit and its numbers.
+//!
+//! Names are cut into words at everything that is no letter or digit, at `camelCase` and before trailing digits; each role
+//! knows words that speak for it and words that speak against it. The best column of each role is taken, each column once.
+
+use super::signal::{Quantity, Signal};
+use super::table::Table;
+use super::units::Unit;
+
+/// What a column may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The time.
+    Time,
+    /// A signal.
+    Signal(Signal),
+}
+
+/// A column with what was made of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guess {
+    /// What it is taken for.
+    pub role: Role,
+    /// Its name in the file.
+    pub column: String,
+    /// Its unit, from the header or the end of its name.
+    pub unit: Option<&'static Unit>,
+    /// How sure that is: names and units that fit add up; below [`SURE`] a person should look.
+    pub score: i32,
+}
+
+/// From here on a guess is sure.
+pub const SURE: i32 = 6;
+
+/// The unit at the end of a name: `theta_rad`, `speed_rad_s`, `force_cmd_N`.
+#[must_use]
+pub fn suffix(name: &str) -> Option<(&str, &'static Unit)> {
+    let cuts: Vec<usize> = name.match_indices('_').map(|(k, _)| k).collect();
+    for parts in [2, 1] {
+        let Some(cut) = cuts.len().checked_sub(parts).map(|k| cuts[k]) else { continue };
+        let end = &name[cut + 1..];
+        let spelled = [end.replace('_', "/"), end.replace('_', ".")];
+        if cut > 0
+            && let Some(unit) = spelled.iter().find_map(|s| Unit::parse(s))
+        {
+            return Some((&name[..cut], unit));
+        }
+    }
+    None
+}
+
+/// Words of a name, in small letters.
+fn words(name: &str) -> Vec<String> {
+    let mut out: Vec<String> = vec![String::new()];
+    let mut before = ' ';
+    for c in name.chars() {
+        let boundary = !c.is_alphanumeric()
+            || (c.is_uppercase() && before.is_lowercase())
+            || (c.is_ascii_digit() != before.is_ascii_digit() && before.is_alphanumeric());
+        if boundary && out.last().is_some_and(|w| !w.is_empty()) {
+            out.push(String::new());
+        }
+        if c.is_alphanumeric()
+            && let Some(last) = out.last_mut()
+        {
+            last.extend(c.to_lowercase());
+        }
+        before = c;
+    }
+    out.retain(|w| !w.is_empty());
+    out
+}
+
+const REFERENCE: &[&str] =
+    &["ref", "reference", "goal", "target", "soll", "desired", "set", "setpoint", "cmd", "command", "des"];
+const MEASURED: &[&str] = &["meas", "measured", "act", "actual", "ist", "fb", "feedback", "enc", "encoder"];
+const POSITION: &[&str] = &[
+    "pos",
+    "position",
+    "theta",
+    "angle",
+    "phi",
+    "q",
+    "x",
+    "winkel",
+    "lage",
+    "way",
+    "weg",
+    "displacement",
+    "enc",
+    "encoder",
+];
+const SPEED: &[&str] =
+    &["speed", "vel", "velocity", "omega", "w", "v", "drehzahl", "geschwindigkeit", "rpm", "dq", "qd", "n"];
+const TORQUE: &[&str] = &["torque", "force", "moment", "drehmoment", "kraft", "tau", "trq", "effort", "t", "m", "f"];
+const CURRENT: &[&str] = &["current", "iq", "i", "strom", "amps", "cur"];
+const DRIVE: &[&str] = &["load", "input", "u", "voltage", "pwm", "duty", "control", "out", "output", "last"];
+const TIME: &[&str] = &["time", "t", "timestamp", "zeit", "stamp", "sec", "seconds", "clock"];
+const MOTOR: &[&str] = &["motor", "mot", "m", "1", "drive", "rotor"];
+const TABLE: &[&str] =
+    &["load", "table", "tisch", "last", "2", "scale", "linear", "direct", "slide", "ext", "external", "second"];
+const ACCELERATION: &[&str] =
+    &["acc", "accel", "acceleration", "alpha", "ddq", "jerk", "error", "err", "deviation", "lag"];
+
+/// What the columns of a log are taken for, the time first, then the signals in their order.
+#[must_use]
+pub fn guess(table: &Table) -> Vec<Guess> {
+    let mut candidates: Vec<(Guess, usize)> = Vec::new();
+    for (index, header) in table.headers.iter().enumerate() {
+        let Ok(values) = table.column(index) else { continue };
+        let given = header.unit.as_deref().and_then(Unit::parse);
+        let (stem, unit) = match (given, suffix(&header.name)) {
+            (Some(unit), _) => (header.name.as_str(), Some(unit)),
+            (None, Some((stem, unit))) => (stem, Some(unit)),
+            (None, None) => (header.name.as_str(), None),
+        };
+        let words = words(stem);
+        for (role, score) in scores(&header.name, &words, unit.map(|u| u.quantity), values) {
+            candidates.push((Guess { role, column: header.name.clone(), unit, score }, index));
+        }
+    }
+    // The best pairing first; of equals the column further to the left.
+    candidates.sort_by(|a, b| b.0.score.cmp(&a.0.score).then(a.1.cmp(&b.1)));
+    let mut found: Vec<Guess> = Vec::new();
+    for (candidate, _) in candidates {
+        if !found.iter().any(|f| f.role == candidate.role || f.column == candidate.column) {
+            found.push(candidate);
+        }
+    }
+    // A table's encoder alone, where nothing says that it is the table's, is the motor's.
+    let order = |role: &Role| match role {
+        Role::Time => 0,
+        Role::Signal(s) => 1 + s.index(),
+    };
+    found.sort_by_key(|f| order(&f.role));
+    found
+}
+
+/// The roles that a column may have, each with what speaks for it.
+fn scores(name: &str, words: &[String], quantity: Option<Quantity>, values: &[f64]) -> Vec<(Role, i32)> {
+    let has = |list: &[&str]| words.iter().any(|w| list.contains(&w.as_str()));
+    let rises = values.len() > 2 && values.windows(2).all(|w| w[1] > w[0]);
+    let moves = values.iter().any(|v| *v != values[0]);
+    let mut out = Vec::new();
+    let mut add = |role: Role, score: i32| {
+        if score > 2 {
+            out.push((role, score + if moves { 1 } else { -4 }));
+        }
+    };
+    // Its own name says all.
+    if let Some(signal) = Signal::from_name(name).or_else(|| suffix(name).and_then(|(stem, _)| Signal::from_name(stem)))
+    {
+        add(Role::Signal(signal), 20);
+    }
+    let is = |q: Quantity| quantity == Some(q);
+    let other = |q: &[Quantity]| quantity.is_some_and(|own| !q.contains(&own));
+    let (time, signal) = (Role::Time, Role::Signal);
+    add(
+        time,
+        5 * i32::from(is(Quantity::Time)) + 4 * i32::from(has(TIME)) + 2 * i32::from(rises)
+            - 20 * i32::from(!rises || other(&[Quantity::Time])),
+    );
+    let length = is(Quantity::Angle) || is(Quantity::Length);
+    let rate = is(Quantity::AngularVelocity) || is(Quantity::Velocity);
+    let against = 8 * i32::from(has(ACCELERATION));
+    let position = 4 * i32::from(has(POSITION)) + 4 * i32::from(length)
+        - 12 * i32::from(other(&[Quantity::Angle, Quantity::Length]) || has(SPEED) || rate)
+        - against;
+    let speed = 4 * i32::from(has(SPEED)) + 5 * i32::from(rate)
+        - 12 * i32::from(other(&[Quantity::AngularVelocity, Quantity::Velocity]))
+        - against;
+    let (reference, measured) = (i32::from(has(REFERENCE)), i32::from(has(MEASURED)));
+    let (motor, table) = (i32::from(has(MOTOR)), i32::from(has(TABLE)));
+    if position > 2 {
+        add(signal(Signal::Theta1), position + 2 + 2 * measured + 2 * motor - 6 * reference - 5 * table);
+        if table > 0 {
+            add(signal(Signal::Theta2), position + 1 + 2 * measured + 3 * table - 6 * reference - 5 * motor);
+        }
+        if reference > 0 {
+            add(signal(Signal::Reference), position + 4 * reference - 2 * measured);
+        }
+    }
+    if speed > 2 {
+        add(signal(Signal::Omega1), speed + 2 + 2 * measured + 2 * motor - 6 * reference - 5 * table);
+        if table > 0 {
+            add(signal(Signal::Omega2), speed + 1 + 2 * measured + 3 * table - 6 * reference - 5 * motor);
+        }
+    }
+    let force = is(Quantity::Torque) || is(Quantity::Force);
+    let drive = is(Quantity::Drive);
+    let wrong =
+        other(&[Quantity::Torque, Quantity::Force, Quantity::Drive]) || position > 2 || (speed > 2 && !force) || rises;
+    let torque = 5 * i32::from(has(TORQUE))
+        + 6 * i32::from(force)
+        + 4 * i32::from(has(CURRENT))
+        + 3 * i32::from(has(DRIVE))
+        + 2 * i32::from(drive)
+        + measured
+        + i32::from(has(&["input", "plant"]))
+        - 2 * i32::from(reference > 0 && !force)
+        - 20 * i32::from(wrong);
+    // A supply's voltage hardly moves; a drive's does.
+    let steady = {
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        low > 0.0 && high < 2.0 * low
+    };
+    add(signal(Signal::T), torque - 8 * i32::from(steady));
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn guessed(header: &str) -> Vec<String> {
+        let width = header.split(',').count();
+        let mut text = format!("{header}\n");
+        for k in 0..20_i32 {
+            let cells: Vec<String> = (0..width as i32)
+                .map(
+                    |c| if c == 0 { format!("{}", f64::from(k) * 0.001) } else { format!("{}", (k * (c + 1)) % 7 - 3) },
+                )
+                .collect();
+            text.push_str(&format!("{}\n", cells.join(",")));
+        }
+        let table = Table::parse(text.as_bytes(), "log.csv").unwrap();
+        let name = |g: &Guess| match g.role {
+            Role::Time => "time".to_owned(),
+            Role::Signal(s) => s.name().to_owned(),
+        };
+        guess(&table).iter().map(|g| format!("{}={}", name(g), g.column)).collect()
+    }
+
+    #[test]
+    fn logs_of_real_machines_are_understood_by_their_headers() {
+        for (header, expected) in [
+            (
+                "t_s,iq_ref_A,iq_meas_A,vdc_V,theta_motor_rad,omega_motor_rad_s,theta_load_rad,omega_load_rad_s",
+                &[
+                    "time=t_s",
+                    "T=iq_meas_A",
+                    "theta1=theta_motor_rad",
+                    "omega1=omega_motor_rad_s",
+                    "theta2=theta_load_rad",
+                    "omega2=omega_load_rad_s",
+                ][..],
+            ),
+            (
+                "t_s,q_ref_m,q_meas_m,u_V,force_cmd_N",
+                &["time=t_s", "T=force_cmd_N", "theta1=q_meas_m", "reference=q_ref_m"],
+            ),
+            (
+                "t_s,goal_rad,pos_rad,speed_rad_s,load_raw,volts",
+                &["time=t_s", "T=load_raw", "theta1=pos_rad", "omega1=speed_rad_s"],
+            ),
+            (
+                "Time,ActTorque,ActPosition,SetPosition,ActVelocity",
+                &["time=Time", "T=ActTorque", "theta1=ActPosition", "omega1=ActVelocity"],
+            ),
+            (
+                "time [ms],Torque [Nm],Motor angle [deg],Table position [mm]",
+                &["time=time", "T=Torque", "theta1=Motor angle", "theta2=Table position"],
+            ),
+        ] {
+            let found = guessed(header);
+            for one in expected {
+                assert!(found.iter().any(|f| f == one), "{header}: {one} is not among {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_unit_at_the_end_of_a_name_is_found() {
+        for (name, stem, symbol) in [
+            ("t_s", "t", "s"),
+            ("omega_load_rad_s", "omega_load", "rad/s"),
+            ("force_cmd_N", "force_cmd", "N"),
+            ("x2_mm", "x2", "mm"),
+        ] {
+            assert_eq!(suffix(name).map(|(s, u)| (s, u.symbol)), Some((stem, symbol)), "{name}");
+        }
+        assert_eq!(suffix("load_raw"), None);
+    }
+}
