@@ -139,7 +139,7 @@ fn no_broken_record_is_identified_or_given_a_cause() {
         log.write(&at("log.csv"), keep);
         let with = ["--axis", "axis.toml"];
         for command in [
-            &["identify", "log.csv"][..],
+            &["identify", "log.csv", "--method", "ls"][..],
             &["identify", "log.csv", "--stream", "--method", "ls"],
             &["diagnose", "log.csv"],
         ] {

@@ -18,7 +18,7 @@ use crate::effects::{EFFECTS, Effect};
 use crate::fleet::{Found, Tracked};
 use crate::identify::parameters::{NAMES, units as base_units};
 use crate::report::diagnose::{Findings, report, short};
-use crate::report::format::{Medium, number};
+use crate::report::format::{Medium, number, printable};
 use crate::report::{html, terminal};
 use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
@@ -165,7 +165,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         bar.tick();
     })?;
     bar.finish_and_clear();
-    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
     let findings = diagnosed.findings();
     let outcome = &diagnosed.outcome;
     let colour = std::io::stdout().is_terminal();

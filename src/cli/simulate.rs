@@ -16,6 +16,7 @@ use crate::fmu::contained::{self, Host, simulate};
 use crate::fmu::isolation;
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting};
+use crate::report::format::printable;
 use crate::trace::{Hold, Machine, Table, load, write_columns};
 
 /// Arguments of `eixo simulate`.
@@ -186,7 +187,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         // The axis file says how its own log's columns are named.
         (Some(path), Some(machine)) => {
             let loaded = load(path, &machine.signals)?;
-            loaded.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+            loaded.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
             hold = hold.or(Some(loaded.trace.hold));
             Inputs::of(&loaded.trace)?
         }

@@ -11,14 +11,16 @@
 
 use rustfft::num_complex::Complex;
 
+use super::encoders::{encoders, motor_side};
 use super::finding::{Finding, Severity};
+use super::least::non_negative;
 use super::pairs::factor;
 use super::robust::{quantile, span};
 use super::spectra::Spectra;
 use super::{Input, Nominal, Structure};
 
 /// Coherence from which a line tells something of the motion, where the averages do not ask for more.
-const COHERENT: f64 = 0.4;
+pub(super) const COHERENT: f64 = 0.4;
 /// Share of the torque's power that the balance must explain for the record to be about this torque.
 const EXPLAINED: f64 = 0.2;
 /// From this share on the balance speaks of signs and delays.
@@ -33,10 +35,10 @@ const AHEAD: i32 = 3;
 const BEHIND: i32 = 48;
 
 /// Columns of the spectra.
-const T: usize = 0;
-const MAIN: usize = 1;
+pub(super) const T: usize = 0;
+pub(super) const MAIN: usize = 1;
 const SIGN: usize = 2;
-const TABLE: usize = 3;
+pub(super) const TABLE: usize = 3;
 
 /// Looks at torque and motion; gives the band in which the motion follows, Hz, and puts down the inertia that moves where it
 /// shows.
@@ -209,145 +211,6 @@ fn directions(speed: &[f64], findings: &mut Vec<Finding>) {
     }
 }
 
-/// The two encoders against each other: sign, scale, and which one is the motor's.
-fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
-    let together: Vec<usize> =
-        (0..s.lines).filter(|f| s.coherence(MAIN, TABLE, *f) > s.by_chance().max(COHERENT)).collect();
-    if together.len() < 4 {
-        findings.push(Finding::new(
-            "foreign",
-            Severity::Refuse,
-            "theta2",
-            "theta2 does not follow theta1 at any frequency.",
-            "It comes from another axis or another time, or one of the encoders is broken.",
-            "Map the right columns in [signals], or leave theta2 out.",
-        ));
-        return;
-    }
-    // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
-    let total: f64 = together.iter().map(|f| s.power(MAIN, *f)).sum();
-    let mut sum = 0.0;
-    let low: Vec<usize> = together
-        .iter()
-        .copied()
-        .take_while(|f| {
-            let take = sum < 0.1 * total;
-            sum += s.power(MAIN, *f);
-            take
-        })
-        .collect();
-    let cross: Complex<f64> = low.iter().map(|f| s.of(MAIN, TABLE, *f)).sum();
-    let power: f64 = low.iter().map(|f| s.power(MAIN, *f)).sum();
-    let gain = cross / power;
-    let expected = input.nominal.filter(|n| n.structure == Structure::TwoInertia).map_or(1.0, |n| {
-        let p = n.parameters;
-        let w = s.omega(low[low.len() / 2]);
-        let spring = Complex::new(p.k, w * p.b);
-        (spring / (spring - p.i2 * w * w)).re
-    });
-    let ratio = gain.re / expected;
-    // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
-    if gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0 {
-        findings.push(Finding::new(
-            "sign",
-            Severity::Refuse,
-            "theta2",
-            "theta2 runs against theta1.",
-            "One of the two encoders counts the other way round.",
-            "Give its column scale = -1 in [signals] of the axis file.",
-        ));
-        return;
-    }
-    let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
-    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
-    let words = lead
-        .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
-        .or_else(|| factor(ratio).map(str::to_owned));
-    if let Some(words) = words.filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25) {
-        findings.push(Finding::new(
-            "units",
-            Severity::Refuse,
-            "theta2",
-            format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {words}."),
-            "One of the two columns is in another unit than the file says.",
-            "Give the unit in the header or in [signals] (unit = \"deg\"), or scale by the gear ratio.",
-        ));
-        return;
-    }
-    if !(0.6..1.67).contains(&ratio.abs()) {
-        findings.push(Finding::new(
-            "scale",
-            Severity::Warn,
-            "theta2",
-            format!("theta2 moves {ratio:.4} times as far as theta1 at the lowest frequencies."),
-            "A gear lies between the encoders, or the record holds no motion slow enough to tell.",
-            "Give theta2 the gear's ratio as scale in [signals], so that both count the same angle.",
-        ));
-    }
-    // The table is moved by the twist alone: I2*a2 = B*d' + K*d. Which of the two is?
-    let misfit = |of: usize, sense: f64| -> f64 {
-        let (mut aa, mut ad, mut dd, mut av, mut dv, mut vv) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for &f in lines.iter().filter(|f| s.coherence(MAIN, TABLE, **f) > COHERENT) {
-            let w = s.omega(f);
-            let j = Complex::new(0.0, w);
-            // Spectra of a (of the channel), d = (v1 - v2)/(jw), d' = v1 - v2.
-            let twist_twist = s.power(MAIN, f) + s.power(TABLE, f) - 2.0 * s.of(MAIN, TABLE, f).re;
-            let own_twist = (s.of(of, MAIN, f) - s.of(of, TABLE, f)) * sense;
-            aa += w * w * s.power(of, f);
-            // conj(a)*d = conj(jw*v)*(v1 - v2)/(jw)
-            ad += (j.conj() * own_twist / j).re;
-            av += (j.conj() * own_twist).re;
-            dd += twist_twist / (w * w);
-            vv += twist_twist;
-            dv += (twist_twist / j.conj()).re;
-        }
-        if aa <= 0.0 || dd <= 0.0 {
-            return 1.0;
-        }
-        let gram = [vec![dd, dv], vec![dv, vv]];
-        1.0 - non_negative(&gram, &[ad, av]).1 / aa
-    };
-    let (as_given, exchanged) = (misfit(TABLE, 1.0), misfit(MAIN, -1.0));
-    if exchanged < 0.3 && as_given > 3.0 * exchanged {
-        findings.push(Finding::new(
-            "swapped",
-            Severity::Refuse,
-            "theta1, theta2",
-            "theta1 moves as a table does and theta2 as a motor: the twist drives theta1.",
-            "The two encoders' columns are exchanged.",
-            "Exchange them in [signals] of the axis file.",
-        ));
-    }
-}
-
-/// Least squares with coefficients of at least zero: `gram*x = right`; gives x and the energy explained, `2*x.right - x.gram.x`.
-fn non_negative(gram: &[Vec<f64>], right: &[f64]) -> (Vec<f64>, f64) {
-    let p = right.len();
-    let mut x = vec![0.0; p];
-    for _ in 0..400 {
-        let mut moved = 0.0_f64;
-        for i in 0..p {
-            if gram[i][i] <= 0.0 {
-                continue;
-            }
-            let rest: f64 = (0..p).filter(|j| *j != i).map(|j| gram[i][j] * x[j]).sum();
-            let new = ((right[i] - rest) / gram[i][i]).max(0.0);
-            moved = moved.max((new - x[i]).abs() * gram[i][i].sqrt());
-            x[i] = new;
-        }
-        let size = right
-            .iter()
-            .zip(gram)
-            .map(|(r, g)| r.abs() / g.iter().fold(0.0_f64, |m, v| m.max(*v)).sqrt())
-            .fold(0.0, f64::max);
-        if moved <= 1e-9 * size {
-            break;
-        }
-    }
-    let explained = (0..p).map(|i| x[i] * (2.0 * right[i] - (0..p).map(|j| gram[i][j] * x[j]).sum::<f64>())).sum();
-    (x, explained)
-}
-
 /// The balance of one record: regressors, lines and what they hold.
 struct Balance<'a> {
     s: &'a Spectra,
@@ -495,7 +358,8 @@ fn weigh(
     }
     // Six coefficients explain some of any torque: each half a line of a single spectrum, less of an averaged one.
     let by_chance = 3.0 / (lines.len() as f64 * s.averages);
-    if plus.1.max(turned_anywhere.1) < EXPLAINED + by_chance {
+    let motor = || if s.has(TABLE) { 1.0 - motor_side(s, lines, MAIN, TABLE) } else { 0.0 };
+    if plus.1.max(turned_anywhere.1) < EXPLAINED + by_chance && motor() < EXPLAINED + by_chance {
         findings.push(Finding::new(
             "not_followed",
             Severity::Refuse,

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::finding::{Finding, Severity, runs};
-use super::robust::{deviation, quantile, rms, span, step};
+use super::robust::{self, deviation, quantile, rms, span, step};
 use super::{Channel, Input};
 
 /// Least samples of a stretch that counts as stuck.
@@ -114,7 +114,9 @@ fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
     let twin = input.channels().find(|c| c.name != channel.name && c.name != "T" && same_side(c.name));
     runs.into_iter()
         .filter(|r| {
-            let by_twin = twin.is_some_and(|c| moves(c, r, input.dt, position, step(x)));
+            let by_twin = twin.is_some_and(|c| {
+                moves(c, r, input.dt, position, &Stuck { value: x[r.start], step: step(x), size: deviation(x) })
+            });
             let by_other = others.iter().any(|(v, size)| {
                 let part = &v[r.clone()];
                 r.len() >= 2 * STUCK && deviation(part) > 0.5 * size && flat(part, part.len() / 4).is_empty()
@@ -132,8 +134,16 @@ fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
         .collect()
 }
 
+/// A channel that keeps a value: the value, the step it is counted in, its deviation over the record.
+struct Stuck {
+    value: f64,
+    step: f64,
+    size: f64,
+}
+
 /// Whether the other channel of the same side moves during a stretch by much more than the stuck one's step.
-fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position: bool, step: f64) -> bool {
+fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position: bool, stuck: &Stuck) -> bool {
+    let &Stuck { value, step, size } = stuck;
     let part = &other.values[stretch.clone()];
     if stuck_is_position {
         // The speed says how far the position went.
@@ -144,13 +154,13 @@ fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position:
         let way: Vec<f64> = way.collect();
         rms(part) > 0.3 * rms(other.values) && span(&way) > 20.0 * step
     } else {
-        // A speed that stands while the position accelerates.
-        let speed =
-            |p: &[f64]| -> Vec<f64> { p.chunks_exact((p.len() / 8).max(1)).map(|c| c[c.len() - 1] - c[0]).collect() };
-        let here = deviation(&speed(part));
-        let usual: Vec<f64> =
-            other.values.chunks_exact(part.len().max(8)).take(64).map(|c| deviation(&speed(c))).collect();
-        here > 0.5 * quantile(usual.into_iter(), 0.5) && here > 0.0
+        // A speed that stands while the position goes another way than it says: the way over sixteenths of the stretch.
+        let length = (part.len() / 16).max(4);
+        let speeds: Vec<f64> =
+            part.chunks_exact(length).map(|c| (c[c.len() - 1] - c[0]) / ((c.len() - 1) as f64 * dt)).collect();
+        let off: Vec<f64> = speeds.iter().map(|v| v - value).collect();
+        let coarse = 4.0 * robust::step(other.values) / ((length - 1) as f64 * dt);
+        rms(&off) > (0.3 * size).max(coarse)
     }
 }
 

@@ -14,7 +14,9 @@
 
 mod balance;
 mod channels;
+mod encoders;
 mod finding;
+mod least;
 mod pairs;
 mod robust;
 mod spectra;

@@ -7,7 +7,7 @@ use crate::examine::{Examination, Finding, Severity};
 use crate::identify::result::Series as Curve;
 use crate::trace::{Motion, Signal, Trace};
 
-/// Most stretches that are marked in one plot.
+/// Most stretches of one finding that are marked in a plot, and most rows of the table of pieces.
 const MARKS: usize = 12;
 
 /// An inspection as the report needs it.
@@ -132,8 +132,7 @@ pub fn report(seen: &Inspected<'_>) -> Report {
             if !about {
                 continue;
             }
-            let most = MARKS.saturating_sub(chart.marks.len());
-            for (k, [from, to]) in f.seconds.iter().take(most).enumerate() {
+            for (k, [from, to]) in f.seconds.iter().take(MARKS).enumerate() {
                 let label = if k == 0 { f.id.to_owned() } else { String::new() };
                 chart.marks.push(if from == to { Mark::X(*from, label) } else { Mark::Span(*from, *to, label) });
             }

@@ -5,14 +5,19 @@
 //! cell that is no finite number is remembered and only an error when its column is used, so that a log may carry
 //! text beside its signals.
 
+mod preamble;
+mod stamp;
+
 use std::ops::Range;
 
 use memchr::{memchr, memchr2};
 use rayon::prelude::*;
 
 use super::error::TraceError;
+use preamble::Preamble;
+use stamp::stamp;
+
 use super::table::{EXAMPLE, Fault, Header, MAX_COLUMNS, Table, header};
-use super::units::Unit;
 
 /// Longest header line, bytes.
 const MAX_HEADER: usize = 1 << 20;
@@ -177,116 +182,6 @@ fn distinct(headers: &[Header], file: &str) -> Result<(), TraceError> {
 /// A body without the line `EOF` that some exports end in.
 fn without_end_mark(body: &[u8]) -> &[u8] {
     body.trim_ascii_end().strip_suffix(b"EOF").filter(|b| b.is_empty() || b.ends_with(b"\n")).unwrap_or(body)
-}
-
-/// Whether a field can stand in a row of units.
-fn is_unit(field: &str) -> bool {
-    let inner = field.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
-    inner.is_empty() || inner == "-" || Unit::parse(inner).is_some()
-}
-
-/// Most lines before the data.
-const MAX_PREAMBLE: usize = 400;
-
-/// Lines above the data that are no header row alone: what the logger says of itself, a row of units, the channel heads of
-/// TwinCAT Scope (Beckhoff Information System, TE13xx, Export in csv: name and value side by side, then a column of time in
-/// milliseconds and one of values for each channel).
-struct Preamble {
-    names: Vec<String>,
-    units: Option<Vec<String>>,
-    separator: u8,
-    blank_last: bool,
-    body: usize,
-    lines: usize,
-}
-
-impl Preamble {
-    /// Looks for them from the first line with text, which is at `at`, has `lines` lines before it and `first` fields. None
-    /// where that line is the header and the next one data.
-    fn find(bytes: &[u8], at: usize, lines: usize, first: usize, separator_of_first: u8) -> Option<Self> {
-        struct Line<'a> {
-            text: &'a [u8],
-            end: usize,
-            number: usize,
-        }
-        let mut found: Vec<Line> = Vec::new();
-        let (mut at, mut number) = (at, lines);
-        while at < bytes.len() && found.len() < MAX_PREAMBLE {
-            let end = memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |k| at + k);
-            let text = trim(&bytes[at..end]);
-            number += 1;
-            at = (end + 1).min(bytes.len());
-            if text.len() > MAX_HEADER {
-                return None;
-            }
-            if !text.is_empty() && !text.starts_with(b"#") {
-                found.push(Line { text, end: at, number });
-            }
-            if found.len() == 2 {
-                // The usual file: a header, then data of as many fields.
-                let (cells, _) = split(found[1].text, separator_of_first);
-                let comma = separator_of_first == b';';
-                let data = cells.iter().any(|c| number_of(c, comma));
-                if cells.len() == first && data {
-                    return None;
-                }
-            }
-        }
-        let data_at = |k: usize| -> Option<(u8, usize)> {
-            let separator = separator(found[k].text);
-            let (cells, _) = split(found[k].text, separator);
-            let numbers = cells.iter().filter(|c| number_of(c, true)).count();
-            let leads = cells.iter().find(|c| !c.is_empty()).is_some_and(|c| number_of(c, true));
-            (cells.len() >= 2 && leads && 2 * numbers >= cells.len()).then_some((separator, cells.len()))
-        };
-        let (k, (separator, width)) = (1..found.len()).find_map(|k| {
-            let one = data_at(k)?;
-            let follows = k + 1 >= found.len() || data_at(k + 1) == Some(one) || trim(found[k + 1].text) == b"EOF";
-            follows.then_some((k, one))
-        })?;
-        let fields = |k: usize| split(found[k].text, separator);
-        let fits = |k: usize| {
-            let (cells, blank) = fields(k);
-            (cells.len() == width || (cells.len() + 1 == width && blank)) && !cells.iter().all(|c| number_of(c, true))
-        };
-        let (body, lines) = (found[k - 1].end, found[k - 1].number);
-        let paired = (0..k).any(|i| fields(i).0.first().is_some_and(|c| c.starts_with("SampleTime")));
-        if paired {
-            let (cells, _) = fields((0..k).rfind(|i| fits(*i) && fields(*i).0.first().is_some_and(|c| c == "Name"))?);
-            let names = (0..width).map(|i| match (i % 2, i) {
-                (1, i) => cells.get(i).cloned().unwrap_or_default(),
-                (_, 0) => "time [ms]".to_owned(),
-                (_, i) => format!("time {} [ms]", i / 2 + 1),
-            });
-            return Some(Self { names: names.collect(), units: None, separator, blank_last: true, body, lines });
-        }
-        let last = (0..k).rfind(|i| fits(*i))?;
-        let (cells, blank_last) = fields(last);
-        let above = (last > 0 && cells.iter().all(|c| is_unit(c)) && cells.iter().any(|c| !c.is_empty() && c != "-"))
-            .then(|| (0..last).rfind(|i| fits(*i)))
-            .flatten();
-        let (names, units) = match above {
-            Some(above) => (fields(above).0, Some(cells)),
-            None => (cells, None),
-        };
-        Some(Self { names, units, separator, blank_last, body, lines })
-    }
-
-    fn head(self, file: &str) -> Result<Head, TraceError> {
-        if self.names.len() > MAX_COLUMNS {
-            let what = format!("{} columns; at most {MAX_COLUMNS} are read", self.names.len());
-            return Err(TraceError::NoTable { file: file.to_owned(), what });
-        }
-        let mut headers: Vec<Header> = self.names.iter().map(|f| header(f)).collect();
-        for (header, unit) in headers.iter_mut().zip(self.units.iter().flatten()) {
-            let inner = unit.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
-            if header.unit.is_none() && !inner.is_empty() && inner != "-" {
-                header.unit = Some(inner.to_owned());
-            }
-        }
-        distinct(&headers, file)?;
-        Ok(Head { headers, separator: self.separator, blank_last: self.blank_last, body: self.body, lines: self.lines })
-    }
 }
 
 /// Whether a cell is a number.
@@ -547,49 +442,6 @@ fn number(field: &[u8], decimal_comma: bool) -> Option<f64> {
     fast_float2::parse(text).ok().or_else(|| stamp(text))
 }
 
-/// A time of the calendar (ISO 8601, `2026-03-01T12:00:00.125Z`) as seconds since 2000, which leave a double a tenth of a
-/// microsecond; a time of the day alone as seconds since midnight.
-fn stamp(text: &[u8]) -> Option<f64> {
-    // The length alone tells nearly every other text.
-    if !(8..=40).contains(&text.len()) || !text[0].is_ascii_digit() {
-        return None;
-    }
-    let text = std::str::from_utf8(text).ok()?;
-    let (date, clock) = match text.split_once(['T', ' ']) {
-        Some((date, clock)) => (Some(date), clock),
-        None => (None, text),
-    };
-    let (clock, zone) = match clock.strip_suffix('Z') {
-        Some(clock) => (clock, 0.0),
-        None => match clock.rfind(['+', '-']) {
-            Some(k) => {
-                let (hours, minutes) = clock[k + 1..].split_once(':').unwrap_or((&clock[k + 1..], "0"));
-                let size = hours.parse::<f64>().ok()? * 3600.0 + minutes.parse::<f64>().ok()? * 60.0;
-                (&clock[..k], if clock[k..].starts_with('-') { -size } else { size })
-            }
-            None => (clock, 0.0),
-        },
-    };
-    let mut parts = clock.splitn(3, ':');
-    let mut next = |most: f64| parts.next()?.replace(',', ".").parse::<f64>().ok().filter(|v| (0.0..most).contains(v));
-    let (h, m, s) = (next(24.0)?, next(60.0)?, next(61.0)?);
-    let seconds = h * 3600.0 + m * 60.0 + s;
-    let Some(date) = date else { return Some(seconds) };
-    let mut parts = date.splitn(3, '-').map(|p| p.parse::<i64>().ok());
-    let (y, month, d) = (parts.next()??, parts.next()??, parts.next()??);
-    if !(1600..4000).contains(&y) || !(1..=12).contains(&month) || !(1..=31).contains(&d) {
-        return None;
-    }
-    // Days of the civil calendar (H. Hinnant, chrono-compatible low-level date algorithms), counted from 2000-01-01.
-    let (y, month) = if month <= 2 { (y - 1, month + 9) } else { (y, month - 3) };
-    let era = y.div_euclid(400);
-    let day =
-        era * 146_097 + (y - era * 400) * 365 + (y - era * 400) / 4 - (y - era * 400) / 100 + (153 * month + 2) / 5 + d
-            - 1;
-    let from_2000 = day - 730_425;
-    Some(from_2000 as f64 * 86_400.0 + seconds - zone)
-}
-
 fn trim(bytes: &[u8]) -> &[u8] {
     bytes.trim_ascii()
 }
@@ -647,46 +499,6 @@ mod tests {
                 Ok(table) if line == 4 && found == 2 => assert!(table.column(1).is_err(), "{text:?}"),
                 other => panic!("{text:?}: {other:?}"),
             }
-        }
-    }
-
-    #[test]
-    fn lines_above_the_header_a_row_of_units_and_a_mark_at_the_end_are_understood() {
-        for text in [
-            "Logger 7\nDate;2026-03-01\nRate;1000\n\ntime;T\ns;N.m\n0;1,5\n0,1;-2,5\n",
-            "time,T\n[s],[N.m]\n0,1.5\n0.1,-2.5\nEOF\n",
-            "time (s),T/(N.m)\n0,1.5\n0.1,-2.5\n",
-            "machine: lathe\ntime [s]\tT [N.m]\n0\t1.5\n0.1\t-2.5\n",
-        ] {
-            let table = parse(text).unwrap_or_else(|e| panic!("{text:?}: {e}"));
-            assert_eq!(table.headers[0], Header { name: "time".into(), unit: Some("s".into()) }, "{text:?}");
-            assert_eq!(table.headers[1], Header { name: "T".into(), unit: Some("N.m".into()) }, "{text:?}");
-            assert_eq!(table.column(1).unwrap(), [1.5, -2.5], "{text:?}");
-        }
-        // A second row of words is a bad row of data, not a header.
-        assert!(parse("time,T\na,b\n0,1\n1,2\n").is_ok());
-    }
-
-    #[test]
-    fn an_export_of_twincat_scope_is_read_with_a_column_of_time_for_each_channel() {
-        let text = "Name\tScope01\r\nFile\t\r\nStartRecord\t128783093223690000\tThursday\t13:08:42\r\n\r\n\
-                    Name\tActPos\tName\tTorque\r\nSampleTime[ms]\t1\tSampleTime[ms]\t1\r\nData-Type\tREAL64\tData-Type\tREAL64\r\n\
-                    VariableSize\t8\tVariableSize\t8\r\n\r\n0\t-1,037\t0\t5,5\r\n1\t-1,035\t1\t5,25\r\n";
-        let table = parse(text).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(table.names(), "time, ActPos, time 2, Torque");
-        assert_eq!(table.headers[0].unit.as_deref(), Some("ms"));
-        assert_eq!(table.column(3).unwrap(), [5.5, 5.25]);
-    }
-
-    #[test]
-    fn times_of_the_calendar_and_of_the_day_are_seconds() {
-        // Python: datetime.fromisoformat("2026-03-01T12:00:00.125+00:00").timestamp() - 946684800
-        assert_eq!(stamp(b"2026-03-01T12:00:00.125Z"), Some(825_681_600.125));
-        assert_eq!(stamp(b"2026-03-01 13:00:00.125+01:00"), Some(825_681_600.125));
-        assert_eq!(stamp(b"2000-01-01T00:00:00"), Some(0.0));
-        assert_eq!(stamp(b"01:02:03,5"), Some(3723.5));
-        for text in ["2026-13-01T00:00:00", "25:00:00", "10.0.0.1", "12:30", "2026-03-01"] {
-            assert_eq!(stamp(text.as_bytes()), None, "{text}");
         }
     }
 

@@ -3,12 +3,14 @@
 use std::ops::Range;
 use std::path::Path;
 
+use super::clock::{Clock, Resampling, clock};
 use super::error::{TraceError, nearest};
-use super::sampling::{NoGrid, Sampling, grid, resample, resample_far};
+use super::sampling::{resample, resample_far};
 use super::signal::{Motion, Quantity, Signal};
 use super::table::Table;
 use super::units::Unit;
-use super::{Grid, Hold, Trace, guess};
+use super::wrap::unwrap;
+use super::{Hold, Trace, guess};
 
 /// Least samples of a trace.
 pub(super) const SHORTEST: usize = 16;
@@ -228,7 +230,7 @@ pub(super) fn scaled(raw: &[f64], scale: f64, offset: f64) -> Vec<f64> {
 }
 
 /// The values of a column in SI units, scaled.
-fn values(
+pub(super) fn values(
     table: &Table,
     column: &Column,
     signal: &'static str,
@@ -287,247 +289,6 @@ pub(super) fn no_signal(table: &Table) -> TraceError {
             table.names()
         ),
     }
-}
-
-/// Counters of limited width go on where they start anew; says so. A counter of 16 or 32 bits is one whose whole numbers jump
-/// by nearly its width; an angle within one turn jumps by nearly that.
-fn unwrap(
-    values: &mut [f64],
-    table: &Table,
-    column: &Column,
-    signal: Signal,
-    motion: Motion,
-) -> Result<Option<String>, TraceError> {
-    let (_, factor) = scale(table, column, signal.name(), signal.quantity(motion))?;
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    let whole = |v: &f64| ((v - column.offset) / factor).fract() == 0.0;
-    let position = matches!(signal.quantity(motion), Quantity::Angle | Quantity::Length);
-    let turn = signal.quantity(motion) == Quantity::Angle;
-    let mut widths: Vec<(f64, &str)> = Vec::new();
-    if values.iter().take(4096).all(whole) {
-        widths.extend([(65_536.0, "a counter of 16 bits"), (4_294_967_296.0, "a counter of 32 bits")]);
-        widths.iter_mut().for_each(|w| w.0 *= factor.abs());
-    }
-    if turn {
-        widths.push((std::f64::consts::TAU * column.scale.abs(), "an angle within one turn"));
-    }
-    for (width, name) in widths {
-        let jumps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|d| d.abs() > 0.5 * width).collect();
-        // What wraps stays within its width, reaches both ends of it, and leaps nearly all of it at once.
-        let wraps = high - low <= 1.001 * width
-            && high - low > 0.8 * width
-            && !jumps.is_empty()
-            && jumps.iter().all(|d| d.abs() > 0.8 * width)
-            && (position || name.starts_with("a counter"));
-        if !wraps {
-            continue;
-        }
-        let mut turns = 0.0;
-        let mut before = values[0];
-        for v in values.iter_mut() {
-            let step = *v - before;
-            before = *v;
-            if step.abs() > 0.5 * width {
-                turns -= step.signum();
-            }
-            *v += turns * width;
-        }
-        // Where it began is not known: the record is kept near zero for a signal that is no position.
-        if !position && values[0] > 0.5 * width {
-            values.iter_mut().for_each(|v| *v -= width);
-        }
-        return Ok(Some(format!(
-            "{}: column {} starts anew {} times ({name}); it was unwrapped",
-            table.file,
-            column.column,
-            jumps.len()
-        )));
-    }
-    Ok(None)
-}
-
-/// How the columns are brought to the grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Resampling {
-    /// They lie on it.
-    None,
-    /// Each sample is moved by less than half an interval.
-    Near,
-    /// The grid has its own samples: stamps that a computer took, some samples lost.
-    Far { samples: usize },
-}
-
-/// The grid of a record, and the rows of the file that it is.
-struct Clock {
-    grid: Grid,
-    rows: Range<usize>,
-    stamps: Option<Vec<f64>>,
-    resampling: Resampling,
-}
-
-/// Stamps that count from a calendar's beginning, in a unit that only their size tells, brought to seconds from the first.
-fn epoch(time: &mut [f64], table: &Table, column: &Column, warnings: &mut Vec<String>) -> Result<(), TraceError> {
-    let given = scale(table, column, "time", Quantity::Time)?;
-    let has_unit = given.1 != 1.0 || table.headers[given.0].unit.is_some() || column.unit.is_some();
-    let Some(first) = time.first().copied().filter(|t| *t > 1e8 && !has_unit) else { return Ok(()) };
-    // Seconds, milli-, micro- and nanoseconds since 1970 of the years 1973 to 2286; FILETIME of Windows counts tenths of a
-    // microsecond since 1601.
-    let (name, factor) = match first {
-        t if t < 1e10 => ("seconds", 1.0),
-        t if (1e11..1e13).contains(&t) => ("milliseconds", 1e-3),
-        t if (1e14..1e16).contains(&t) => ("microseconds", 1e-6),
-        t if (1e17..5e17).contains(&t) => ("tenths of a microsecond (FILETIME)", 1e-7),
-        t if (5e17..1e19).contains(&t) => ("nanoseconds", 1e-9),
-        _ => return Ok(()),
-    };
-    time.iter_mut().for_each(|t| *t = (*t - first) * factor);
-    warnings.push(format!(
-        "{}: the time stamps of column {} are taken for {name} of a calendar and count from the first one; --from and --to count \
-         from there",
-        table.file, column.column
-    ));
-    Ok(())
-}
-
-/// A gap of more than so many intervals is not bridged: the record is cut there.
-const BRIDGED: f64 = 6.0;
-/// Share of the samples that may be missing in bridged gaps.
-const MISSING: f64 = 0.05;
-
-/// The grid: cut by `from` and `to`, at gaps, and brought to even steps where the stamps are not.
-fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Result<Clock, TraceError> {
-    let file = || table.file.clone();
-    let count = table.rows();
-    let short = |found: usize| TraceError::Cut { file: file(), found, rows: count, needed: SHORTEST };
-    let Some(column) = time_column(table, mapping)? else {
-        let dt = mapping.dt.unwrap_or(1.0);
-        let index = |t: f64| (t / dt).round().clamp(0.0, count as f64) as usize;
-        let rows = mapping.from.map_or(0, index)..mapping.to.map_or(count, |t| (index(t) + 1).min(count));
-        if rows.len() < SHORTEST {
-            return Err(short(rows.len()));
-        }
-        let start = rows.start as f64 * dt;
-        let grid = Grid { start, dt, sampling: Sampling::Uniform };
-        return Ok(Clock { grid, rows, stamps: None, resampling: Resampling::None });
-    };
-    let mut time = values(table, &column, "time", Quantity::Time, &(0..count))?;
-    epoch(&mut time, table, &column, warnings)?;
-    let mut rows = 0..count;
-    if mapping.from.is_some() || mapping.to.is_some() {
-        let (from, to) = (mapping.from.unwrap_or(f64::NEG_INFINITY), mapping.to.unwrap_or(f64::INFINITY));
-        // Half a sample of tolerance, as stamps are written with few digits.
-        let slack = if count > 1 { 0.5 * (time[count - 1] - time[0]).abs() / (count - 1) as f64 } else { 0.0 };
-        let first = time.iter().position(|t| *t >= from - slack).unwrap_or(count);
-        let last = time.iter().rposition(|t| *t <= to + slack).map_or(0, |k| k + 1);
-        rows = first..last.max(first);
-        if rows.len() < SHORTEST {
-            return Err(short(rows.len()));
-        }
-        time = time[rows.clone()].to_vec();
-    }
-    let line = |rows: &Range<usize>, k: usize| table.line(rows.start + k);
-    let mut found = grid(&time);
-    if let Err(NoGrid::Gap { row, gap, dt: middle }) = found {
-        // Stamps that a computer took come in clusters: the mean of the steps without lost samples is the rate.
-        let steps = || time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= 2.5 * middle);
-        let usual = (steps().sum::<f64>() / steps().count().max(1) as f64).max(middle);
-        let dt = usual;
-        let wide = |k: usize| time[k] - time[k - 1] > BRIDGED * usual;
-        let missing: f64 =
-            (1..time.len()).map(|k| ((time[k] - time[k - 1]) / usual).round() - 1.0).filter(|m| *m > 0.0).sum();
-        let (mut best, mut start) = (0..0, 0);
-        for k in 1..=time.len() {
-            if k == time.len() || wide(k) {
-                if k - start > best.len() {
-                    best = start..k;
-                }
-                start = k;
-            }
-        }
-        let refused = TraceError::Gap {
-            file: file(),
-            line: line(&rows, row),
-            gap,
-            missing: ((gap / dt).round() as usize).saturating_sub(1).max(1),
-            dt,
-        };
-        let bridges = missing <= MISSING * time.len() as f64;
-        if best.len() < SHORTEST || (best.len() == time.len() && !bridges) {
-            return Err(refused);
-        }
-        if best.len() < time.len() {
-            let pieces = 1 + (1..time.len()).filter(|k| wide(*k)).count();
-            warnings.push(format!(
-                "{}: the record has gaps and is {pieces} pieces (the first ends before row {}); the longest is used, {} of {} \
-                 samples, {:.6} s to {:.6} s. Another is taken with --from and --to",
-                table.file,
-                line(&rows, (1..time.len()).find(|k| wide(*k)).unwrap_or(row)),
-                best.len(),
-                time.len(),
-                time[best.start],
-                time[best.end - 1]
-            ));
-            rows = rows.start + best.start..rows.start + best.end;
-            time = time[best].to_vec();
-            found = grid(&time);
-        }
-    }
-    let named = |e: NoGrid| match e {
-        NoGrid::TooShort => TraceError::TooShort { file: file(), found: time.len(), needed: SHORTEST },
-        NoGrid::NotIncreasing { row } => {
-            TraceError::NotIncreasing { file: file(), line: line(&rows, row), before: time[row - 1], after: time[row] }
-        }
-        NoGrid::Gap { row, gap, dt } => TraceError::Gap {
-            file: file(),
-            line: line(&rows, row),
-            gap,
-            missing: ((gap / dt).round() as usize).saturating_sub(1).max(1),
-            dt,
-        },
-        NoGrid::Jitter { row, jitter, dt } => TraceError::Jitter {
-            file: file(),
-            line: line(&rows, row),
-            jitter: 100.0 * jitter,
-            limit: 100.0 * Sampling::RESAMPLED,
-            dt,
-        },
-    };
-    let (grid, resampling) = match found {
-        Ok(grid) => match grid.sampling {
-            Sampling::Uniform => (grid, Resampling::None),
-            Sampling::Jittered { jitter } => {
-                warnings.push(format!(
-                    "{}: the time stamps are up to {:.1} % of a sample off uniform sampling; the trace was resampled to dt = \
-                     {:.9e} s. If the sampling is uniform and only its stamps are not, give dt in [signals] and leave the time \
-                     column out",
-                    table.file,
-                    100.0 * jitter,
-                    grid.dt
-                ));
-                (grid, Resampling::Near)
-            }
-        },
-        Err(NoGrid::Gap { dt: middle, .. } | NoGrid::Jitter { dt: middle, .. }) => {
-            let (start, end) = (time[0], time[time.len() - 1]);
-            let steps = || time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= 2.5 * middle);
-            let dt = steps().sum::<f64>() / steps().count().max(1) as f64;
-            let samples = ((end - start) / dt).round() as usize + 1;
-            let grid =
-                Grid { start, dt: (end - start) / (samples - 1) as f64, sampling: Sampling::Jittered { jitter: 0.5 } };
-            warnings.push(format!(
-                "{}: the steps between time stamps are uneven ({} stamps for {samples} samples at an even rate); the trace \
-                 was resampled to dt = {:.9e} s. What moves faster than about {:.4} Hz is smeared by it",
-                table.file,
-                time.len(),
-                grid.dt,
-                // A cubic through four samples keeps 97 % of an amplitude up to a tenth of the sampling rate.
-                0.1 / grid.dt
-            ));
-            (grid, Resampling::Far { samples })
-        }
-        Err(e) => return Err(named(e)),
-    };
-    Ok(Clock { grid, rows, stamps: Some(time), resampling })
 }
 
 #[cfg(test)]

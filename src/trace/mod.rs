@@ -5,6 +5,7 @@
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
 //! record: see [`Trace::hold`].
 
+mod clock;
 mod csv;
 mod error;
 mod forms;
@@ -19,6 +20,7 @@ mod signal;
 pub mod stream;
 mod table;
 mod units;
+mod wrap;
 mod write;
 
 use std::ops::Range;

@@ -1,0 +1,159 @@
+//! The encoder of the table beside that of the motor.
+
+use rustfft::num_complex::Complex;
+
+use super::balance::{COHERENT, MAIN, T, TABLE};
+use super::finding::{Finding, Severity};
+use super::least::non_negative;
+use super::pairs::factor;
+use super::spectra::Spectra;
+use super::{Input, Structure};
+
+/// The two encoders against each other: sign, scale, and which one is the motor's.
+pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
+    let together: Vec<usize> =
+        (0..s.lines).filter(|f| s.coherence(MAIN, TABLE, *f) > s.by_chance().max(COHERENT)).collect();
+    // At the lines where the torque moves anything: does the table move with the motor, or with the torque? A table that is
+    // moved by something else as well (a stop, stick and slip) still does at some, or where most of the motion is.
+    let chance = s.by_chance();
+    let own = lines.iter().filter(|f| s.coherence(MAIN, TABLE, **f).max(s.coherence(T, TABLE, **f)) > chance).count();
+    let driven = || 0..=lines[lines.len() - 1];
+    let common: f64 = driven().map(|f| s.power(MAIN, f) * s.coherence(MAIN, TABLE, f)).sum();
+    let motion: f64 = driven().map(|f| s.power(MAIN, f)).sum();
+    if (own as f64) < 0.1 * lines.len() as f64 && common < chance.max(0.3) * motion {
+        findings.push(Finding::new(
+            "foreign",
+            Severity::Refuse,
+            "theta2",
+            "theta2 does not follow theta1 where the torque moves it.",
+            "It comes from another axis or another time, or one of the encoders is broken.",
+            "Map the right columns in [signals], or leave theta2 out.",
+        ));
+        return;
+    }
+    if together.is_empty() {
+        return;
+    }
+    // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
+    let total: f64 = together.iter().map(|f| s.power(MAIN, *f)).sum();
+    let mut sum = 0.0;
+    let low: Vec<usize> = together
+        .iter()
+        .copied()
+        .take_while(|f| {
+            let take = sum < 0.1 * total;
+            sum += s.power(MAIN, *f);
+            take
+        })
+        .collect();
+    let cross: Complex<f64> = low.iter().map(|f| s.of(MAIN, TABLE, *f)).sum();
+    let power: f64 = low.iter().map(|f| s.power(MAIN, *f)).sum();
+    let gain = cross / power;
+    let expected = input.nominal.filter(|n| n.structure == Structure::TwoInertia).map_or(1.0, |n| {
+        let p = n.parameters;
+        let w = s.omega(low[low.len() / 2]);
+        let spring = Complex::new(p.k, w * p.b);
+        (spring / (spring - p.i2 * w * w)).re
+    });
+    let ratio = gain.re / expected;
+    // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
+    if gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0 {
+        findings.push(Finding::new(
+            "sign",
+            Severity::Refuse,
+            "theta2",
+            "theta2 runs against theta1.",
+            "One of the two encoders counts the other way round.",
+            "Give its column scale = -1 in [signals] of the axis file.",
+        ));
+        return;
+    }
+    let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
+    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
+    let words = lead
+        .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
+        .or_else(|| factor(ratio).map(str::to_owned));
+    if let Some(words) = words.filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25) {
+        findings.push(Finding::new(
+            "units",
+            Severity::Refuse,
+            "theta2",
+            format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {words}."),
+            "One of the two columns is in another unit than the file says.",
+            "Give the unit in the header or in [signals] (unit = \"deg\"), or scale by the gear ratio.",
+        ));
+        return;
+    }
+    if !(0.6..1.67).contains(&ratio.abs()) {
+        findings.push(Finding::new(
+            "scale",
+            Severity::Warn,
+            "theta2",
+            format!("theta2 moves {ratio:.4} times as far as theta1 at the lowest frequencies."),
+            "A gear lies between the encoders, or the record holds no motion slow enough to tell.",
+            "Give theta2 the gear's ratio as scale in [signals], so that both count the same angle.",
+        ));
+    }
+    // The table is moved by the twist alone: I2*a2 = B*d' + K*d. Which of the two is?
+    let misfit = |of: usize, sense: f64| -> f64 {
+        let (mut aa, mut ad, mut dd, mut av, mut dv, mut vv) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        for &f in lines.iter().filter(|f| s.coherence(MAIN, TABLE, **f) > COHERENT) {
+            let w = s.omega(f);
+            let j = Complex::new(0.0, w);
+            // Spectra of a (of the channel), d = (v1 - v2)/(jw), d' = v1 - v2.
+            let twist_twist = s.power(MAIN, f) + s.power(TABLE, f) - 2.0 * s.of(MAIN, TABLE, f).re;
+            let own_twist = (s.of(of, MAIN, f) - s.of(of, TABLE, f)) * sense;
+            aa += w * w * s.power(of, f);
+            // conj(a)*d = conj(jw*v)*(v1 - v2)/(jw)
+            ad += (j.conj() * own_twist / j).re;
+            av += (j.conj() * own_twist).re;
+            dd += twist_twist / (w * w);
+            vv += twist_twist;
+            dv += (twist_twist / j.conj()).re;
+        }
+        if aa <= 0.0 || dd <= 0.0 {
+            return 1.0;
+        }
+        let gram = [vec![dd, dv], vec![dv, vv]];
+        1.0 - non_negative(&gram, &[ad, av]).1 / aa
+    };
+    let (as_given, exchanged) = (misfit(TABLE, 1.0), misfit(MAIN, -1.0));
+    // A blow on the table (the end of its travel) drives it as the torque drives a motor: the torque must speak for the
+    // exchange, too.
+    let unexplained = |motor: usize, table: usize| motor_side(s, lines, motor, table);
+    let speaks = || unexplained(TABLE, MAIN) < 0.5 * unexplained(MAIN, TABLE);
+    if exchanged < 0.3 && as_given > 3.0 * exchanged && speaks() {
+        findings.push(Finding::new(
+            "swapped",
+            Severity::Refuse,
+            "theta1, theta2",
+            "theta1 moves as a table does and theta2 as a motor: the twist drives theta1.",
+            "The two encoders' columns are exchanged.",
+            "Exchange them in [signals] of the axis file.",
+        ));
+    }
+}
+
+/// Share of the torque that the motor's side leaves unexplained: `T = I1*a + B*d' + K*d` holds whatever acts on the table.
+pub(super) fn motor_side(s: &Spectra, lines: &[usize], motor: usize, table: usize) -> f64 {
+    let (mut gram, mut right, mut size) = (vec![vec![0.0; 3]; 3], vec![0.0; 3], 0.0);
+    for &f in lines {
+        let j = Complex::new(0.0, s.omega(f));
+        let one = Complex::new(1.0, 0.0);
+        let of = [[(motor, j), (motor, j * 0.0)], [(motor, one), (table, -one)], [(motor, one / j), (table, -one / j)]];
+        for (i, a) in of.iter().enumerate() {
+            for (ca, fa) in a {
+                right[i] += (fa.conj() * s.of(*ca, T, f)).re;
+                for (k, b) in of.iter().enumerate() {
+                    gram[i][k] += b.iter().map(|(cb, fb)| (fa.conj() * *fb * s.of(*ca, *cb, f)).re).sum::<f64>();
+                }
+            }
+        }
+        size += s.power(T, f);
+    }
+    // Columns of unit size.
+    let unit: Vec<f64> = (0..3).map(|i| gram[i][i].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let gram: Vec<Vec<f64>> = (0..3).map(|i| (0..3).map(|k| gram[i][k] / unit[i] / unit[k]).collect()).collect();
+    let right: Vec<f64> = (0..3).map(|i| right[i] / unit[i]).collect();
+    1.0 - non_negative(&gram, &right).1 / size.max(f64::MIN_POSITIVE)
+}

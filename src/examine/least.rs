@@ -1,0 +1,29 @@
+//! Least squares with coefficients that may not be negative.
+
+/// Least squares with coefficients of at least zero: `gram*x = right`; gives x and the energy explained, `2*x.right - x.gram.x`.
+pub(super) fn non_negative(gram: &[Vec<f64>], right: &[f64]) -> (Vec<f64>, f64) {
+    let p = right.len();
+    let mut x = vec![0.0; p];
+    for _ in 0..400 {
+        let mut moved = 0.0_f64;
+        for i in 0..p {
+            if gram[i][i] <= 0.0 {
+                continue;
+            }
+            let rest: f64 = (0..p).filter(|j| *j != i).map(|j| gram[i][j] * x[j]).sum();
+            let new = ((right[i] - rest) / gram[i][i]).max(0.0);
+            moved = moved.max((new - x[i]).abs() * gram[i][i].sqrt());
+            x[i] = new;
+        }
+        let size = right
+            .iter()
+            .zip(gram)
+            .map(|(r, g)| r.abs() / g.iter().fold(0.0_f64, |m, v| m.max(*v)).sqrt())
+            .fold(0.0, f64::max);
+        if moved <= 1e-9 * size {
+            break;
+        }
+    }
+    let explained = (0..p).map(|i| x[i] * (2.0 * right[i] - (0..p).map(|j| gram[i][j] * x[j]).sum::<f64>())).sum();
+    (x, explained)
+}

@@ -1,0 +1,63 @@
+//! Counters of limited width.
+
+use super::error::TraceError;
+use super::load::{Column, scale};
+use super::signal::{Motion, Quantity, Signal};
+use super::table::Table;
+
+/// Counters of limited width go on where they start anew; says so. A counter of 16 or 32 bits is one whose whole numbers jump
+/// by nearly its width; an angle within one turn jumps by nearly that.
+pub(super) fn unwrap(
+    values: &mut [f64],
+    table: &Table,
+    column: &Column,
+    signal: Signal,
+    motion: Motion,
+) -> Result<Option<String>, TraceError> {
+    let (_, factor) = scale(table, column, signal.name(), signal.quantity(motion))?;
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let whole = |v: &f64| ((v - column.offset) / factor).fract() == 0.0;
+    let position = matches!(signal.quantity(motion), Quantity::Angle | Quantity::Length);
+    let turn = signal.quantity(motion) == Quantity::Angle;
+    let mut widths: Vec<(f64, &str)> = Vec::new();
+    if values.iter().take(4096).all(whole) {
+        widths.extend([(65_536.0, "a counter of 16 bits"), (4_294_967_296.0, "a counter of 32 bits")]);
+        widths.iter_mut().for_each(|w| w.0 *= factor.abs());
+    }
+    if turn {
+        widths.push((std::f64::consts::TAU * column.scale.abs(), "an angle within one turn"));
+    }
+    for (width, name) in widths {
+        let jumps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|d| d.abs() > 0.5 * width).collect();
+        // What wraps stays within its width, reaches both ends of it, and leaps nearly all of it at once.
+        let wraps = high - low <= 1.001 * width
+            && high - low > 0.8 * width
+            && !jumps.is_empty()
+            && jumps.iter().all(|d| d.abs() > 0.8 * width)
+            && (position || name.starts_with("a counter"));
+        if !wraps {
+            continue;
+        }
+        let mut turns = 0.0;
+        let mut before = values[0];
+        for v in values.iter_mut() {
+            let step = *v - before;
+            before = *v;
+            if step.abs() > 0.5 * width {
+                turns -= step.signum();
+            }
+            *v += turns * width;
+        }
+        // Where it began is not known: the record is kept near zero for a signal that is no position.
+        if !position && values[0] > 0.5 * width {
+            values.iter_mut().for_each(|v| *v -= width);
+        }
+        return Ok(Some(format!(
+            "{}: column {} starts anew {} times ({name}); it was unwrapped",
+            table.file,
+            column.column,
+            jumps.len()
+        )));
+    }
+    Ok(None)
+}
