@@ -201,7 +201,7 @@ fn shares(torque: &[f64], theta: &[f64], dt: f64) -> [f64; 3] {
 }
 
 /// The estimates, where they are those of an axis. A friction that is negative within its error is none.
-fn physical(mut found: Rigid) -> Result<Rigid, String> {
+fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
     let (v, s) = (&found.values, &found.std);
     if !v.iter().chain(s.iter()).all(|v| v.is_finite()) || v[0] <= 0.0 {
         return Err("the inertia comes out negative or without bound: the torque of this record does not accelerate this axis, or \
@@ -209,10 +209,8 @@ fn physical(mut found: Rigid) -> Result<Rigid, String> {
                     (`eixo inspect`), or diagnose it"
             .to_owned());
     }
-    let size = rms(&found.fit.1);
     for (i, name) in [(1, "viscous friction"), (2, "dry friction")] {
-        // A friction of a share of the torque that counts, in units of the torque where the regressor is a sign.
-        let material = i == 1 || -v[i] > SMALL_TORQUE * size;
+        let material = -v[i] * shares[i - 1] > SMALL_TORQUE;
         if v[i] + 3.0 * s[i] < 0.0 && material {
             return Err(format!(
                 "the {name} comes out negative: something else moves the axis with its motion (gravity, a spring, another drive), \
@@ -257,7 +255,7 @@ pub(super) fn identify(
     let mut recommended = None;
     let mut evidence = Evidence::default();
     let found = weak_least_squares(torque, theta, trace.dt, trace.start).map_err(|e| e.to_string());
-    match found.and_then(physical) {
+    match found.and_then(|f| physical(f, &shares(torque, theta, trace.dt))) {
         Ok(found) => {
             let window = (2 * found.half + 1) as f64 * trace.dt;
             result.formulation =

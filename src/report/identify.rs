@@ -173,7 +173,9 @@ fn fit_percent(fit: f64) -> String {
 
 /// Whether an estimate is one: finite, and larger than its standard error.
 fn is_shown(e: &Estimate) -> bool {
-    e.value.is_finite() && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
+    // What no axis has is not shown as a value of it.
+    let negative = e.value < 0.0 && matches!(e.name, "I" | "I1" | "I2" | "B" | "K" | "wn" | "zeta");
+    e.value.is_finite() && !negative && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
 }
 
 fn value(e: &Estimate) -> Cell {
