@@ -70,6 +70,12 @@ FAMILY = {
     "torque_gain": ("parameters", "input"),
     "encoder_quantisation": ("sensor", "sensor"), "sensor_delay": ("sensor", "sensor"), "lead_error": ("sensor", "sensor"),
 }
+# The second edition's (conditions.py). Apart from FAMILY, whose order is part of the first edition's random streams.
+SECOND = {
+    "gravity": ("gravity", "table"), "external_spring": ("external_spring", "table"), "dead_zone": ("dead_zone", "input"),
+    "position_friction": ("position_friction", "motor"), "motor_mode": ("flexible_mode", "motor"), "latch": ("latch", "sensor"),
+}
+KNOWN = FAMILY | SECOND
 # Effects that show only when the axis turns far enough; their excitation is always tilted to low frequency.
 TURNING = {"torque_ripple", "unbalance", "lead_error", "end_stop"}
 # Effects a base-parameter fit absorbs by construction: no gap is left after it.

@@ -2,8 +2,8 @@
 
     .venv/bin/python scripts/blind/run.py --cases DIR [--eixo target/release/eixo] [--jobs 2] [--half tuning|scoring|all]
 
-DIR is what generate.py wrote. Answers go to DIR/answers (kept with their stderr), the result to DIR/result.md and
-DIR/result.json. Exit code 0, or 1 when a threshold given by --need is missed, or 2 when the check could not run.
+DIR is what generate.py or conditions.py wrote (the index beside the seals tells which). Answers go to DIR/answers (kept with their stderr,
+seconds and peak memory), the result to DIR/result.md and DIR/result.json, of the second edition with DIR/reliability.svg. Exit code 0, or 1 when a threshold given by --need is missed, or 2 when the check could not run.
 """
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ import sys
 import time
 
 import effects
+import outcome
+import reliability
 import score
 
 
@@ -29,22 +31,29 @@ def load(path: pathlib.Path):
 
 
 def diagnose(eixo: pathlib.Path, case: pathlib.Path, out: pathlib.Path, threads: int, timeout: float, without=()):
-    """Run one diagnosis in the case's own folder, which holds nothing of the seal; returns the seconds it took, or None if cut off."""
+    """Run one diagnosis in the case's own folder, which holds nothing of the seal; returns its seconds (None if cut off) and peak memory in MB."""
     command = [str(eixo), "diagnose", "train.csv", "--axis", "axis.toml", "--holdout", "holdout.csv", "--json", str(out)]
     if without:
         command += ["--without", ",".join(without)]
     out.unlink(missing_ok=True)
     begun = time.perf_counter()
     with open(out.with_suffix(".err"), "w") as err:
-        try:
-            code = subprocess.run(command, cwd=case, stdout=subprocess.DEVNULL, stderr=err, timeout=timeout,
-                                  env=os.environ | {"RAYON_NUM_THREADS": str(threads)}).returncode
-        except subprocess.TimeoutExpired:
+        child = subprocess.Popen(command, cwd=case, stdout=subprocess.DEVNULL, stderr=err, env=os.environ | {"RAYON_NUM_THREADS": str(threads)})
+        cut = False
+        while True:  # wait4 tells the memory of this child alone
+            pid, status, used = os.wait4(child.pid, os.WNOHANG)
+            if pid:
+                break
+            if not cut and time.perf_counter() - begun > timeout:
+                cut = True
+                child.kill()
+            time.sleep(0.01)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        if cut:
             err.write(f"\ncut off after {timeout} s\n")
-            return None
-    if code not in (0, 1):
+    if cut or child.returncode not in (0, 1):
         out.unlink(missing_ok=True)
-    return time.perf_counter() - begun
+    return None if cut else time.perf_counter() - begun, used.ru_maxrss / 1024
 
 
 def run_all(tasks, jobs: int, label: str) -> dict:
@@ -61,8 +70,10 @@ def run_all(tasks, jobs: int, label: str) -> dict:
     return results
 
 
-def check(needs: list[str], s: dict) -> list[str]:
+def check(needs: list[str], s: dict, second: bool = False) -> list[str]:
     """Thresholds missed, in words; needs are name=value."""
+    if second:
+        return [m for m in (outcome.check(need, s) for need in needs) if m]
     c = s["closure_of_oracle"]["all_singles"]
     value = {
         "family": s["singles"]["family_right"]["share"], "place": s["singles"]["place_right"]["share"],
@@ -90,7 +101,10 @@ def main(argv=None) -> int:
     parser.add_argument("--eixo", type=pathlib.Path, default=root / "target/release/eixo")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="diagnoses at a time, each on its share of the cores")
     parser.add_argument("--half", choices=["tuning", "scoring", "all"], default="all")
-    parser.add_argument("--classes", help="only these classes, comma-separated")
+    parser.add_argument("--classes", help="only these classes (second edition: groups), comma-separated")
+    parser.add_argument("--axes", help="second edition: only these axes, comma-separated")
+    parser.add_argument("--conditions", help="second edition: only cases with one of these conditions, comma-separated, as in the tables")
+    parser.add_argument("--only", help="only these cases, comma-separated")
     parser.add_argument("--no-without", action="store_true", help="skip the abstention run (half of the time)")
     parser.add_argument("--rescore", action="store_true", help="score the answers that are there; run only what is missing")
     parser.add_argument("--timeout", type=float, default=300.0, help="seconds a case")
@@ -109,21 +123,41 @@ def main(argv=None) -> int:
     answers.mkdir(exist_ok=True)
     # The index beside the seals says which half and class a case belongs to, so that the seals stay shut while cases run.
     index = json.loads((args.cases / "seals" / "index.json").read_text())
-    picked = [n for n in cases if args.half in ("all", index[n]["half"])
-              and (not args.classes or index[n]["class"] in args.classes.split(","))]
+    second = any(entry.get("edition") == 2 for entry in index.values())
+    listed = lambda text: None if text is None else {x.strip() for x in text.split(",")}
+    classes, wanted, on, under = (listed(x) for x in (args.classes, args.only, args.axes, args.conditions))
+    if (on or under) and not second:
+        print(f"--axes and --conditions pick from a set of conditions.py; {args.cases} is one of generate.py", file=sys.stderr)
+        return 2
+    picked = [n for n in cases if args.half in ("all", index[n]["half"]) and (classes is None or index[n]["class"] in classes)
+              and (wanted is None or n in wanted) and (on is None or index[n]["axis"] in on)
+              and (under is None or under & set(index[n]["conditions"]))]
+    if not picked:
+        print(f"none of the {len(cases)} cases in {args.cases} is picked by --half, --classes, --axes, --conditions, --only", file=sys.stderr)
+        return 2
     threads = max(1, (os.cpu_count() or 1) // args.jobs)
 
     def task(name, out, without=()):
         return lambda: diagnose(eixo, cases[name], out, threads, args.timeout, without)
 
     todo = {n: task(n, answers / f"{n}.json") for n in picked if not (args.rescore and (answers / f"{n}.json").exists())}
-    times_path = answers / "seconds.json"
-    times = (load(times_path) or {}) if args.rescore else {}
-    times |= run_all(todo, args.jobs, "diagnosed")
-    times_path.write_text(json.dumps(times, indent=1) + "\n")
+    spent = {}
+    for what in ("seconds", "memory_mb"):
+        spent[what] = (load(answers / f"{what}.json") or {}) if args.rescore else {}
+    for n, (seconds, memory) in run_all(todo, args.jobs, "diagnosed").items():
+        spent["seconds"][n], spent["memory_mb"][n] = seconds, memory
+    for what, values in spent.items():
+        (answers / f"{what}.json").write_text(json.dumps(values, indent=1) + "\n")
+    times = spent["seconds"]
 
     # Every diagnosis is done: open the seals.
     seals = {n: json.loads((args.cases / "seals" / f"{n}.json").read_text()) for n in picked}
+    if second:
+        rows = [outcome.judge(seals[n], load(answers / f"{n}.json"), times.get(n), spent["memory_mb"].get(n)) for n in picked]
+        figures = outcome.summary(rows)
+        (args.cases / "reliability.svg").write_text(reliability.svg(figures["calibration"]))
+        title = f"Withheld-effect check, second edition: {len(rows)} cases, half: {args.half}"
+        return finish(args, {"figures": figures, "cases": rows}, outcome.markdown(figures, rows, title, "reliability.svg"), True)
     without = []
     if not args.no_without:
         todo, singles = {}, []
@@ -147,13 +181,18 @@ def main(argv=None) -> int:
     lines += [f"| {w['case']} | {w['class']} | {w['outcome']} | {w['told']} | {score.number(w['closure'])} |"
               for w in sorted(without, key=lambda w: w["class"]) if w["outcome"] != "abstained"]
     text += "\n".join(lines) + "\n" if without else ""
-    (args.cases / "result.json").write_text(json.dumps({"figures": figures, "cases": rows, "without": without}, indent=1) + "\n")
+    return finish(args, {"figures": figures, "cases": rows, "without": without}, text, False)
+
+
+def finish(args, result: dict, text: str, second: bool) -> int:
+    """Write the result, print it, and hold it against the thresholds."""
+    (args.cases / "result.json").write_text(json.dumps(result, indent=1) + "\n")
     (args.cases / "result.md").write_text(text)
     if args.report:
         args.report.write_text(text)
     print(text)
     try:
-        missed = check(args.need, figures)
+        missed = check(args.need, result["figures"], second)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
