@@ -78,9 +78,9 @@ def labels(case: dict) -> list:
     return out
 
 
-def pick_effects(rng, group: str, machine, sensors: str, loop: str, which: int) -> list:
+def pick_effects(rng, group: str, machine, sensors: str, which: int) -> list:
     """Effect ids of a case; the first of a single walks through the list, so that each comes up."""
-    ids = hidden.possible(machine, sensors, loop)
+    ids = hidden.possible(machine, sensors)
     if group in ("healthy", "parameters", "foreign"):
         return []
     if group in ("single", "beside"):
@@ -139,7 +139,7 @@ def draw_case(group: str, kind: str, seed: int, r: int, attempt: int) -> dict | 
     machine = axes.draw(kind, rng, c["fast"], c["unlike"])
     sensors = "motor" if machine.rigid else str(choice.choice(["both", "motor", "velocities"], p=[0.65, 0.3, 0.05]))
     which = nth_of_group(r // 2) if attempt < 4 * KEEP else int(choice.integers(1000))
-    ids = pick_effects(choice, group, machine, sensors, c["loop"], which)
+    ids = pick_effects(choice, group, machine, sensors, which)
     if any(effects.KNOWN.get(e, ("", ""))[1] == "sensor" and e != "latch" for e in ids) and sensors == "motor":
         return None
     timed = {"delay", "latch", "sensor_delay", "actuator_lag"}.intersection(ids)

@@ -53,7 +53,7 @@ def accepted(draw: Draw, rigid: bool) -> set:
     return out
 
 
-def possible(machine: Machine, sensors: str, loop: str) -> list:
+def possible(machine: Machine, sensors: str) -> list:
     """Effects that this axis can have and this log can show."""
     ids = list(RIGID if machine.rigid else TWO)
     if sensors == "motor":
