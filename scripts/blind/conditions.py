@@ -104,12 +104,14 @@ def pick_effects(rng, group: str, machine, sensors: str, which: int) -> list:
             return picked
 
 
-def sizes(rng, group: str, ids) -> list:
-    """Shares of the moving torque, 3 to 50 %; of several the smaller near the larger, of a real machine as they come."""
+def sizes(rng, group: str, ids, again: int) -> list:
+    """Shares of the moving torque, 3 to 50 %; of several the smaller near the larger, of a real machine as they come.
+
+    again: attempts that the same effects have failed; in the second half of them the smallest sizes are left out."""
     if group == "machine":
         own = {"load_motor": (0.02, 0.3), "torque_ripple": (0.01, 0.05), "gravity": (0.1, 1.0)}
         return [log_uniform(rng, *own.get(e, (0.05, 0.4))) for e in ids]
-    first = log_uniform(rng, 0.03 if group != "beside" else 0.08, 0.5)
+    first = log_uniform(rng, (0.03 if group != "beside" else 0.08) if again < KEEP // 2 else 0.15, 0.5)
     return [first] + [min(0.5, max(0.03, first * rng.uniform(0.5, 1.5))) for _ in ids[1:]]
 
 
@@ -177,7 +179,8 @@ def draw_case(group: str, kind: str, seed: int, r: int, attempt: int) -> dict | 
     ref = effects.Reference(axes.sizing(machine), machine.dt, n * machine.dt, plain.command[train.kept], plain.states[train.kept],
                             1 / (n * machine.dt), 1.5 * machine.band, machine.band, train.hold == "linear")
     ref.torque_rms = machine.level
-    draws = [hidden.draw(e, machine, ref, rng, s, train.drive is not None) for e, s in zip(ids, sizes(rng, group, ids))]
+    reach = hidden.REACH_OF_MACHINES if group == "machine" else hidden.REACH
+    draws = [hidden.draw(e, machine, ref, rng, s, train.drive is not None, reach) for e, s in zip(ids, sizes(rng, group, ids, attempt % KEEP))]
     params, sensor, bias = generate.combine(draws)
     base = machine.base | params
     known, kept_bias = {}, None

@@ -12,7 +12,7 @@ import effects
 import plant
 from axes import Machine, log_uniform
 from effects import Draw, rms
-from motion import SUBSTEPS_STIFF
+from motion import SUBSTEPS, SUBSTEPS_STIFF
 
 RIGID = ("coulomb_motor", "presliding_motor", "viscous_motor", "load_motor", "torque_ripple", "friction_drift", "flexible_mode",
          "disturbance", "quadratic_drag", "end_stop", "saturation", "actuator_lag", "delay", "gravity", "external_spring", "dead_zone",
@@ -36,6 +36,8 @@ GROUPS = ({"coulomb_motor", "presliding_motor", "friction_drift", "coulomb_load"
           {"viscous_motor", "friction_drift"}, {"backlash", "cubic_stiffness", "coupling_hysteresis", "stiffness_drift"},
           {"saturation", "dead_zone"}, {"delay", "latch", "sensor_delay"}, {"actuator_lag", "latch"}, {"gravity", "unbalance"},
           {"load_motor", "load_table"})
+# Of presliding over the travel: drawn to be seen, and as guides have it.
+REACH, REACH_OF_MACHINES = (0.005, 0.1), (5e-4, 0.01)
 # The same law, or the same equation on a time-invariant axis: no record can tell them apart, so either name is right.
 LATE = {"latch", "delay", "sensor"}
 TWINS = {"delay": {"latch"}, "actuator_lag": {"latch"}, "gravity": {"unbalance"}, "unbalance": {"gravity"}}
@@ -74,8 +76,16 @@ def _times(rng, machine, low, high):
     return machine.dt * rng.uniform(low, min(high, max(low * 1.5, 0.25 / (machine.band * machine.dt))))
 
 
-def draw(effect: str, machine: Machine, ref: effects.Reference, rng, size: float, closed: bool) -> Draw:
-    """Parameters of `effect` at `size` of the level of `ref`."""
+def _presliding(machine: Machine, ref, rng, level: float, place: str, reach: tuple) -> dict:
+    """A soft bristle that breaks away within `reach` of the travel (range, log-uniform), damped below critical."""
+    key, inertia, th = ("fm", ref.base["I1"], ref.states[:, 0]) if place == "motor" else ("ft", ref.base["I2"], ref.states[:, 2])
+    s0 = level / (log_uniform(rng, *reach) * float(np.ptp(th)))
+    s0 = min(s0, inertia * (0.5 * SUBSTEPS / machine.dt) ** 2)  # what the sub-step resolves
+    return {f"{key}_c": level, f"{key}_s0": s0, f"{key}_s1": 2.0 * rng.uniform(0.1, 0.7) * math.sqrt(s0 * inertia)}
+
+
+def draw(effect: str, machine: Machine, ref: effects.Reference, rng, size: float, closed: bool, reach: tuple = REACH) -> Draw:
+    """Parameters of `effect` at `size` of the level of `ref`; reach: of presliding, over the travel."""
     level = size * ref.torque_rms
     th1, th2 = ref.states[:, 0], ref.states[:, 2]
     sign = 1.0 if rng.random() < 0.5 else -1.0
@@ -120,6 +130,8 @@ def draw(effect: str, machine: Machine, ref: effects.Reference, rng, size: float
         family, place = effects.SECOND[effect]
         return Draw(effect, family, place, size, variant, made, {}, bias)
     family, place = effects.FAMILY[effect]
+    if effect.startswith("presliding_"):
+        return Draw(effect, family, place, size, "lugre", _presliding(machine, ref, rng, level, place, reach))
     if effect == "delay":
         return Draw(effect, family, place, size, "fractional", {"delay": _times(rng, machine, 0.5, 4.0)})
     if effect == "actuator_lag":

@@ -11,7 +11,8 @@ from axes import Machine, log_uniform
 
 LOOPS = ("open", "moves", "moves_ff", "stops", "triangles", "one_way")
 BEFORE, AFTER = 64, 8  # samples simulated before and after the record: what is late or early by some samples is true data
-SUBSTEPS, SUBSTEPS_STIFF = 16, 32
+SUBSTEPS, SUBSTEPS_STIFF = 16, 64  # of smooth laws; of dry friction and contacts
+EVENTS = {"fm_wd", "ft_wd", "fp_wd", "stop_hi", "stop_lo", "backlash"}
 OFF_FROM = 2 / 3  # of the record: where a drive is switched off
 
 
@@ -43,7 +44,7 @@ class Motion:
 
     def run(self, params: dict, bias: float = 0.0, extra=None, reading=None) -> Run:
         """params: the plant's, machine included; bias: what the command holds against a load; extra as `plant.run`."""
-        stiff = {"fm_wd", "ft_wd", "fp_wd"} & params.keys()
+        stiff = EVENTS & params.keys()
         drive, command = self.drive, self.command + bias * (self.command_on() if self.drive is None else 0.0)
         if drive is not None and bias:
             drive = plant.Drive(**{**drive.__dict__, "preload": bias})

@@ -24,7 +24,7 @@ Formulations (each differs from the crate on purpose):
 - dead zone of the amplifier: what passes is the command less its part within +-d;
 - load-dependent friction: the bristles' level grows by f times the torque carried, |K*(th1-th2) + B*(w1-w2)|, on a rigid axis by f times
   |the table's position-dependent and constant torques|, as it is now (no step's delay);
-- friction that depends on position: a further bristle on the motor with g = f*exp(-((th1-c)/width)^2);
+- friction that depends on position: a further bristle on the motor, of level f, its torque times exp(-((th1-c)/width)^2);
 - a mode behind the motor: I0*w0' = K0*(th1-th0) + B0*(w1-w0), integrated as the rest;
 - a rigid axis: one inertia I1, every torque of motor and table on it, th2 = th1;
 - what no library holds: warming, motor friction times 1 + a*exp(-t/tau); a jam, f*tanh(w1/ws) between two instants; any sampled torque.
@@ -169,25 +169,19 @@ def _friction(p, c, z, w, t, load):
 
 
 @njit(cache=True, inline="always")
-def _tight(p, th):
-    """Level of the friction that depends on position, at th."""
-    return p[FP_C] * math.exp(-(((th - p[FP_CENTRE]) / p[FP_WIDTH]) ** 2))
-
-
-@njit(cache=True, inline="always")
-def _tight_bristle(p, z, th, w, h):
-    g = _tight(p, th)
-    if w == 0.0 or g == 0.0:
-        return z if w == 0.0 else 0.0
-    z_end = g / p[FP_S0] * (1.0 if w > 0.0 else -1.0)
-    return z_end + (z - z_end) * math.exp(-abs(w) * h * p[FP_S0] / g)
+def _tight_bristle(p, z, w, h):
+    """The bristle of the friction that depends on position, at its full level: where it acts is a factor on its torque."""
+    if w == 0.0:
+        return z
+    z_end = p[FP_C] / p[FP_S0] * (1.0 if w > 0.0 else -1.0)
+    return z_end + (z - z_end) * math.exp(-abs(w) * h * p[FP_S0] / p[FP_C])
 
 
 @njit(cache=True, inline="always")
 def _tight_friction(p, z, th, w):
-    g = _tight(p, th)
-    zdot = w - p[FP_S0] * abs(w) * z / g if g > 0.0 else 0.0
-    return p[FP_S0] * z + p[FP_S1] * math.exp(-((w / p[FP_WD]) ** 2)) * zdot
+    zdot = w - p[FP_S0] * abs(w) * z / p[FP_C]
+    f = p[FP_S0] * z + p[FP_S1] * math.exp(-((w / p[FP_WD]) ** 2)) * zdot
+    return f * math.exp(-(((th - p[FP_CENTRE]) / p[FP_WIDTH]) ** 2))
 
 
 @njit(cache=True, inline="always")
@@ -440,7 +434,7 @@ def _run(p, torque, dt, t0, linear, x0, ns, out, extra, parts, drive, aim, readi
                 if p[FT_S0] > 0.0:
                     zt = _bristle(p, FT_C, zt, y[3], t, 0.5 * h, _carried(p, FT_C, y))
                 if p[FP_C] > 0.0:
-                    zp = _tight_bristle(p, zp, y[0], y[1], 0.5 * h)
+                    zp = _tight_bristle(p, zp, y[1], 0.5 * h)
                 _rhs(p, y, t, r0, zm, zt, zp, em, et, k1, q)
                 if told:
                     q[Q_INPUT] -= _torque(p, torque, n, k, s, dt, linear)
@@ -464,7 +458,7 @@ def _run(p, torque, dt, t0, linear, x0, ns, out, extra, parts, drive, aim, readi
                 if p[FT_S0] > 0.0:
                     zt = _bristle(p, FT_C, zt, y[3], t + h, 0.5 * h, _carried(p, FT_C, y))
                 if p[FP_C] > 0.0:
-                    zp = _tight_bristle(p, zp, y[0], y[1], 0.5 * h)
+                    zp = _tight_bristle(p, zp, y[1], 0.5 * h)
 
 
 @dataclass
