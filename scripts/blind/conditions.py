@@ -39,7 +39,9 @@ LEAST_NOISE = 3.0  # every cause stands this far above the noise, the others pro
 LEAST_RIVAL = 2.0  # and the best simple rival of another family leaves this much of it, in noise and remainder together
 LEAST_ASYMMETRY = 10.0  # of a constant torque beside dry friction, whose two directions may differ: only standstill tells the two apart
 REQUIRED = 0.25  # of the largest cause's torque: those must be named
+WILD = 8.0  # times the moving torque: a command above it is a loop that is not stable, or a drive against a stop
 LOG_KINDS = ("none", "latched", "antialias")
+HEALTHY = ("healthy", "parameters")
 
 
 def pick_conditions(rng, group: str, kind: str) -> dict:
@@ -55,8 +57,10 @@ def pick_conditions(rng, group: str, kind: str) -> dict:
         "torque_noise": rng.random() < 0.25, "log": str(rng.choice(LOG_KINDS, p=[0.8, 0.12, 0.08])),
         "bias": rng.random() < 0.08, "drive_off": rng.random() < 0.07, "length": length,
         "fast": screw and rng.random() < 0.15, "unlike": screw and rng.random() < 0.15,
-        "rest": str(rng.choice(unmodelled.KINDS)) if group in ("beside", "machine") or (group in ("single", "two") and rng.random() < 0.1) else "none",
+        "rest": "none",
     }
+    if group in ("beside", "machine") or (group in ("single", "two") and rng.random() < 0.1):
+        out["rest"] = str(rng.choice(unmodelled.KINDS))
     if group == "foreign":
         out["rest"], out["bias"] = str(rng.choice(["wander", "jam"])), False
     if group == "machine":
@@ -81,7 +85,7 @@ def labels(case: dict) -> list:
 def pick_effects(rng, group: str, machine, sensors: str, which: int) -> list:
     """Effect ids of a case; the first of a single walks through the list, so that each comes up."""
     ids = hidden.possible(machine, sensors)
-    if group in ("healthy", "parameters", "foreign"):
+    if group in (*HEALTHY, "foreign"):
         return []
     if group in ("single", "beside"):
         return [ids[which % len(ids)]]
@@ -133,6 +137,65 @@ def draw_log(rng, machine, c: dict, m) -> logging_chain.Log:
     return log
 
 
+def settle(c: dict, group: str, ids) -> str:
+    """Leave out conditions that would hide or double the causes; returns the log's kind. c is changed."""
+    timed = {"delay", "latch", "sensor_delay", "actuator_lag"}.intersection(ids)
+    if timed and c["noise"].startswith("jitter"):
+        c["noise"] = "white"
+    if any(e.startswith("load_") for e in ids) or c["loop"] == "one_way" and group in HEALTHY:
+        c["bias"] = False
+    pulled = {"gravity", "external_spring", "end_stop", "load_motor", "load_table"}.intersection(ids)
+    if c["loop"] == "open" and (c["bias"] or pulled):
+        c["drive_off"] = False  # nothing would hold the axis
+    return "none" if timed else c["log"]
+
+
+def draw_motions(rng, choice, machine, c: dict, ids):
+    """The training and the held-out experiment; the second another realisation, 0.5 to 1 times as long, by the same drive."""
+    n = {"short": 512, "long": int(choice.choice([20000, 60000])), "usual": int(log_uniform(rng, 1500, 9000))}[c["length"]]
+    if c["length"] == "usual" and c["loop"] == "open":
+        n = max(2048, n)
+    moves = max(3.0, n / rng.uniform(500, 1500)) if c["loop"] != "open" else None
+    turning = bool((effects.TURNING | {"gravity", "external_spring", "position_friction"}).intersection(ids))
+    train = motion.draw(machine, rng, c["loop"], n, 1.0, turning, c["drive_off"], moves)
+    held = motion.draw(machine, rng, c["loop"], max(512, int(n * rng.uniform(0.5, 1.0))), rng.uniform(0.8, 1.25), turning, False, moves)
+    held.drive, held.hold = (plant.Drive(**{**train.drive.__dict__, "off": math.inf}) if train.drive else None), train.hold
+    return train, held
+
+
+def draw_lateness(rng, machine, log_kind: str, log) -> None:
+    """Encoders late or early against the torque, or filtered: at most a quarter of the resonance's period."""
+    period = 1 / (machine.band * machine.dt)
+    if log_kind == "latched":
+        top = min(3.0, max(0.75, 0.25 * period))
+        log.shift = float(rng.choice([-1, 1])) * rng.uniform(0.55, top)
+    elif log_kind == "antialias":
+        log.filter = rng.uniform(0.5, min(4.0, max(0.75, 0.25 * period)))
+
+
+def reference(machine, m, run) -> effects.Reference:
+    """What effects are sized on: the axis without them in the same experiment, and the torque that moves it."""
+    n = m.samples
+    ref = effects.Reference(axes.sizing(machine), machine.dt, n * machine.dt, run.command[m.kept], run.states[m.kept],
+                            1 / (n * machine.dt), 1.5 * machine.band, machine.band, m.hold == "linear")
+    ref.torque_rms = machine.level
+    return ref
+
+
+def draw_rests(rng, case: dict, ref, base: dict, key):
+    """A remainder for each of the two records (None without one): the same law, of a wandering torque another realisation."""
+    c, machine = case["conditions"], case["machine"]
+    if c["rest"] == "none":
+        return [None, None]
+    smallest = min((d.size for d in case["draws"]), default=0.3)
+    share = log_uniform(rng, 0.08, 0.3) if case["group"] == "foreign" else min(0.03, smallest / case["factor"] * rng.uniform(0.3, 1.0))
+    out = []
+    for i, m in enumerate(case["motions"]):
+        own = np.random.default_rng([*key, i] if c["rest"] == "wander" else key)
+        out.append(unmodelled.draw(c["rest"], ref, own, share, m.length, base, machine.linear, machine.rigid))
+    return [out[0], out[0]] if out[0].plant else out
+
+
 def draw_case(group: str, kind: str, seed: int, r: int, attempt: int) -> dict | None:
     """One attempt; None when the record could not tell the causes drawn."""
     choice = np.random.default_rng([seed, 2, r, attempt // KEEP])
@@ -142,50 +205,28 @@ def draw_case(group: str, kind: str, seed: int, r: int, attempt: int) -> dict | 
     sensors = "motor" if machine.rigid else str(choice.choice(["both", "motor", "velocities"], p=[0.65, 0.3, 0.05]))
     which = nth_of_group(r // 2) if attempt < 4 * KEEP else int(choice.integers(1000))
     ids = pick_effects(choice, group, machine, sensors, which)
-    if any(effects.KNOWN.get(e, ("", ""))[1] == "sensor" and e != "latch" for e in ids) and sensors == "motor":
-        return None
-    timed = {"delay", "latch", "sensor_delay", "actuator_lag"}.intersection(ids)
-    log_kind = "none" if timed else c["log"]
-    if timed and c["noise"].startswith("jitter"):
-        c["noise"] = "white"
-    if any(e.startswith("load_") for e in ids) or c["loop"] == "one_way" and group in ("healthy", "parameters"):
-        c["bias"] = False
-    if c["loop"] == "open" and (c["bias"] or {"gravity", "external_spring", "end_stop", "load_motor", "load_table"}.intersection(ids)):
-        c["drive_off"] = False
-    n = {"short": 512, "long": int(choice.choice([20000, 60000])), "usual": int(log_uniform(rng, 1500, 9000))}[c["length"]]
-    if c["length"] == "usual" and c["loop"] == "open":
-        n = max(2048, n)
-    moves = max(3.0, n / rng.uniform(500, 1500)) if c["loop"] != "open" else None
-    turning = bool(effects.TURNING.intersection(ids) or {"gravity", "external_spring", "position_friction"}.intersection(ids))
-    train = motion.draw(machine, rng, c["loop"], n, 1.0, turning, c["drive_off"], moves)
-    held = motion.draw(machine, rng, c["loop"], max(512, int(n * rng.uniform(0.5, 1.0))), rng.uniform(0.8, 1.25), turning, False, moves)
-    held.drive, held.hold = (plant.Drive(**{**train.drive.__dict__, "off": math.inf}) if train.drive else None), train.hold
-
+    log_kind = settle(c, group, ids)
+    train, held = draw_motions(rng, choice, machine, c, ids)
+    closed = train.drive is not None
     log = draw_log(rng, machine, c, train)
-    if log_kind == "latched":
-        top = min(3.0, max(0.75, 0.25 / (machine.band * machine.dt)))
-        log.shift = float(rng.choice([-1, 1])) * rng.uniform(0.55, top)
-    elif log_kind == "antialias":
-        log.filter = rng.uniform(0.5, min(4.0, max(0.75, 0.25 / (machine.band * machine.dt))))
-    reading = [log.sigma * (logging_chain.pink(rng, x.length) if log.noise == "pink" else rng.standard_normal(x.length)) if train.drive
+    draw_lateness(rng, machine, log_kind, log)
+    reading = [log.sigma * (logging_chain.pink(rng, x.length) if log.noise == "pink" else rng.standard_normal(x.length)) if closed
                else np.zeros(x.length) for x in (train, held)]
     for x in (train, held):
-        if x.drive is not None:
+        if closed:
             x.drive.step = log.step
 
     plain = train.run(machine.base, 0.0, None, reading[0])
-    if not np.all(np.isfinite(plain.states)) or effects.rms(plain.command) > 8 * machine.level:
+    if not np.all(np.isfinite(plain.states)) or effects.rms(plain.command) > WILD * machine.level:
         return None  # the loop is not stable with these gains
-    ref = effects.Reference(axes.sizing(machine), machine.dt, n * machine.dt, plain.command[train.kept], plain.states[train.kept],
-                            1 / (n * machine.dt), 1.5 * machine.band, machine.band, train.hold == "linear")
-    ref.torque_rms = machine.level
+    ref = reference(machine, train, plain)
     reach = hidden.REACH_OF_MACHINES if group == "machine" else hidden.REACH
-    draws = [hidden.draw(e, machine, ref, rng, s, train.drive is not None, reach) for e, s in zip(ids, sizes(rng, group, ids, attempt % KEEP))]
+    draws = [hidden.draw(e, machine, ref, rng, s, closed, reach) for e, s in zip(ids, sizes(rng, group, ids, attempt % KEEP))]
     params, sensor, bias = generate.combine(draws)
     base = machine.base | params
     known, kept_bias = {}, None
-    if kind == "joint" and group in ("healthy", "parameters") and rng.random() < 0.35:
-        g = hidden.draw("gravity", machine, ref, rng, log_uniform(rng, 0.2, 1.0), train.drive is not None)
+    if kind == "joint" and group in HEALTHY and rng.random() < 0.35:
+        g = hidden.draw("gravity", machine, ref, rng, log_uniform(rng, 0.2, 1.0), closed)
         base, bias = base | g.plant, bias + g.bias
         known["gravity"] = {"sine": g.plant["grav_s"], "cosine": g.plant["grav_c"], "ratio": 1.0}
     if c["bias"]:
@@ -193,25 +234,19 @@ def draw_case(group: str, kind: str, seed: int, r: int, attempt: int) -> dict | 
         place = "motor" if machine.rigid or rng.random() < 0.5 else "table"
         base, bias = base | {f"load_{place[0]}": load}, bias - load
         kept_bias = {"id": f"load_{place}", "torque": load}
-    rests = [None, None]
-    factor = float(math.exp(rng.uniform(math.log(3), math.log(10))))
-    if c["rest"] != "none":
-        smallest = min((d.size for d in draws), default=0.3)
-        share = log_uniform(rng, 0.08, 0.3) if group == "foreign" else min(0.03, smallest / factor * rng.uniform(0.3, 1.0))
-        for i, x in enumerate((train, held)):
-            rests[i] = unmodelled.draw(c["rest"], ref, np.random.default_rng([seed, 4, r, attempt, i]) if c["rest"] == "wander" else
-                                       np.random.default_rng([seed, 4, r, attempt]), share, x.length, base, machine.linear, machine.rigid)
-        if rests[0].plant:
-            rests[1] = rests[0]
-        base = base | rests[0].plant
+    case = dict(group=group, machine=machine, conditions=c, log_kind=log_kind, log=log, sensors=sensors, motions=(train, held),
+                draws=draws, sensor=sensor, known=known, bias=kept_bias, reading=reading,
+                factor=float(math.exp(rng.uniform(math.log(3), math.log(10)))))
+    rests = draw_rests(rng, case, ref, base, [seed, 4, r, attempt])
+    base = base | (rests[0].plant if rests[0] else {})
     span = np.ptp(plain.states[train.kept, 0]) + 1e-12
 
     def run(i):
         """Record i, or None where the axis runs away or the drive fights it."""
         x, rest = (train, held)[i], rests[i]
         out = x.run(base, bias, rest.extra if rest else None, reading[i])
-        wild = effects.rms(out.command - np.mean(out.command)) > 8 * machine.level
-        return None if not np.all(np.isfinite(out.states)) or wild or np.ptp(out.states[x.kept, 0]) > 30 * span else out
+        fights = effects.rms(out.command - np.mean(out.command)) > WILD * machine.level
+        return None if not np.all(np.isfinite(out.states)) or fights or np.ptp(out.states[x.kept, 0]) > 30 * span else out
 
     first = run(0)
     if first is None:
@@ -222,9 +257,7 @@ def draw_case(group: str, kind: str, seed: int, r: int, attempt: int) -> dict | 
         nominal = dict(machine.nominal)
     else:
         nominal = axes.nominal_of(machine, rng, 0.03 if rng.random() < 0.75 else 0.15, False)
-    case = dict(group=group, machine=machine, conditions=c, log_kind=log_kind, log=log, sensors=sensors, motions=(train, held), runs=[first],
-                draws=draws, sensor=sensor, nominal=nominal, known=known, bias=kept_bias, rest=rests[0], factor=factor, reading=reading)
-    case = judge(case, [seed, 5, r, attempt])
+    case = judge(case | dict(nominal=nominal, rest=rests[0], runs=[first]), [seed, 5, r, attempt])
     if case is not None:
         case["runs"].append(run(1))
     return case if case and case["runs"][1] is not None else None
@@ -241,9 +274,9 @@ def judge(case: dict, key) -> dict | None:
     view = separable.View(machine, run, m, [0] if case["sensors"] == "motor" else [0, 2])
     torques = [separable.torque_of(d, run, m) for d in draws]
     instants = np.arange(m.kept.start, m.kept.stop, dtype=float)
-    clean = logging_chain.seen(run, machine.dt, {}, logging_chain.Log("white", 0.0), m.kept, instants)
+    clean = logging_chain.seen(run, machine.dt, {}, logging_chain.Log("white", 0.0), instants)
     stack = lambda x, y: np.stack([x["theta1"] - y["theta1"], 0 * x["theta1"], x["theta2"] - y["theta2"], 0 * x["theta1"]], axis=1)
-    errors = [stack(logging_chain.seen(run, machine.dt, d.sensor, logging_chain.Log("white", 0.0), m.kept, instants), clean)
+    errors = [stack(logging_chain.seen(run, machine.dt, d.sensor, logging_chain.Log("white", 0.0), instants), clean)
               if d.sensor else None for d in draws]
     lateness = [view.flat(np.stack([run.states[m.kept, 1], 0 * instants, run.states[m.kept, 3], 0 * instants], axis=1))] \
         if case["log_kind"] != "none" else []
@@ -301,7 +334,7 @@ def judge(case: dict, key) -> dict | None:
     if case["group"] == "foreign" and told["remainder"] < 5 * told["floor"]:
         return None
     told["parameters"] = wrong_parameters(view, case)
-    return case | dict(told=told, key=key, table=table, quiet=quiet)
+    return case | dict(told=told, key=key, table=table, quiet=quiet, good=good)
 
 
 def wrong_parameters(view, case) -> float:

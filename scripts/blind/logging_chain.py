@@ -55,8 +55,8 @@ def filtered(position, speed, dt: float, tau: float) -> np.ndarray:
     return y[::FINE]
 
 
-def seen(run: motion.Run, dt: float, sensor: dict, log: Log, kept: slice, instants) -> dict:
-    """Noise-free readings (th1, w1, th2, w2 over the record) at `instants` (fractional samples), with the sensors' effects and the log's."""
+def seen(run: motion.Run, dt: float, sensor: dict, log: Log, instants) -> dict:
+    """Noise-free readings (th1, w1, th2, w2 over the record) at `instants` (fractional samples of the whole run), with the sensors' effects and the log's."""
     out = {}
     late = log.shift + sensor.get("latch", 0.0) / dt
     tau = math.hypot(log.filter, sensor.get("filter", 0.0) / dt)
@@ -88,8 +88,8 @@ def record(run: motion.Run, dt: float, sensor: dict, log: Log, m: motion.Motion,
     torque = run.command[kept]
     scatter = rng.standard_normal(n)
     table["T"] = torque + log.torque_noise * effects.rms(torque) * scatter
-    quiet = seen(run, dt, sensor, Log(log.noise, log.sigma), kept, whole)
-    loud = seen(run, dt, sensor, log, kept, whole + moved)
+    quiet = seen(run, dt, sensor, Log(log.noise, log.sigma), whole)
+    loud = seen(run, dt, sensor, log, whole + moved)
     good = np.ones(n, dtype=bool)
     if log.noise == "spikes":
         good[rng.choice(np.arange(2, n), max(2, int(0.001 * n)), replace=False)] = False

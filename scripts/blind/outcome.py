@@ -80,7 +80,8 @@ def judge(seal: dict, answer: dict | None, seconds: float | None, memory: float 
     probability = lambda c: min(1.0, max(0.0, float(c.get("probability") or 0.0)))
     return {
         "case": seal["case"], "group": seal["group"], "half": seal["half"], "axis": seal["axis"], "sensors": seal["sensors"],
-        "conditions": seal["conditions"], "truth": [e["id"] for e in seal["effects"]], "required": [e["id"] for e in seal["effects"] if e["required"]],
+        "conditions": seal["conditions"], "truth": [e["id"] for e in seal["effects"]],
+        "required": [e["id"] for e in seal["effects"] if e["required"]],
         "missing": [e["id"] for e in missing], "outcome": result, "good": result in GOOD,
         "told": [(c.get("id"), c.get("place"), probability(c)) for c in told] or [("" if answer is None else answer.get("verdict", ""), "", 0.0)],
         "false": [c.get("id") for c in false], "confidently_wrong": any(probability(c) >= SURE for c in false),
@@ -108,9 +109,10 @@ def summary(rows: list[dict]) -> dict:
     """All figures of a scored set."""
     healthy = [r for r in rows if r["group"] in HEALTHY]
     of = lambda *groups: [r for r in rows if r["group"] in groups]
+    sick = [r for r in rows if r["group"] not in HEALTHY]
     places = [p for r in rows for p in r["places"]]
     out = {
-        "all": count(rows), "right": share(rows, lambda r: r["good"]), "sick_right": share([r for r in rows if r["group"] not in HEALTHY], lambda r: r["good"]),
+        "all": count(rows), "right": share(rows, lambda r: r["good"]), "sick_right": share(sick, lambda r: r["good"]),
         "confidently_wrong": share(rows, lambda r: r["confidently_wrong"]), "false_alarms": share(healthy, lambda r: r["false_alarm"]),
         "healthy": share(healthy, lambda r: r["good"]), "verdict_exact": share(healthy, lambda r: r["verdict_exact"]),
         "two": share(of("two"), lambda r: r["good"]), "three": share(of("three"), lambda r: r["good"]),
@@ -136,7 +138,8 @@ def summary(rows: list[dict]) -> dict:
 AIMS = (("right", "all conditions together right", ">= 90 %"), ("sick_right", "of these the axes that are not healthy", ""),
         ("confidently_wrong", f"a false cause at {SURE:g} or more", "<= 1 %"), ("false_alarms", "false alarms on healthy axes", "<= 1 %"),
         ("healthy", "healthy axes called healthy", ">= 95 %"), ("verdict_exact", "of these with the very verdict (no gap or parameters)", ""),
-        ("two", "two causes", ">= 92 %"), ("three", "three causes", ">= 85 %"), ("machine", "like real machines: friction, viscosity, bias, a remainder", ""),
+        ("two", "two causes", ">= 92 %"), ("three", "three causes", ">= 85 %"),
+        ("machine", "like real machines: friction, viscosity, bias, a remainder", ""),
         ("place", "place of the causes that are right by family", ""))
 
 
@@ -165,21 +168,23 @@ def markdown(s: dict, rows: list[dict], title: str, picture: str) -> str:
     """The tables for people; `picture` is the reliability diagram's file name."""
     lines = [f"# {title}", "", "Share (hits/cases; 95 % Wilson interval in %).", "", "| figure | result | to reach |", "|---|---|---|"]
     lines += [f"| {text} | {percent(s[key])} | {aim} |" for key, text, aim in AIMS]
-    for key, text in (("calibration", "calibration error of the causes named"), ("calibration_of_suspects", "the same with suspects under `unexplained`")):
+    for key, text, aim in (("calibration", "calibration error of the causes named", "<= 5 %"),
+                           ("calibration_of_suspects", "the same with suspects under `unexplained`", "")):
         e = s[key]["ece"]
-        lines.append(f"| {text} | {'-' if e is None else f'{100 * e:.1f} %'} ({s[key]['n']} causes) | {'<= 5 %' if key == 'calibration' else ''} |")
-    for what, unit in (("seconds", "s"), ("memory_mb", "MB")):
-        if s[what]:
-            lines.append(f"| {what.replace('_mb', '')} a case: median, largest | {s[what]['median']:.1f}, {s[what]['max']:.1f} {unit} | {'20 s' if unit == 's' else ''} |")
-    lines += ["", "Right with remainder: every required cause, nothing false, and what stays is stated. Incomplete: nothing false, a required cause is",
-              "missing. Extra: all required and a false one. Wrong: a false one, and a required one is missing. Missed: an effect that is there, and",
+        lines.append(f"| {text} | {'-' if e is None else f'{100 * e:.1f} %'} ({s[key]['n']} causes) | {aim} |")
+    for key, text, aim in (("seconds", "seconds a case", "20 s"), ("memory_mb", "MB a case, peak", "")):
+        if s[key]:
+            lines.append(f"| {text}: median, largest | {s[key]['median']:.1f}, {s[key]['max']:.1f} | {aim} |")
+    lines += ["", "Right with remainder: every required cause, nothing false, and what stays is stated. Incomplete: nothing false, a required",
+              "cause is missing. Extra: all required and a false one. Wrong: a false one, and a required one is missing. Missed: an effect that is there, and",
               "the verdict is no gap or parameters.", "", "## By group", "", *rows_of(s["by"]["group"] | {"all": s["all"]})]
     for by in ("axis", "condition", "sensors", "cause"):
         note = " (required; a case of several counts for each)" if by == "cause" else ""
         lines += ["", f"## By {by}{note}", "", *rows_of(s["by"][by])]
     lines += ["", "## Probabilities", "", f"![reliability diagram]({picture})", "", *reliability.markdown(s["calibration"])]
     lines += ["", "## Slowest", ""] + [f"- {case}: {'cut off' if t is None else f'{t:.1f} s'}" for case, t in s["slowest"]]
-    lines += ["", "## Cases not right", "", "| case | group | axis | truth (required) | told | outcome | false | conditions | gap/noise |", "|---" * 9 + "|"]
+    lines += ["", "## Cases not right", "", "Causes in brackets need not be named.", "",
+              "| case | group | axis | truth | told | outcome | false | conditions | gap/noise |", "|---" * 9 + "|"]
     for r in sorted((r for r in rows if not r["good"]), key=lambda r: (r["outcome"], r["group"], r["case"])):
         told = ", ".join(f"{i} {place} {p:.2f}" if place else str(i) for i, place, p in r["told"])
         truth = ", ".join(t if t in r["required"] else f"({t})" for t in r["truth"]) or "-"

@@ -34,10 +34,11 @@ A drive may close the loop (`Drive`): it sets the command at every sample from i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+
+from drive import Drive, sample
 
 SUBSTEPS = 40
 SUBSTEPS_STIFF = 80  # with stiff bristles
@@ -57,13 +58,10 @@ NAMES = (
     "unb", "unb_phase", "drag",
     "stop_hi", "stop_lo", "stop_k", "stop_b",
     "sat", "gain", "delay", "lag",
-    "rigid",
-    "fm_load", "ft_load",
+    "rigid", "fm_load", "ft_load",
     "grav_s", "grav_c", "grav_r", "spring", "spring_rest",
-    "dead",
-    "fp_c", "fp_centre", "fp_width", "fp_s0", "fp_s1", "fp_wd",
-    "I0", "K0", "B0",
-    "warm", "warm_tau", "jam", "jam_from", "jam_to", "jam_speed",
+    "dead", "fp_c", "fp_centre", "fp_width", "fp_s0", "fp_s1", "fp_wd",
+    "I0", "K0", "B0", "warm", "warm_tau", "jam", "jam_from", "jam_to", "jam_speed",
 )
 INDEX = {name: i for i, name in enumerate(NAMES)}
 (
@@ -80,13 +78,10 @@ INDEX = {name: i for i, name in enumerate(NAMES)}
     UNB, UNB_PHASE, DRAG,
     STOP_HI, STOP_LO, STOP_K, STOP_B,
     SAT, GAIN, DELAY, LAG,
-    RIGID,
-    FM_LOAD, FT_LOAD,
+    RIGID, FM_LOAD, FT_LOAD,
     GRAV_S, GRAV_C, GRAV_R, SPRING, SPRING_REST,
-    DEAD,
-    FP_C, FP_CENTRE, FP_WIDTH, FP_S0, FP_S1, FP_WD,
-    I0, K0, B0,
-    WARM, WARM_TAU, JAM, JAM_FROM, JAM_TO, JAM_SPEED,
+    DEAD, FP_C, FP_CENTRE, FP_WIDTH, FP_S0, FP_S1, FP_WD,
+    I0, K0, B0, WARM, WARM_TAU, JAM, JAM_FROM, JAM_TO, JAM_SPEED,
 ) = range(len(NAMES))
 FIRST_FRICTION = {"motor": FM_C, "table": FT_C}
 
@@ -341,24 +336,6 @@ def _between(values, column, k, n, s):
 
 
 @njit(cache=True)
-def _drive(c, memory, command, aim, reading, k, dt):
-    """One sample of the drive: P on position, PI on the filtered difference of the encoder, feed-forward, limit (Drive's fields in c)."""
-    if c[9] > 0.0:
-        reading = round(reading / c[9]) * c[9]
-    if k == 0:
-        memory[0] = reading
-    speed = (reading - memory[0]) / dt
-    memory[0] = reading
-    memory[1] += c[8] * (speed - memory[1])
-    error = c[0] * (aim[k, 0] - reading) + c[4] * aim[k, 1] - memory[1]
-    integral = memory[2] + c[2] * dt * error
-    wanted = c[1] * error + integral + c[3] * aim[k, 2]
-    command[k] = min(max(wanted, -c[5]), c[5])
-    if command[k] == wanted:  # the integral stands still at the limit
-        memory[2] = integral
-
-
-@njit(cache=True)
 def _run(p, torque, dt, t0, linear, x0, ns, out, extra, parts, drive, aim, reading):
     """Fill out (n x 4: th1 w1 th2 w2 at the samples) from the state x0 at time t0; torque[k] belongs to t0 + k*dt.
 
@@ -373,7 +350,7 @@ def _run(p, torque, dt, t0, linear, x0, ns, out, extra, parts, drive, aim, readi
     memory = np.zeros(3)
     if closed:
         memory[2] = drive[6]
-        _drive(drive, memory, torque, aim, y[0] + reading[0], 0, dt)
+        sample(drive, memory, torque, aim, y[0] + reading[0], 0, dt)
         memory[2] = drive[6]
     y[7] = _limit(p, torque[0])
     zm = 0.0
@@ -406,7 +383,7 @@ def _run(p, torque, dt, t0, linear, x0, ns, out, extra, parts, drive, aim, readi
         for i in range(4):
             out[k, i] = y[i]
         if closed and k > 0:
-            _drive(drive, memory, torque, aim, y[0] + reading[k], k, dt)
+            sample(drive, memory, torque, aim, y[0] + reading[k], k, dt)
         if k == n - 1:
             break
         tk = t0 + k * dt
@@ -459,28 +436,6 @@ def _run(p, torque, dt, t0, linear, x0, ns, out, extra, parts, drive, aim, readi
                     zt = _bristle(p, FT_C, zt, y[3], t + h, 0.5 * h, _carried(p, FT_C, y))
                 if p[FP_C] > 0.0:
                     zp = _tight_bristle(p, zp, y[1], 0.5 * h)
-
-
-@dataclass
-class Drive:
-    """A cascaded drive: P on position, PI on speed, feed-forward; its encoder is the motor's. SI units.
-
-    Torque = kv*e + integral of ki*e + inertia*a_ref, e = kp*(reference - reading) + speed_forward*w_ref - filtered speed.
-    """
-    kp: float  # 1/s
-    kv: float  # N.m.s/rad
-    ki: float  # N.m/rad
-    inertia: float = 0.0  # feed-forward of the acceleration, kg.m2
-    speed_forward: float = 0.0  # share of the reference's speed
-    limit: float = math.inf  # N.m
-    preload: float = 0.0  # integral at the start, N.m: a drive that already holds the axis
-    off: float = math.inf  # sample from which the drive is off and a brake holds
-    smooth: float = 1.0  # share of the new speed difference that the filter takes, 1 = none
-    step: float = 0.0  # the encoder's step, rad
-
-    def packed(self) -> np.ndarray:
-        return np.array([self.kp, self.kv, self.ki, self.inertia, self.speed_forward, self.limit, self.preload, self.off,
-                         self.smooth, self.step])
 
 
 def stiff_bristle(params: dict, place: str, level: float, dt: float, substeps: int = SUBSTEPS_STIFF) -> dict:

@@ -33,7 +33,8 @@ def svg(t: dict) -> str:
     side, edge = 420, 60
     x = lambda p: edge + side * p
     y = lambda p: edge / 2 + side * (1 - p)
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{side + 1.6 * edge:.0f}" height="{side + 1.4 * edge:.0f}" font-family="sans-serif" font-size="12">',
+    size = f'width="{side + 1.6 * edge:.0f}" height="{side + 1.4 * edge:.0f}"'
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">',
            '<rect width="100%" height="100%" fill="white"/>']
     for k in range(11):
         p = k / 10
@@ -46,7 +47,8 @@ def svg(t: dict) -> str:
         out.append('<polyline fill="none" stroke="#1f5fa8" stroke-width="1.5" points="' + " ".join(f"{a:.1f},{b:.1f}" for a, b in points) + '"/>')
     for b, (px, py) in zip(t["bins"], points):
         out.append(f'<path d="M{px:.1f} {y(b["wilson"][0]):.1f}V{y(b["wilson"][1]):.1f}" stroke="#1f5fa8"/>')
-        out.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="4" fill="#1f5fa8"><title>{b["n"]} causes told at {b["told"]:.3f}, {b["right"]:.3f} right</title></circle>')
+        title = f'{b["n"]} causes told at {b["told"]:.3f}, {b["right"]:.3f} right'
+        out.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="4" fill="#1f5fa8"><title>{title}</title></circle>')
         out.append(f'<text x="{px - 7:.1f}" y="{py + 16:.1f}" text-anchor="end" fill="#444">{b["n"]}</text>')
     told = "no cause named" if t["ece"] is None else f'calibration error {100 * t["ece"]:.1f} %, {t["n"]} causes'
     out.append(f'<text x="{x(0.02):.1f}" y="{y(0.95):.1f}" font-size="14">{told}</text>')

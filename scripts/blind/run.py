@@ -2,8 +2,9 @@
 
     .venv/bin/python scripts/blind/run.py --cases DIR [--eixo target/release/eixo] [--jobs 2] [--half tuning|scoring|all]
 
-DIR is what generate.py or conditions.py wrote (the index beside the seals tells which). Answers go to DIR/answers (kept with their stderr,
-seconds and peak memory), the result to DIR/result.md and DIR/result.json, of the second edition with DIR/reliability.svg. Exit code 0, or 1 when a threshold given by --need is missed, or 2 when the check could not run.
+DIR is what generate.py or conditions.py wrote (the index beside the seals tells which). Answers go to DIR/answers (kept with their
+stderr, seconds and peak memory), the result to DIR/result.md and DIR/result.json, of the second edition with DIR/reliability.svg.
+Exit code 0, or 1 when a threshold given by --need is missed, or 2 when the check could not run.
 """
 from __future__ import annotations
 

@@ -173,14 +173,12 @@ def test_jitter_reads_the_true_position_at_another_time(stamps):
 @pytest.mark.parametrize("kind", unmodelled.KINDS)
 def test_what_no_library_holds_is_small_and_there(kind):
     m, exp, run = run_of("joint", "moves")
-    states, command = run.states[exp.kept], run.command[exp.kept]
-    ref = effects.Reference(axes.sizing(m), m.dt, 3000 * m.dt, command, states, 1.0, 20.0, 10.0, False)
-    ref.torque_rms = m.level
+    ref = conditions.reference(m, exp, run)
     rest = unmodelled.draw(kind, ref, np.random.default_rng(2), 0.02, exp.length, {"vm": 0.05}, False, True)
     assert rest.kind == kind and (rest.extra is None) == (kind != "wander")
     again = exp.run(m.base | {"vm": 0.05} | rest.plant, extra=rest.extra)
     change = again.states[exp.kept, 0] - exp.run(m.base | {"vm": 0.05}).states[exp.kept, 0]
-    assert 0 < effects.rms(change) < 0.1 * np.ptp(states[:, 0])
+    assert 0 < effects.rms(change) < 0.1 * np.ptp(run.states[exp.kept, 0])
     if kind == "wander":
         assert np.std(rest.extra[:, 0]) == pytest.approx(0.02 * m.level, rel=1e-6)
 
@@ -188,14 +186,14 @@ def test_what_no_library_holds_is_small_and_there(kind):
 @pytest.mark.parametrize("kind,effect", [(k, e) for k in ("seed", "joint", "rigid_stage") for e in hidden.possible(machine(k), "both")])
 def test_every_effect_changes_the_axes_that_can_have_it(kind, effect):
     m, exp, run = run_of(kind, "moves" if kind != "seed" else "open", turning=True)
-    ref = effects.Reference(axes.sizing(m), m.dt, 3000 * m.dt, run.command[exp.kept], run.states[exp.kept], 1 / (3000 * m.dt), 1.5 * m.band, m.band, False)
-    ref.torque_rms = m.level
+    ref = conditions.reference(m, exp, run)
     d = hidden.draw(effect, m, ref, np.random.default_rng(4), 0.2, exp.drive is not None)
     assert d.id == effect or effect == "coulomb_load" and d.id.startswith("coulomb_")
     again = exp.run(m.base | d.plant, d.bias)
     assert np.all(np.isfinite(again.states))
     if d.place == "sensor":
-        x = logging_chain.seen(again, m.dt, d.sensor, logging_chain.Log("white", 0.0), exp.kept, np.arange(exp.kept.start, exp.kept.stop, dtype=float))
+        instants = np.arange(exp.kept.start, exp.kept.stop, dtype=float)
+        x = logging_chain.seen(again, m.dt, d.sensor, logging_chain.Log("white", 0.0), instants)
         change = max(effects.rms(x["theta1"] - again.states[exp.kept, 0]), effects.rms(x["theta2"] - again.states[exp.kept, 2]))
     else:
         assert effects.rms(separable.torque_of(d, again, exp)) > 1e-3 * m.level
@@ -209,8 +207,7 @@ def test_every_effect_changes_the_axes_that_can_have_it(kind, effect):
 @pytest.mark.parametrize("effect", ["coulomb_motor", "presliding_motor", "torque_ripple", "end_stop", "position_friction"])
 def test_half_the_sub_step_changes_a_windows_motion_by_less_than_the_encoders_could_see(effect, kind):
     m, exp, run = run_of(kind, "open", turning=True)
-    ref = effects.Reference(axes.sizing(m), m.dt, 3000 * m.dt, run.command[exp.kept], run.states[exp.kept], 1 / (3000 * m.dt), 1.5 * m.band, m.band, False)
-    ref.torque_rms = m.level
+    ref = conditions.reference(m, exp, run)
     d = hidden.draw(effect, m, ref, np.random.default_rng(4), 0.2, False)
     at = motion.SUBSTEPS_STIFF if motion.EVENTS & d.plant.keys() else motion.SUBSTEPS
     runs = [plant.simulate(m.base | d.plant, exp.command[:512], m.dt, x0=exp.x0, hold=exp.hold, substeps=k * at) for k in (1, 2)]
@@ -230,27 +227,31 @@ def cases():
     return out
 
 
-def test_a_log_of_a_healthy_axis_is_its_model_and_noise(cases):
-    """Replaying the logged torque through the linear axis, by exact discretisation and in windows, leaves the floor that was sealed."""
-    tried = 0
+def test_a_log_is_the_linear_axis_under_the_logged_torque_the_torques_told_and_noise(cases):
+    """Replayed by exact discretisation in windows, the logged torque and every effect's own leave the floor that was sealed: no sign, no
+    sample and no effect is astray between plant, drive and log."""
+    table = {"load_t", "drag", "ft", "vt", "dist", "unb", "stop", "mode3", "gravity", "spring", "extra_t"}
+    healthy = sick = 0
     for c in cases:
-        if c["group"] not in conditions.GROUPS or c["draws"] or c["rest"] or c["known"] or c["bias"] or c["conditions"]["drive_off"]:
-            continue
-        if c["log_kind"] != "none" or c["conditions"]["noise"] in ("spikes", "held") or c["motions"][0].hold == "linear":
-            continue
         m, exp, run = c["machine"], c["motions"][0], c["runs"][0]
+        late = c["log_kind"] != "none" or any(d.place == "sensor" for d in c["draws"])
+        if late or c["conditions"]["drive_off"] or c["conditions"]["fast"] or exp.hold == "linear":
+            continue  # a brake's torque is not told, a late log is not replayed, and held means are coarse for what varies within a sample
         view = separable.View(m, run, exp, [0])
-        u = np.zeros((exp.samples, 2))
-        u[:, 0] = c["table"]["T"]
+        part = lambda name: run.parts[exp.kept, plant.PARTS.index(name)]
+        coupling = part("coupling")
+        motor = sum(part(n) for n in plant.PARTS if n not in table and n != "coupling") - coupling
+        u = np.stack([c["table"]["T"] + motor, sum(part(n) for n in table) + coupling], axis=1)
         replay = np.zeros((exp.samples, 4))
         for k in range(view.count):
             s = slice(k * view.window, (k + 1) * view.window)
             replay[s] = view._march(u[s], np.zeros(4))
         error = np.zeros((exp.samples, 4))
-        error[:, 0] = c["table"]["theta1"] - replay[:, 0]
-        assert effects.rms(view.flat(error)) < 2.0 * c["told"]["floor"] + 1e-9
-        tried += 1
-    assert tried >= 2
+        error[:, 0] = np.where(c["good"], c["table"]["theta1"], c["quiet"]["theta1"]) - replay[:, 0]
+        left, added = effects.rms(view.flat(error)), max([e["gap"] for e in c["told"]["effects"]], default=0.0)
+        assert left < 2.0 * c["told"]["floor"] + 2e-3 * added, conditions.labels(c)
+        healthy, sick = healthy + (not c["draws"]), sick + bool(c["draws"])
+    assert healthy >= 2 and sick >= 3
 
 
 def test_a_sealed_cause_stands_above_noise_remainder_and_rivals(cases):
@@ -304,7 +305,8 @@ def test_the_same_seed_writes_the_same_set_and_the_files_tell_no_answer(tmp_path
         case = tmp_path / "a" / "cases" / name
         seal = json.loads((tmp_path / "a/seals" / f"{name}.json").read_text())
         toml = tomllib.loads((case / "axis.toml").read_text())
-        assert (toml.get("structure") == "rigid") == seal["rigid"] and set(toml["parameters"]) >= ({"I1"} if seal["rigid"] else {"I1", "I2", "B", "K"})
+        assert (toml.get("structure") == "rigid") == seal["rigid"]
+        assert set(toml["parameters"]) - {"rho"} == ({"I1"} if seal["rigid"] else {"I1", "I2", "B", "K"})
         known = set(toml.get("effects", {}))
         text = "".join(p.read_text() for p in case.iterdir()) + name
         assert not any(e in text for e in set(effects.KNOWN) - known)

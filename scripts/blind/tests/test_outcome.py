@@ -15,7 +15,8 @@ import run
 
 def effect(eid, required=True, accepted=(), place=None):
     family, at = effects.KNOWN[eid]
-    return {"id": eid, "family": family, "place": place or at, "accepted": sorted({family, eid, *accepted}), "required": required, "gap_over_noise": 20.0}
+    names = sorted({family, eid, *accepted})
+    return {"id": eid, "family": family, "place": place or at, "accepted": names, "required": required, "gap_over_noise": 20.0}
 
 
 def seal(group="single", true=("coulomb_motor",), **changes):
@@ -103,7 +104,8 @@ def test_on_a_rigid_axis_the_place_is_the_axis():
 
 def test_the_summary_counts_and_the_tables_show_it():
     rows = [outcome.judge(seal(), answer(cause("coulomb_motor")), 2.0, 50.0), outcome.judge(seal(), answer(cause("delay")), 4.0, 70.0),
-            outcome.judge(seal("healthy", ()), answer(cause("delay", 0.5)), 1.0, 30.0), outcome.judge(seal("healthy", ()), answer(verdict="no_gap"), 1.0, 30.0)]
+            outcome.judge(seal("healthy", ()), answer(cause("delay", 0.5)), 1.0, 30.0),
+            outcome.judge(seal("healthy", ()), answer(verdict="no_gap"), 1.0, 30.0)]
     s = outcome.summary(rows)
     assert s["right"]["hits"] == 2 and s["confidently_wrong"]["hits"] == 1 and s["false_alarms"]["hits"] == 1 and s["false_alarms"]["n"] == 2
     assert s["healthy"]["share"] == 0.5 and s["verdict_exact"]["hits"] == 1 and s["by"]["condition"]["loop open"]["n"] == 4
