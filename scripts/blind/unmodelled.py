@@ -29,7 +29,7 @@ def draw(kind: str, ref: effects.Reference, rng, share: float, length: int, para
     A mode's size is an inertia, of 3 to 12 % of the motor's."""
     size = share * ref.torque_rms
     if kind == "warming" and ("vm" in params or "fm_c" in params):
-        return Rest(kind, share, {"warm": rng.uniform(0.15, 0.4), "warm_tau": rng.uniform(0.2, 0.8) * ref.duration})
+        return Rest(kind, share, {"warm": rng.uniform(0.03, 0.12), "warm_tau": rng.uniform(0.2, 0.8) * ref.duration})
     if kind == "mode":
         i0 = rng.uniform(0.03, 0.12) * ref.base["I1"]
         f = rng.uniform(0.8, 2.0) * ref.resonance
