@@ -17,6 +17,7 @@ import plant
 
 SAMPLES = 1024
 EVERY = 32
+FINEST = 16 * plant.SUBSTEPS_STIFF  # a bristle's breakaway costs an order: of friction under load and at a spot 1e-3 is left at an eighth of this
 # name, base, dt, hold, torque amplitude [N.m], angular frequencies [rad/s]
 AXES = (
     ("seed", dict(I1=2.37e-4, I2=6.07e-6, B=5.4e-4, K=1.76e-2), 5.626e-4, "zoh", 0.03, (11.0, 37.0, 90.0)),
@@ -67,6 +68,27 @@ def simplify(draw: effects.Draw) -> None:
         draw.plant |= {"hyst_n": 1.0, "hyst_even": 0.0}
 
 
+def further(base: dict, ref: effects.Reference, dt: float, rng, size: float):
+    """(id, the plant's parameters, the crate's) of the second edition's effects; its `latch` is a log's and has no place in the plant."""
+    level, travel = size * ref.torque_rms, float(np.ptp(ref.states[:, 0]))
+    sine, cosine, ratio = level * rng.uniform(0.5, 1.5), level * rng.uniform(-1.0, 1.0), rng.uniform(0.5, 2.0)
+    yield "gravity", {"grav_s": sine, "grav_c": cosine, "grav_r": ratio}, {"sine": sine, "cosine": cosine, "ratio": ratio}
+    stiffness, rest = level / effects.rms(ref.states[:, 2]), rng.uniform(-0.3, 0.3) * travel
+    yield "external_spring", {"spring": stiffness, "spring_rest": rest}, {"stiffness": stiffness, "rest": rest}
+    yield "dead_zone", {"dead": level}, {"width": level}
+    centre, width = float(np.median(ref.states[:, 0])), rng.uniform(0.1, 0.25) * travel
+    spot = {k.replace("fm_", "fp_"): v for k, v in plant.stiff_bristle(base, "motor", level, dt, FINEST // 2).items()}
+    yield "position_friction", {"fp_c": level, "fp_centre": centre, "fp_width": width} | spot, {"level": level, "centre": centre, "width": width}
+    inertia = 2 * size * base["I1"]
+    k = inertia * (2 * math.pi * ref.resonance * rng.uniform(0.5, 1.2)) ** 2
+    b = 2 * rng.uniform(0.02, 0.1) * math.sqrt(k * inertia)
+    yield "motor_mode", {"I0": inertia, "K0": k, "B0": b}, {"inertia": inertia, "stiffness": k, "damping": b}
+    for place, key in (("motor", "fm"), ("table", "ft")):
+        load = level / effects.rms(base["K"] * ref.twist)
+        law = {f"{key}_c": 0.3 * level, f"{key}_load": load} | plant.stiff_bristle(base, place, 1.5 * level, dt, FINEST // 2)
+        yield f"coulomb_{place}", law, {"level": 0.3 * level, "load": load}
+
+
 def main() -> None:
     root = pathlib.Path(__file__).resolve().parents[2]
     out = []
@@ -79,17 +101,24 @@ def main() -> None:
         plain = plant.simulate(base, torque, dt, x0=x0, hold=hold)
         ref = effects.Reference(base, dt, SAMPLES * dt, torque, plain, 1.0, c / math.pi,
                                 math.sqrt(base["K"] * (1 / base["I1"] + 1 / base["I2"])) / (2 * math.pi), hold == "linear")
+        cases = []
         for i, effect in enumerate(effects.FAMILY):
             for variant in range(2):
                 draw = effects.draw(effect, ref, np.random.default_rng([17, i, variant]), (0.25, 0.1)[variant])
                 simplify(draw)
                 fine = 2 * plant.SUBSTEPS_STIFF if "fm_wd" in draw.plant or "ft_wd" in draw.plant else 2 * plant.SUBSTEPS
-                states = plant.simulate(base | draw.plant, torque, dt, x0=x0, hold=hold, substeps=fine)
-                seen = effects.measure(states, dt, draw.sensor)
-                head = [effect, name, hold, *(f"{v:.17g}" for v in (dt, base["I1"], base["I2"], base["B"], base["K"], amplitude, a, b, c, w0))]
-                out.append(" ".join(head + [f"{k}={float(v):.17g}" for k, v in crate(draw).items()]))
-                for k in range(0, SAMPLES, EVERY):
-                    out.append(" ".join(f"{v:.10g}" for v in (seen["theta1"][k], seen["theta2"][k], plain[k, 0], plain[k, 2])))
+                cases.append((effect, draw.plant, draw.sensor, crate(draw), fine))
+        for variant in range(2):
+            rng = np.random.default_rng([18, variant])
+            for effect, mine, theirs in further(base, ref, dt, rng, (0.25, 0.1)[variant]):
+                cases.append((effect, mine, {}, theirs, FINEST if {"fm_wd", "ft_wd", "fp_wd"} & mine.keys() else 2 * plant.SUBSTEPS))
+        for effect, mine, sensor, theirs, fine in cases:
+            states = plant.simulate(base | mine, torque, dt, x0=x0, hold=hold, substeps=fine)
+            seen = effects.measure(states, dt, sensor)
+            head = [effect, name, hold, *(f"{v:.17g}" for v in (dt, base["I1"], base["I2"], base["B"], base["K"], amplitude, a, b, c, w0))]
+            out.append(" ".join(head + [f"{k}={float(v):.17g}" for k, v in theirs.items()]))
+            for k in range(0, SAMPLES, EVERY):
+                out.append(" ".join(f"{v:.10g}" for v in (seen["theta1"][k], seen["theta2"][k], plain[k, 0], plain[k, 2])))
     path = root / "tests" / "plant" / "oracle.txt"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(f"# Written by scripts/blind/oracle.py; {SAMPLES} samples, every {EVERY}th. Per effect: id axis hold dt I1 I2 B K A a b c w0 parameters;\n"
