@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
 
 KINDS = ("seed", "ballscrew", "rigid_stage", "belt", "joint")
 RIGID = {"rigid_stage", "joint"}

@@ -115,7 +115,6 @@ def acceleration(rng, length: int, dt: float, accel: float, loop: str, moves: fl
     if loop == "triangles":
         # Slow: one speed, reversed at once; the reversals are short beside the strokes.
         ramp = max(4, int(length / moves * 0.03))
-        speed = 0.25 * accel * ramp * dt
         out[at:at + ramp] = 0.25 * accel
         at += ramp
         while at < length:
