@@ -31,8 +31,8 @@ mod say;
 mod controlled;
 mod diagnosed;
 mod drives;
-mod info3;
 mod examined;
+mod info3;
 mod limits;
 mod outputs;
 
