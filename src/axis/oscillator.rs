@@ -5,6 +5,9 @@
 
 use crate::scalar::Scalar;
 
+/// Most halvings of a step: one that turns by more than 2^64 radians has no digit of its phase left.
+const HALVINGS: u32 = 64;
+
 /// How the linear part of the axis is stepped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scheme {
@@ -87,10 +90,16 @@ impl<S: Scalar> OscillatorStep<S> {
     /// `c_n*h^n` follow from `c_(n+2) = -(b*(n+1)*c_(n+1) + k*c_n)/((n+1)*(n+2))`; the step and ramp responses are its
     /// first and second integral, term by term. A long step is halved first and squared back.
     fn exact(b: S, k: S, h: S) -> Self {
-        let size = (b.re() * h.re()).abs() + k.re().abs().sqrt() * h.re().abs();
-        if size > 1.0 {
-            return Self::exact(b, k, h * 0.5).doubled();
+        let mut size = (b.re() * h.re()).abs() + k.re().abs().sqrt() * h.re().abs();
+        let (mut h, mut halvings) = (h, 0);
+        while size > 1.0 && halvings < HALVINGS {
+            (size, h, halvings) = (0.5 * size, h * 0.5, halvings + 1);
         }
+        (0..halvings).fold(Self::short(b, k, h), |step, _| step.doubled())
+    }
+
+    /// The same of a step that turns by no more than a radian.
+    fn short(b: S, k: S, h: S) -> Self {
         let (bh, kh) = (b * h, k * h * h);
         // In units of the step: terms t_n = c_n*h^(n-1).
         let (mut previous, mut term) = (S::default(), S::from(1.0));

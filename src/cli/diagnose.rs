@@ -281,6 +281,9 @@ pub(super) struct Recorded {
     pub command: Option<Vec<f64>>,
 }
 
+/// Samples that a diagnosis needs: a third of them is held out, and what is left must give a speed and its noise.
+const SHORTEST: usize = 64;
+
 /// Reads a trace as the diagnosis needs it.
 pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyhow::Result<Recorded> {
     let Examined { trace, mut warnings, .. } = examined(path, machine, true, believed)?;
@@ -300,6 +303,12 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
             path.display()
         );
     }
+    anyhow::ensure!(
+        torque.len() >= SHORTEST,
+        "{}: {} samples are too few for a diagnosis, which needs {SHORTEST}; log a longer record, or take more of it with --from and --to",
+        path.display(),
+        torque.len()
+    );
     let views = [0, 1, 2, 3].map(|i: usize| channels[i].as_deref());
     let noise = estimate_noise(&torque, &views, None);
     // A noise-free trace (a simulation) still has the rounding of its file: no channel is taken as exact.

@@ -270,11 +270,15 @@ impl MethodResult {
         self.modal = estimated.modal(reference);
         for e in &self.parameters {
             if let Some(std) = e.std.filter(|s| *s > 0.5 * e.value.abs()) {
+                let share = 100.0 * std / e.value.abs();
+                let how = if share < 1e4 {
+                    format!("hardly determined by this record (standard error {share:.0} % of the estimate)")
+                } else {
+                    "not determined by this record".to_owned()
+                };
                 self.notes.push(format!(
-                    "{} is hardly determined by this record (standard error {:.0} % of the estimate); excite the axis \
-                     more around its natural frequency, or trust the modal parameters",
-                    e.name,
-                    100.0 * std / e.value.abs()
+                    "{} is {how}; excite the axis more around its natural frequency, or trust the modal parameters",
+                    e.name
                 ));
             }
         }

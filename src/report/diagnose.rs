@@ -63,6 +63,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
         blocks.push(Block::Table(causes(f)));
     }
     blocks.push(Block::Table(levels(f)));
+    blocks.extend(remainder(f).map(Block::Paragraph));
     blocks.extend(controlled::short(f));
     blocks.push(Block::Table(ranking(f, 5)));
     blocks.push(Block::Steps(next(f)));
@@ -121,7 +122,14 @@ fn verdict(f: &Findings) -> Verdict {
                 percent(held.before),
                 percent(held.noise_floor)
             );
-            (Tone::Good, "No gap: the model explains this trace to within its noise.".to_owned(), levels)
+            let sentence = match d.remainder.as_ref().filter(|r| r.noise_multiple > REMAINS) {
+                Some(r) => format!(
+                    "No gap: no cause stands out in the {} of the torque that the model leaves.",
+                    percent(r.share)
+                ),
+                None => "No gap: the model explains this trace to within its noise.".to_owned(),
+            };
+            (Tone::Good, sentence, levels)
         }
         Answer::Parameters if !d.causes.is_empty() => (
             Tone::Finding,
@@ -336,9 +344,28 @@ pub(super) fn improved(d: &Diagnosis) -> &'static str {
     }
 }
 
+/// Multiple of the noise from which a remainder is worth a sentence.
+const REMAINS: f64 = 1.5;
+
+/// What no cause explains, in a sentence.
+fn remainder(f: &Findings) -> Option<String> {
+    let r = f.diagnosis.remainder.as_ref().filter(|r| r.noise_multiple > REMAINS)?;
+    let beside = if f.diagnosis.causes.is_empty() { "No cause explains" } else { "Beside that no cause explains" };
+    Some(format!(
+        "{beside} {} {} rms of torque at the {} ({} of the torque, {} times what the encoders' noise makes): {}.",
+        format::number(r.torque_rms, 3, Medium::Page),
+        f.motion.unit("N.m"),
+        r.place,
+        percent(r.share),
+        format::number(r.noise_multiple, 2, Medium::Page),
+        r.summary
+    ))
+}
+
 fn how_far(f: &Findings) -> Vec<Block> {
     let d = f.diagnosis;
     let mut blocks = vec![Block::Table(levels(f))];
+    blocks.extend(remainder(f).map(Block::Paragraph));
     if d.verdict == Answer::Effect && d.gap.closure_of_effect.is_finite() {
         blocks.push(Block::Paragraph(format!(
             "Counted from the model whose parameters alone were fitted again, {} {} of what was left.",

@@ -40,6 +40,8 @@ impl Tracked {
 /// Bandwidth of the feedback on each side, rad/s.
 pub type Bandwidth = [f64; 2];
 
+/// Largest torque and error that are told.
+const LARGEST: f64 = 1e100;
 /// Damping ratio of the feedback.
 const DAMPING: f64 = 0.7;
 
@@ -160,7 +162,10 @@ fn track_with(
             return None;
         }
     }
-    Some((Tracked { torque: lacking(model, dt, inertia, &error, given), error, motion }, memories))
+    let torque = lacking(model, dt, inertia, &error, given);
+    // Squares of what is larger than this are no numbers.
+    let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
+    bounded.then_some((Tracked { torque, error, motion }, memories))
 }
 
 /// Adds `D e` to what was given.

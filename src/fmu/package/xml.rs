@@ -57,7 +57,8 @@ fn content(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
         .with_attributes([
             ("modelIdentifier", identifier(starts.model)),
             ("canHandleVariableCommunicationStepSize", "true"),
-            ("canInterpolateInputs", "true"),
+            // A drive samples its inputs: what they do until its next sample is nothing to it.
+            ("canInterpolateInputs", if starts.model == Model::Axis { "true" } else { "false" }),
             ("maxOutputDerivativeOrder", "1"),
             ("canNotUseMemoryManagementFunctions", "true"),
             ("canGetAndSetFMUstate", "true"),
