@@ -1,5 +1,6 @@
 //! `eixo identify --stream`: the memory it takes does not grow with the record.
 
+use rustfft::num_complex::Complex;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
@@ -7,17 +8,23 @@ use std::process::Command;
 #[path = "program/memory.rs"]
 mod memory;
 
-/// A record of so many rows: a table of 1000 rows of a motion in closed form, time after time.
+/// A record of so many rows: a table of 1000 rows of the paper's axis under a multisine, in closed form (the equations of motion at
+/// each frequency), time after time.
 fn long(path: &Path, rows: usize) {
     let mut file = std::io::BufWriter::new(std::fs::File::create(path).expect("the file"));
     let period: Vec<[f64; 3]> = (0..1000)
         .map(|k| {
             let (mut torque, mut theta1, mut theta2) = (0.0, 0.0, 0.0);
             for h in 1..40_u32 {
-                let phase = f64::from(k) * f64::from(h) * std::f64::consts::TAU / 1000.0 + f64::from(h * h);
+                let w = f64::from(h) * std::f64::consts::TAU;
+                let phase = f64::from(k) * w / 1000.0 + f64::from(h * h);
+                // K + j*w*B; I1*a1 + c*(th1 - th2) = T, I2*a2 = c*(th1 - th2).
+                let c = Complex::new(1.76e-2, 5.4e-4 * w);
+                let (motor, table) = (c - 2.37e-4 * w * w, c - 6.07e-6 * w * w);
+                let answer = Complex::from_polar(1.0, phase) / (motor * table - c * c);
                 torque += phase.sin();
-                theta1 += (phase - 0.3).sin() / f64::from(h * h);
-                theta2 += (phase - 0.5).sin() / f64::from(h * h);
+                theta1 += 1e-2 * (answer * table).im;
+                theta2 += 1e-2 * (answer * c).im;
             }
             [1e-2 * torque, theta1, theta2]
         })

@@ -119,6 +119,13 @@ fn examine(
         suspects,
     };
     let mut outcome = diagnose(&case, progress);
+    let gap = &outcome.diagnosis.gap;
+    anyhow::ensure!(
+        [&gap.train.combined, &gap.holdout.combined].iter().all(|l| l.before.is_finite() && l.after.is_finite()),
+        "{}: the model of {} leaves every bound along this record; check the parameters of the axis file and the units of the log",
+        trace.display(),
+        axis.display()
+    );
     if let Some(controller) = &machine.controller {
         match &reference {
             Some(reference) => {
