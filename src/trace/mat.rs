@@ -5,7 +5,7 @@
 //! of them have is the length of the table; one of another length is an error only when used. Scalars, text, cells, sparse
 //! matrices and objects are passed over.
 //!
-//! Source: MAT-File Format (The MathWorks), chapter 1, "Level 5 MAT-File Format". The readers on crates.io stop at an
+//! Source: MAT-File Format (The MathWorks), chapter 1, "Level 5 MAT-File Format". The readers that are published stop at an
 //! integer-valued vector that MATLAB stored in short integers, or at a structure, and unfold compressed data without a
 //! limit; all that is needed of the format stands here.
 
