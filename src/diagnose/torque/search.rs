@@ -30,6 +30,9 @@ const MOST: usize = 5;
 const STEPS: usize = 12;
 /// Share of the gap's power that the causes must explain together to be called its causes.
 const EXPLAINED: f64 = 0.75;
+/// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
+/// suspect. The share left also counts against each cause's probability.
+const LEFT: f64 = 0.25;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 /// Difference of log evidence below which two hypotheses are alike.
@@ -314,8 +317,9 @@ impl Search<'_> {
         let explained = self.explained(&parameters, &chosen);
         let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let settled = self.at_floor(&chosen) || white;
+        let left = self.band().torque_share(&chosen.rows, self.problem.record);
         let verdict = match chosen.terms.is_empty() {
-            false if settled || explained >= EXPLAINED => Verdict::Effect,
+            false if left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
             true if !settled && self.band().torque_share(&chosen.rows, self.problem.record) > 0.15 => {
                 Verdict::Unexplained
@@ -337,7 +341,7 @@ impl Search<'_> {
                     .filter(|w| w.fit.terms.iter().any(|(o, _)| o.info().family == e.info().family))
                     .map(|w| w.probability)
                     .sum();
-                of * (1.0 - 0.5 * (1.0 - explained).clamp(0.0, 1.0))
+                of * (1.0 - 0.5 * (1.0 - explained).clamp(0.0, 1.0)) * (1.0 - left).clamp(0.0, 1.0)
             })
             .collect();
         ranking.truncate(40);
