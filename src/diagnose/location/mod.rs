@@ -13,12 +13,12 @@ mod follows;
 mod kalman;
 mod places;
 mod plant;
-mod words;
+pub(super) mod words;
 
 use serde::Serialize;
 
 pub use by_frequency::FrequencyPart;
-pub use by_state::{Bin, Shape, StateCurve, shape};
+pub use by_state::{Bin, StateCurve};
 pub use by_time::{Spread, TimeSlot};
 pub use fit::{Fitted, Motion};
 pub use places::PlaceEvidence;

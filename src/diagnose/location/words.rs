@@ -90,12 +90,7 @@ fn located(f: &Findings<'_>, place: Place) -> String {
         text.push_str(", ");
         text.push_str(&part);
     }
-    text.push_str(match f.spread {
-        Spread::Throughout => ", throughout the record.",
-        Spread::Grows => ", growing over the record.",
-        Spread::Falls => ", falling over the record.",
-        Spread::Events => ", in a few events rather than throughout.",
-    });
+    text.push_str(&format!(", {}.", over_time(f.spread)));
     if let Some(weak) = f.weak {
         text.push_str(" The place is weak: ");
         text.push_str(weak);
@@ -104,8 +99,18 @@ fn located(f: &Findings<'_>, place: Place) -> String {
     text
 }
 
+/// How a residual spreads over the record.
+pub fn over_time(spread: Spread) -> &'static str {
+    match spread {
+        Spread::Throughout => "throughout the record",
+        Spread::Grows => "growing over the record",
+        Spread::Falls => "falling over the record",
+        Spread::Events => "in a few events rather than throughout",
+    }
+}
+
 /// What the residual depends on, by the curve that explains most of it.
-fn against(curves: &[StateCurve], residual: &str) -> Option<String> {
+pub fn against(curves: &[StateCurve], residual: &str) -> Option<String> {
     let own = || curves.iter().filter(|c| c.residual == residual);
     let most = own().map(|c| c.explained).fold(0.0, f64::max);
     // The residual's own side of the chain comes first.
@@ -132,7 +137,7 @@ fn against(curves: &[StateCurve], residual: &str) -> Option<String> {
 }
 
 /// A single frequency that is not the excitation's, or a harmonic of the turn.
-fn foreign(parts: &[FrequencyPart], residual: &str) -> Option<String> {
+pub fn foreign(parts: &[FrequencyPart], residual: &str) -> Option<String> {
     let own = || parts.iter().filter(|p| p.residual == residual);
     if let Some(order) = own().filter(|p| p.kind.starts_with("turn_order_")).max_by(|a, b| a.share.total_cmp(&b.share))
         && order.share > NAMED
@@ -147,7 +152,7 @@ fn foreign(parts: &[FrequencyPart], residual: &str) -> Option<String> {
 }
 
 /// Three significant digits.
-fn significant(v: f64) -> String {
+pub fn significant(v: f64) -> String {
     if v == 0.0 || !v.is_finite() {
         return format!("{v}");
     }

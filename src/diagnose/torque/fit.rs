@@ -10,7 +10,7 @@ use super::likelihood::{Band, C, Discrepancy};
 use super::scales::Scales;
 use super::tracking::{Bandwidth, track};
 use crate::axis::Structure;
-use crate::effects::{Effect, Role, Scale, Start};
+use crate::effects::{Effect, Scale, Start};
 
 /// Prior standard deviation of the logarithm of a nominal parameter.
 const PRIOR: f64 = 0.5;
@@ -127,8 +127,6 @@ impl Problem<'_> {
                         0.02 / (std::f64::consts::TAU * value.abs() * self.record.dt * self.record.len() as f64)
                             .max(1e-3)
                     }
-                    _ if c.log => 1e-2,
-                    _ if info.role == Role::Size => 1e-2,
                     _ => 1e-2,
                 }
             }

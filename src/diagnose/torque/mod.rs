@@ -19,6 +19,7 @@ mod tests;
 mod tracking;
 mod words;
 
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::assess::{Case, HELD_OUT, Outcome, Replay};
@@ -39,8 +40,11 @@ use likelihood::Band;
 use search::{Decision, Search, decide};
 use tracking::{Tracked, track};
 
-/// Samples that a search works on at most, spread over the record: the hypotheses are told apart long before that.
+/// Samples, at the rate of the band, that a search works on at most: the first of the record.
 const SEARCHED: usize = 32_768;
+
+/// Hypotheses that are told, each with its own run over the held-out data.
+const TOLD: usize = 12;
 
 /// A record ready for the search: in the band of its motion, with that band.
 struct Prepared {
@@ -63,7 +67,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let on_held = gap::measure(&held, &models);
     progress("where");
     let located = located(&searched, &models[1], decision.parameters.bandwidth);
-    let mut diagnosis = build(case, &decision, &searched, on_train, &on_held, &located);
+    let mut diagnosis = build(case, &decision, &searched, &held, on_train, &on_held, &located);
     let told = told(&decision, &searched.band);
     lattice::judge(case, &told, &mut diagnosis);
     super::words::fill(&mut diagnosis, &told);
@@ -181,6 +185,7 @@ fn build(
     case: &Case<'_>,
     decision: &Decision,
     searched: &Prepared,
+    held: &Record,
     train: Gap,
     holdout: &Gap,
     located: &Location,
@@ -188,8 +193,8 @@ fn build(
     let best = decision.ranking.first().map_or(0.0, |w| w.evidence);
     let ranking = decision
         .ranking
-        .iter()
-        .take(20)
+        .par_iter()
+        .take(TOLD)
         .map(|w| {
             let first = w.fit.terms.first().map(|t| t.0.info());
             Ranked {
@@ -199,7 +204,8 @@ fn build(
                 probability: w.probability,
                 delta_bic: 2.0 * (best - w.evidence),
                 chi2: searched.band.noise_multiple(&w.fit.rows).powi(2),
-                closure_holdout: 0.0,
+                closure_holdout: gap::measure(held, &[decision.given.model, decision.parameters.model, w.fit.model])
+                    .closure,
             }
         })
         .collect();

@@ -33,6 +33,8 @@ const EXPLAINED: f64 = 0.75;
 /// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
 /// suspect. The share left also counts against each cause's probability.
 const LEFT: f64 = 0.25;
+/// The same where no cause is named and the residual is not white: more than a torque sensor's own error.
+const UNCAUSED: f64 = 0.15;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 /// Difference of log evidence below which two hypotheses are alike.
@@ -321,9 +323,7 @@ impl Search<'_> {
         let verdict = match chosen.terms.is_empty() {
             false if left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
-            true if !settled && self.band().torque_share(&chosen.rows, self.problem.record) > 0.15 => {
-                Verdict::Unexplained
-            }
+            true if !settled && left > UNCAUSED => Verdict::Unexplained,
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
         };
