@@ -6,10 +6,9 @@
 
 use serde::Serialize;
 
-use super::decide::Decision;
 use super::model::Model;
 use super::record::Record;
-use super::search::Tested;
+use super::torque::{Decision, Fit};
 use crate::axis::{Axis, Scheme, substeps};
 use crate::effects::{Ramp, Reading, TorqueHistory};
 use crate::trace::Controller;
@@ -181,26 +180,21 @@ impl UnderControl<'_> {
         let commands = Commands {
             time: (0..self.reference.len()).map(|k| self.record.time(k)).collect(),
             measured: self.command.to_vec(),
-            before: self.run(&decision.given.fitted.model).0,
-            after: self.run(&decision.chosen.fitted.model).0,
+            before: self.run(&decision.given.model).0,
+            after: self.run(&decision.chosen.model).0,
         };
-        let before = of(&decision.given.fitted.model);
+        let before = of(&decision.given.model);
         let closure = |e: &LoopErrors| 1.0 - (e.command / before.command).powi(2);
-        let after = of(&decision.chosen.fitted.model);
-        let name = |t: &Tested| match (t.effects.is_empty(), t.freedom) {
-            (true, 0) => "no_gap".to_owned(),
-            (true, _) => "parameters".to_owned(),
-            _ => t.ids().join("+"),
+        let after = of(&decision.chosen.model);
+        let ranked = |t: &Fit| {
+            let errors = of(&t.model);
+            LoopRanked { id: t.id(), errors, closure: closure(&errors) }
         };
-        let ranked = |t: &Tested| {
-            let errors = of(&t.fitted.model);
-            LoopRanked { id: name(t), errors, closure: closure(&errors) }
-        };
-        let mut ranking: Vec<LoopRanked> = decision.ranking.iter().map(|w| ranked(&w.tested)).collect();
+        let mut ranking: Vec<LoopRanked> = decision.ranking.iter().map(|w| ranked(&w.fit)).collect();
         ranking.sort_by(|a, b| b.closure.total_cmp(&a.closure));
         ClosedLoop {
             before,
-            reidentified: of(&decision.parameters.fitted.model),
+            reidentified: of(&decision.parameters.model),
             after,
             closure: closure(&after),
             agrees: ranking.first().is_none_or(|best| best.closure <= closure(&after) + MATERIAL),

@@ -4,8 +4,8 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::closed_loop::ClosedLoop;
-use super::decide::Verdict;
 use super::gap::Figures;
+use super::verdict::Verdict;
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "eixo.diagnosis/1";

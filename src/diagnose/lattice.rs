@@ -7,9 +7,10 @@
 use serde_json::{Map, json};
 
 use super::assess::Case;
-use super::decide::{Decision, Verdict};
 use super::diagnosis::{Cause, Diagnosis};
 use super::noise::NoiseEstimate;
+use super::torque::Decision;
+use super::verdict::Verdict;
 use crate::effects::{Effect, Place};
 
 /// Share of the step within which a model's own rounding is the record's.

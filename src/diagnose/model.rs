@@ -143,6 +143,12 @@ impl Coordinate {
         }
     }
 
+    /// Whether it shapes an effect, rather than sizes it.
+    #[must_use]
+    pub fn is_shape(&self) -> bool {
+        matches!(self.free, Free::Effect(e, i) if e.info().parameters[i].role == Role::Shape)
+    }
+
     /// x of the model's present value.
     #[must_use]
     pub fn x(&self, model: &Model) -> f64 {

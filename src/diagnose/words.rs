@@ -1,7 +1,8 @@
 //! The diagnosis in words: verdict, confusable pairs, the next experiment.
 
-use super::decide::{Confusable, Decision, Verdict};
 use super::diagnosis::Diagnosis;
+use super::torque::{Confusable, Decision};
+use super::verdict::Verdict;
 use crate::effects::{Effect, Family};
 
 /// Fills in the sentences.
@@ -32,7 +33,7 @@ pub fn fill(d: &mut Diagnosis, decision: &Decision) {
         }
     };
     for c in &decision.confusable {
-        let why = format!("their fits differ by {:.1} in BIC on this record", c.delta_bic);
+        let why = format!("their fits differ by {:.1} in BIC on this record", 2.0 * c.difference);
         d.confusable.push([c.named.info().id.to_owned(), c.other.info().id.to_owned(), why]);
     }
     d.next_experiment = next(d, decision);
@@ -50,7 +51,7 @@ fn describe(id: &str, place: &str) -> String {
 fn next(d: &Diagnosis, decision: &Decision) -> String {
     let families: Vec<Family> = decision
         .chosen
-        .effects
+        .terms
         .iter()
         .take(1)
         .map(|(e, _)| e.info().family)

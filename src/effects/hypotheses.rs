@@ -30,11 +30,4 @@ impl Effect {
         let (a, b) = (self.info(), other.info());
         a.family == Family::DryFriction && b.family == Family::DryFriction && a.place == b.place
     }
-
-    /// Whether the effect is one that simulation over windows is asked for: those with an initial state of their own that such a
-    /// window cannot give it, and those that another explains to the letter there, are left to the comparison in torque.
-    #[must_use]
-    pub fn has_windows(self) -> bool {
-        !matches!(self, Self::Gravity | Self::PositionFriction | Self::MotorMode | Self::Latch)
-    }
 }

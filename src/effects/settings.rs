@@ -250,21 +250,6 @@ impl<S: Scalar> Settings<S> {
         sum
     }
 
-    /// The same along a motion that is known: the internal states are committed at once.
-    #[cfg(feature = "cli")]
-    pub(crate) fn forces_along(
-        &self,
-        on: &ActiveEffects,
-        base: &Base<S>,
-        step: &StepMotion<S>,
-        memory: &mut Memory<S>,
-    ) -> Forces<S> {
-        let mut internals = memory.map(Internal::at);
-        let forces = self.forces(on, base, step, &mut internals);
-        *memory = internals.map(|state| state.end);
-        forces
-    }
-
     /// The torque of one effect on the motion; its internal states reach their end on trial.
     #[inline]
     fn reaction(&self, effect: Effect, base: &Base<S>, moment: &Moment<S>, memory: &mut Internals<S>) -> Reaction<S> {

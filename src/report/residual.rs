@@ -94,9 +94,6 @@ pub(super) fn blocks(located: &Location, d: &Diagnosis, motion: Motion) -> Vec<B
     if !parts.rows.is_empty() {
         blocks.push(Block::Table(parts));
     }
-    if let Some(weak) = &located.weak {
-        blocks.push(Block::Warning(weak.clone()));
-    }
     blocks
 }
 

@@ -45,9 +45,9 @@ pub fn by_time(start: f64, dt: f64, r1: &[f64], r2: Option<&[f64]>, at_place: &[
             TimeSlot {
                 start: start + range.start as f64 * dt,
                 end: start + range.end as f64 * dt,
-                r1: super::plant::rms(&r1[range.clone()]),
-                r2: r2.map(|r| super::plant::rms(&r[range.clone()])),
-                at_place: super::plant::rms(&at_place[range]),
+                r1: rms(&r1[range.clone()]),
+                r2: r2.map(|r| rms(&r[range.clone()])),
+                at_place: rms(&at_place[range]),
             }
         })
         .collect()
@@ -89,6 +89,11 @@ fn rank_correlation(values: &[f64]) -> f64 {
     let d: f64 = order.iter().enumerate().map(|(rank, k)| (rank as f64 - *k as f64).powi(2)).sum();
     let n = n as f64;
     1.0 - 6.0 * d / (n * (n * n - 1.0)).max(1.0)
+}
+
+/// Root mean square.
+fn rms(v: &[f64]) -> f64 {
+    (v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

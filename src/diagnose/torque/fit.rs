@@ -6,11 +6,11 @@ use rustfft::FftPlanner;
 
 use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::super::record::Record;
-use super::likelihood::{Band, C, Discrepancy};
+use super::likelihood::{Band, C, Discrepancy, Lacking, Motion};
 use super::scales::Scales;
 use super::tracking::{Bandwidth, track};
 use crate::axis::Structure;
-use crate::effects::{Effect, Scale, Start};
+use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 
 /// Prior standard deviation of the logarithm of a nominal parameter.
 const PRIOR: f64 = 0.5;
@@ -22,23 +22,50 @@ const RICHER: f64 = 2.2;
 /// Cost of an effect in log evidence: one of some fifty.
 pub const PRICE: f64 = 4.0;
 
+/// Steps tried, each shorter than the one before, until one is better.
+const TRIALS: usize = 7;
+/// Steps in which the shapes of effects are held.
+const SIZES_FIRST: usize = 1;
+/// Largest step of a logarithm.
+const FARTHEST_STEP: f64 = 0.5;
+/// Share of a discrepancy's variance that is left at least from one step to the next.
+const SHRINKS: f64 = 0.01;
+/// Change of a discrepancy, in the logarithm of its variance, below which it is settled.
+const SETTLED: f64 = 0.05;
+/// Gain in log likelihood below which a fit is done.
+const WORTH: f64 = 0.05;
+/// Change of the feedback's bandwidth, in its logarithm, from which the motion is followed anew.
+const ANOTHER: f64 = 0.4;
+
 thread_local! { static PLANNER: std::cell::RefCell<FftPlanner<f64>> = std::cell::RefCell::new(FftPlanner::new()); }
 
+/// An effect in one of its forms.
 pub type Term = (Effect, usize);
 
+/// A hypothesis fitted.
 #[derive(Debug, Clone)]
 pub struct Fit {
+    /// Its effects and their forms, in the order they were found.
     pub terms: Vec<Term>,
+    /// The model at its best.
     pub model: Model,
+    /// What was free.
     pub coordinates: Vec<Coordinate>,
+    /// Standard error of each free value, in its unit, every value of the record taken as independent.
     pub std: Vec<f64>,
-    pub rows: [Vec<C>; 2],
-    /// Columns of the coordinates, unwhitened.
+    /// What it lacks.
+    pub rows: Lacking,
+    /// Columns of the coordinates, not whitened.
     pub columns: Vec<[Vec<C>; 2]>,
+    /// Variance of what each equation lacks beyond the noise, (N.m)^2 a sample of the band.
     pub discrepancy: Discrepancy,
+    /// Bandwidth at which it followed the record, rad/s.
     pub bandwidth: Bandwidth,
+    /// Log likelihood at that discrepancy.
     pub log_likelihood: f64,
+    /// Log density of its nominal parameters.
     pub log_prior: f64,
+    /// Steps that the fit took.
     pub iterations: usize,
 }
 
@@ -61,6 +88,8 @@ pub struct Problem<'a> {
     /// Range of theta1 and theta2 over the record, and its length: what a period is told by.
     pub range: [f64; 2],
     pub scales: Option<Scales>,
+    /// Spectra of the measured motion; `None` where it is not measured whole.
+    motion: Option<Motion>,
 }
 
 impl<'a> Problem<'a> {
@@ -74,7 +103,7 @@ impl<'a> Problem<'a> {
                 (high - low).max(1e-12)
             })
         });
-        Self { record, band, nominal, range, scales: None }
+        Self { record, band, nominal, range, scales: None, motion: band.motion(record) }
     }
 }
 
@@ -105,9 +134,9 @@ impl Problem<'_> {
         })
     }
 
-    pub fn rows(&self, model: &Model, bandwidth: Bandwidth) -> Option<[Vec<C>; 2]> {
+    pub fn rows(&self, model: &Model, bandwidth: Bandwidth) -> Option<Lacking> {
         let tracked = track(model, self.record, bandwidth)?;
-        Some(PLANNER.with_borrow_mut(|planner| self.band.rows(model, &tracked, planner)))
+        Some(PLANNER.with_borrow_mut(|planner| self.band.lacking(model, &tracked, planner)))
     }
 
     /// Step of a coordinate for its column.
@@ -120,8 +149,7 @@ impl Problem<'_> {
                 let value = model.effects.of(e)[i];
                 match info.start {
                     Start::Grid(Scale::Order, _) => {
-                        0.02 / (value.abs() * self.range[usize::from(e.info().place == crate::effects::Place::Table)])
-                            .max(1e-3)
+                        0.02 / (value.abs() * self.range[usize::from(e.info().place == Place::Table)]).max(1e-3)
                     }
                     Start::Grid(Scale::Frequency, _) => {
                         0.02 / (std::f64::consts::TAU * value.abs() * self.record.dt * self.record.len() as f64)
@@ -137,13 +165,20 @@ impl Problem<'_> {
         &self,
         model: &Model,
         coordinates: &[Coordinate],
-        rows: &[Vec<C>; 2],
+        lacking: &Lacking,
         bandwidth: Bandwidth,
     ) -> Option<Vec<[Vec<C>; 2]>> {
         let x: Vec<f64> = coordinates.iter().map(|c| c.x(model)).collect();
+        // A coupling with play does not pull by its twist alone.
+        let linear = !EFFECTS.iter().any(|e| e.info().place == Place::Coupling && model.effects.is_on(*e));
         (0..coordinates.len())
             .into_par_iter()
             .map(|i| {
+                if let (Free::Base(p), Some(motion)) = (coordinates[i].free, &self.motion)
+                    && (linear || matches!(p, BaseParameter::I1 | BaseParameter::I2))
+                {
+                    return Some(self.band.base_column(p, motion, coordinates[i].slope(x[i])));
+                }
                 let mut h = self.step(&coordinates[i], model);
                 if x[i] + h > coordinates[i].bounds[1] {
                     h = -h;
@@ -151,7 +186,7 @@ impl Problem<'_> {
                 let mut y = x.clone();
                 y[i] += h;
                 let moved = self.rows(&model.at(coordinates, &y), bandwidth)?;
-                Some([0, 1].map(|e| moved[e].iter().zip(&rows[e]).map(|(a, b)| (a - b) / h).collect()))
+                Some([0, 1].map(|e| moved.rows[e].iter().zip(&lacking.rows[e]).map(|(a, b)| (a - b) / h).collect()))
             })
             .collect()
     }
@@ -172,7 +207,7 @@ impl Problem<'_> {
     pub fn nothing(&self) -> Fit {
         let mut tracked = super::tracking::Tracked::nothing(self.record.len());
         tracked.torque[0].copy_from_slice(&self.record.torque);
-        let rows = PLANNER.with_borrow_mut(|planner| self.band.rows(&self.nominal, &tracked, planner));
+        let rows = PLANNER.with_borrow_mut(|planner| self.band.lacking(&self.nominal, &tracked, planner));
         let s = self.band.discrepancy(&rows);
         Fit {
             terms: vec![],
@@ -214,116 +249,141 @@ impl Problem<'_> {
         })
     }
 
-    /// Fits the hypothesis from a start.
+    /// Fits the hypothesis from a start: likelier parameters at the present discrepancy (Levenberg and Marquardt's method), then
+    /// the likeliest discrepancy at these, in turn. A discrepancy shrinks step by step, so that a fit from afar comes in along the
+    /// motion as measured before the noise's own sharpness holds it in some valley.
     pub fn fit(&self, start: &Model, terms: &[Term], from: Discrepancy, effort: usize) -> Option<Fit> {
         let free = self.free(terms);
         let coordinates: Vec<Coordinate> =
             free.iter().map(|f| bounded(Coordinate::new(*f, start), &self.nominal)).collect();
-        let mut model = *start;
-        let mut bandwidth = self.bandwidth(from);
-        let mut rows = self.rows(&model, bandwidth)?;
-        let mut s = self.band.discrepancy(&rows);
-        let mut value = self.band.log_likelihood(&rows, s);
-        let mut columns = Vec::new();
-        let mut iterations = 0;
-        let mut stale = true;
-        let mut rounds = 0;
+        let mut at = self.along(start, self.bandwidth(from))?;
         let mut damping = 0.0;
         let mut std = Vec::new();
+        let mut columns = Vec::new();
+        let mut iterations = 0;
         while iterations < effort {
             iterations += 1;
-            if stale {
-                columns = self.columns(&model, &coordinates, &rows, bandwidth)?;
-                stale = false;
+            columns = self.columns(&at.model, &coordinates, &at.rows, at.bandwidth)?;
+            let x: Vec<f64> = coordinates.iter().map(|c| c.x(&at.model)).collect();
+            let base: Vec<(BaseParameter, f64, usize)> = coordinates
+                .iter()
+                .enumerate()
+                .filter_map(|(i, c)| match c.free {
+                    Free::Base(p) => Some((p, c.slope(x[i]), i)),
+                    Free::Effect(..) | Free::Loop(_) => None,
+                })
+                .collect();
+            let grows = self.band.score(&at.model, &at.rows, at.s, &base, &mut columns);
+            let cost = |l: &Lacking, x: &[f64]| -self.band.log_likelihood(l, at.s) - self.log_prior(&coordinates, x);
+            let before = cost(&at.rows, &x);
+            let mut normal = self.normal(&coordinates, &x, &columns, &at.rows, at.s);
+            for ((_, _, i), g) in base.iter().zip(&grows) {
+                normal.g[*i] += g;
             }
-            let x: Vec<f64> = coordinates.iter().map(|c| c.x(&model)).collect();
-            let (delta, errors) = self.newton(&coordinates, &x, &columns, &rows, s, damping)?;
-            std = errors;
-            // Line search.
-            let mut accepted = false;
-            let mut share = 1.0;
-            for _ in 0..4 {
+            let mut next = None;
+            // Sizes first, at the shapes of the start.
+            let mut held: Vec<bool> = coordinates.iter().map(|c| iterations <= SIZES_FIRST && c.is_shape()).collect();
+            for _ in 0..TRIALS {
+                let (delta, errors) = normal.solve(&coordinates, &x, damping, &held)?;
+                if std.is_empty() || damping == 0.0 {
+                    std = errors;
+                }
                 let y: Vec<f64> = (0..x.len())
-                    .map(|i| (x[i] + share * delta[i]).clamp(coordinates[i].bounds[0], coordinates[i].bounds[1]))
+                    .map(|i| (x[i] + delta[i]).clamp(coordinates[i].bounds[0], coordinates[i].bounds[1]))
                     .collect();
-                let next: Model = model.at(&coordinates, &y);
-                let allowed = self.scales.as_ref().is_none_or(|s| s.admit(&next, terms.iter().map(|t| t.0)));
-                if let Some(r) = allowed.then(|| self.rows(&next, bandwidth)).flatten() {
-                    let t = self.band.discrepancy(&r);
-                    let v = self.band.log_likelihood(&r, t);
-                    if v + self.log_prior(&coordinates, &y) > value + self.log_prior(&coordinates, &x) + 1e-9 {
-                        let gain = v - value;
-                        (model, rows, s, value) = (next, r, t, v);
-                        accepted = true;
-                        stale = true;
-                        if gain < 0.05 {
-                            accepted = false;
-                        }
+                let model: Model = at.model.at(&coordinates, &y);
+                if !self.admits(&model, terms) {
+                    // What leaves physics' bounds stays where it is; the others move without it.
+                    let alone = |i: usize| self.admits(&at.model.at(&coordinates[i..=i], &y[i..=i]), terms);
+                    let leaving: Vec<usize> = (0..y.len()).filter(|&i| !held[i] && !alone(i)).collect();
+                    if leaving.is_empty() {
+                        damping = (10.0_f64 * damping).max(1e-3);
+                    }
+                    for i in leaving {
+                        held[i] = true;
+                    }
+                    continue;
+                }
+                if let Some(rows) = self.rows(&model, at.bandwidth) {
+                    let after = cost(&rows, &y);
+                    if after < before {
+                        next = Some((model, rows, before - after));
+                        damping = if damping < 2e-4 { 0.0 } else { 0.1 * damping };
                         break;
                     }
                 }
-                share *= 0.3;
+                damping = (10.0_f64 * damping).max(1e-3);
             }
-            if share < 0.5 {
-                damping = (damping * 5.0_f64).max(1e-3);
+            let moved = next.is_some();
+            let mut gain = 0.0;
+            if let Some((model, rows, less)) = next {
+                (at.model, at.rows, gain) = (model, rows, less);
+            }
+            let found = self.band.discrepancy(&at.rows);
+            let s = if self.band.log_likelihood(&at.rows, found) > self.band.log_likelihood(&at.rows, at.s) {
+                found
             } else {
-                damping = 0.0;
-            }
-            if !accepted {
-                let wanted = self.bandwidth(s);
-                let off = (0..2).map(|i| (wanted[i] / bandwidth[i]).ln().abs()).fold(0.0, f64::max);
-                if off > 0.4 && rounds < 3 {
-                    rounds += 1;
-                    bandwidth = wanted;
-                    rows = self.rows(&model, bandwidth)?;
-                    s = self.band.discrepancy(&rows);
-                    value = self.band.log_likelihood(&rows, s);
-                    stale = true;
-                    continue;
-                }
+                at.s
+            };
+            let least = at.s.map(|v| SHRINKS * v);
+            let settled = (0..self.band.equations()).all(|i| (s[i].max(1e-300) / at.s[i]).ln().abs() < SETTLED);
+            at.s = [s[0].max(least[0]), s[1].max(least[1])];
+            let wanted = self.bandwidth(at.s);
+            let off = (0..2).map(|i| (wanted[i] / at.bandwidth[i]).ln().abs()).fold(0.0, f64::max);
+            if off > ANOTHER {
+                at = self.along(&at.model, wanted)?;
+            } else if settled && (gain < WORTH || !moved) {
                 break;
             }
+            if !moved {
+                damping = 0.0;
+            }
         }
-        let x: Vec<f64> = coordinates.iter().map(|c| c.x(&model)).collect();
+        let x: Vec<f64> = coordinates.iter().map(|c| c.x(&at.model)).collect();
         let log_prior = self.log_prior(&coordinates, &x);
         let std = std.iter().zip(&coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect();
         Some(Fit {
             terms: terms.to_vec(),
-            model,
+            model: at.model,
             coordinates,
             std,
-            rows,
+            log_likelihood: self.band.log_likelihood(&at.rows, at.s),
+            rows: at.rows,
             columns,
-            discrepancy: s,
-            bandwidth,
-            log_likelihood: value,
+            discrepancy: at.s,
+            bandwidth: at.bandwidth,
             log_prior,
             iterations,
         })
     }
 
-    fn newton(
+    /// Whether physics lets the effects be what they are in a model.
+    fn admits(&self, model: &Model, terms: &[Term]) -> bool {
+        self.scales.as_ref().is_none_or(|s| s.admit(model, terms.iter().map(|t| t.0)))
+    }
+
+    /// A model along the record, and the discrepancy that it leaves.
+    fn along(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
+        let rows = self.rows(model, bandwidth)?;
+        let s = self.band.discrepancy(&rows);
+        Some(Along { model: *model, rows, s, bandwidth })
+    }
+
+    /// The normal equations of whitened columns, the prior in them.
+    fn normal(
         &self,
         coordinates: &[Coordinate],
         x: &[f64],
         columns: &[[Vec<C>; 2]],
-        rows: &[Vec<C>; 2],
+        lacking: &Lacking,
         s: Discrepancy,
-        damping: f64,
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
+    ) -> Normal {
         let k = coordinates.len();
-        if k == 0 {
-            return Some((vec![], vec![]));
-        }
-        let z = self.band.whiten(rows, s);
-        let j: Vec<Vec<f64>> = columns.iter().map(|c| self.band.whiten(c, s)).collect();
+        let z = self.band.whiten(&lacking.rows, &lacking.weights, s);
+        let j: Vec<Vec<f64>> = columns.iter().map(|c| self.band.whiten(c, &lacking.weights, s)).collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut a = DMatrix::from_fn(k, k, |p, q| if p <= q { dot(&j[p], &j[q]) } else { 0.0 });
-        for p in 0..k {
-            for q in 0..p {
-                a[(p, q)] = a[(q, p)];
-            }
-        }
+        a.fill_lower_triangle_with_upper_triangle();
         let mut g = DVector::from_fn(k, |p, _| -dot(&j[p], &z));
         for i in 0..k {
             if let Free::Base(_) = coordinates[i].free {
@@ -331,40 +391,7 @@ impl Problem<'_> {
                 g[i] -= (x[i] - coordinates[i].x(&self.nominal)) / (PRIOR * PRIOR);
             }
         }
-        // What would leave its bounds stays; others move without it.
-        let mut fixed = vec![false; k];
-        loop {
-            let idx: Vec<usize> = (0..k).filter(|i| !fixed[*i]).collect();
-            if idx.is_empty() {
-                return Some((vec![0.0; k], vec![f64::INFINITY; k]));
-            }
-            let scale: Vec<f64> = idx.iter().map(|&i| a[(i, i)].max(1e-300).sqrt()).collect();
-            let m = DMatrix::from_fn(idx.len(), idx.len(), |p, q| {
-                a[(idx[p], idx[q])] / (scale[p] * scale[q]) + if p == q { 1e-10 + damping } else { 0.0 }
-            });
-            let r = DVector::from_fn(idx.len(), |p, _| g[idx[p]] / scale[p]);
-            let inverse = m.cholesky()?.inverse();
-            let step = &inverse * r;
-            let mut delta = vec![0.0; k];
-            let mut std = vec![f64::INFINITY; k];
-            let mut again = false;
-            for (p, &i) in idx.iter().enumerate() {
-                delta[i] = step[p] / scale[p];
-                std[i] = inverse[(p, p)].max(0.0).sqrt() / scale[p];
-                if coordinates[i].log {
-                    delta[i] = delta[i].clamp(-1.0, 1.0);
-                }
-                let to = x[i] + delta[i];
-                let b = coordinates[i].bounds;
-                if (x[i] <= b[0] + 1e-12 && to < b[0]) || (x[i] >= b[1] - 1e-12 && to > b[1]) {
-                    fixed[i] = true;
-                    again = true;
-                }
-            }
-            if !again {
-                return Some((delta, std));
-            }
-        }
+        Normal { a, g }
     }
 
     /// What an effect costs: one of some fifty, at one of so many lines.
@@ -384,6 +411,66 @@ impl Problem<'_> {
         share * f.log_likelihood + f.log_prior
             - 0.5 * f.coordinates.len() as f64 * n.ln()
             - f.terms.iter().map(|t| self.price(*t)).sum::<f64>()
+    }
+}
+
+/// A model along the record.
+struct Along {
+    model: Model,
+    rows: Lacking,
+    s: Discrepancy,
+    bandwidth: Bandwidth,
+}
+
+/// Normal equations `a*delta = g`.
+struct Normal {
+    a: DMatrix<f64>,
+    g: DVector<f64>,
+}
+
+impl Normal {
+    /// The step and the standard errors of its coordinates; what would leave its bounds stays, others move without it.
+    fn solve(
+        &self,
+        coordinates: &[Coordinate],
+        x: &[f64],
+        damping: f64,
+        held: &[bool],
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let k = coordinates.len();
+        let mut fixed = held.to_vec();
+        loop {
+            let free: Vec<usize> = (0..k).filter(|i| !fixed[*i]).collect();
+            let mut delta = vec![0.0; k];
+            let mut std = vec![f64::INFINITY; k];
+            if free.is_empty() {
+                return Some((delta, std));
+            }
+            let scale: Vec<f64> = free.iter().map(|&i| self.a[(i, i)].max(1e-300).sqrt()).collect();
+            let m = DMatrix::from_fn(free.len(), free.len(), |p, q| {
+                self.a[(free[p], free[q])] / (scale[p] * scale[q]) + if p == q { 1e-10 + damping } else { 0.0 }
+            });
+            let r = DVector::from_fn(free.len(), |p, _| self.g[free[p]] / scale[p]);
+            let inverse = m.cholesky()?.inverse();
+            let step = &inverse * r;
+            let mut again = false;
+            for (p, &i) in free.iter().enumerate() {
+                delta[i] = step[p] / scale[p];
+                std[i] = inverse[(p, p)].max(0.0).sqrt() / scale[p];
+                if coordinates[i].log {
+                    delta[i] = delta[i].clamp(-FARTHEST_STEP, FARTHEST_STEP);
+                }
+                let to = x[i] + delta[i];
+                let b = coordinates[i].bounds;
+                if (x[i] <= b[0] + 1e-12 && to < b[0]) || (x[i] >= b[1] - 1e-12 && to > b[1]) {
+                    fixed[i] = true;
+                    again = true;
+                }
+            }
+            if !again {
+                return Some((delta, std));
+            }
+        }
     }
 }
 

@@ -13,12 +13,18 @@
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
-use super::super::model::Model;
+use super::super::model::{BaseParameter, Model};
 use super::super::record::Record;
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
 use crate::effects::{Family, Place};
 
+/// Decades of variance below the residual's that a discrepancy is looked for in.
+const DECADES: i32 = 12;
+/// Steps of scoring.
+const SCORINGS: usize = 30;
+/// Least variance of one equation's discrepancy over that of the other's, as accelerations.
+const CORNER: f64 = 2.5e-3;
 /// Bins over which the window spreads the noise.
 const SPREAD: f64 = 3.0;
 
@@ -43,17 +49,47 @@ pub struct Band {
     pub omega: Vec<f64>,
     /// Degrees of freedom of each bin over two.
     pub weight: Vec<f64>,
-    /// `N` of each bin: [N11, N22, N12], or the scalar's in the first.
-    noise: Vec<(f64, f64, C)>,
-    /// Inertia of the reference, kg.m2.
-    inertia: f64,
+    /// Noise of each encoder, as a position, at each bin.
+    noise: Vec<[f64; 2]>,
     /// Weights of the eliminated form q = u0 r1 + u1 r2.
     combine: Vec<[C; 2]>,
+    /// Angular frequency at which the axis answers the noise of each bin.
+    spread: Vec<f64>,
+    /// What the noise makes of the reference.
+    reference: Vec<Weight>,
+}
+
+/// What the encoders' noise makes in the equations of a model at a bin, and how dense its readings lie.
+#[derive(Debug, Clone, Copy)]
+pub struct Weight {
+    /// Variance of the noise in each equation, and between them.
+    noise: (f64, f64, C),
+    /// `ln |det V|^2` of the visible stiffness `V` beyond the reference's: the density of readings over that of torques.
+    density: f64,
+}
+
+/// What a model lacks, with how its own stiffness shows the noise in it.
+#[derive(Debug, Clone)]
+pub struct Lacking {
+    /// Spectra of the equations.
+    pub rows: [Vec<C>; 2],
+    /// What the noise makes in them.
+    pub weights: Vec<Weight>,
+    /// Square of the inertia of each equation over the larger one's: torques of one acceleration.
+    alike: [f64; 2],
+}
+
+/// Spectra of the motion as measured: accelerations, twist and its rate.
+pub struct Motion {
+    acceleration: [Vec<C>; 2],
+    twist: Vec<C>,
+    rate: Vec<C>,
 }
 
 /// Variances of the discrepancy of each equation.
 pub type Discrepancy = [f64; 2];
 
+/// Dynamic stiffness in central differences: torque on each side over position of each, N.m/rad.
 pub fn stiffness(p: &Parameters, structure: Structure, w: f64, dt: f64) -> [[C; 2]; 2] {
     let s2 = 2.0 * ((w * dt).cos() - 1.0) / (dt * dt);
     let s1 = C::new(0.0, (w * dt).sin() / dt);
@@ -97,48 +133,137 @@ impl Band {
                 _ => sv / (low * low),
             }
         };
-        let mut noise = Vec::with_capacity(count);
-        let mut combine = Vec::with_capacity(count);
-        for &w in &omega {
-            // The window spreads what stands a few bins higher.
-            let w = w.hypot(SPREAD * step);
-            let d = stiffness(&reference.parameters, reference.structure, w, dt);
-            let one = C::new(1.0, 0.0);
-            match sight {
-                Sight::Rigid => {
-                    noise.push((d[0][0].norm_sqr() * noise_of(0, w), 0.0, C::default()));
-                    combine.push([one, one]);
+        // The window spreads what stands a few bins higher.
+        let spread: Vec<f64> = omega.iter().map(|w| w.hypot(SPREAD * step)).collect();
+        let noise = spread.iter().map(|&w| [noise_of(0, w), noise_of(1, w)]).collect();
+        let one = C::new(1.0, 0.0);
+        let combine = spread
+            .iter()
+            .map(|&w| {
+                let d = stiffness(&reference.parameters, reference.structure, w, dt);
+                match sight {
+                    Sight::Rigid | Sight::Both => [one, one],
+                    Sight::Motor | Sight::Table => {
+                        let u = if sight == Sight::Motor { [d[1][1], -d[0][1]] } else { [d[1][0], -d[0][0]] };
+                        let norm = (u[0].norm_sqr() + u[1].norm_sqr()).sqrt();
+                        u.map(|x| x / norm)
+                    }
                 }
-                Sight::Both => {
-                    let (n1, n2) = (noise_of(0, w), noise_of(1, w));
-                    let n11 = d[0][0].norm_sqr() * n1 + d[0][1].norm_sqr() * n2;
-                    let n22 = d[1][0].norm_sqr() * n1 + d[1][1].norm_sqr() * n2;
-                    let n12 = d[0][0] * d[1][0].conj() * n1 + d[0][1] * d[1][1].conj() * n2;
-                    noise.push((n11, n22, n12));
-                    combine.push([one, one]);
+            })
+            .collect();
+        let mut band = Self { n, dt, sight, taper, omega, weight, noise, combine, spread, reference: Vec::new() };
+        band.reference = band.weights(reference);
+        band
+    }
+
+    /// The stiffness of parameters as the equations show it at a bin: of one equation its first entry.
+    fn visible(&self, p: &Parameters, m: usize) -> [[C; 2]; 2] {
+        let structure = if self.sight == Sight::Rigid { Structure::Rigid } else { Structure::TwoInertia };
+        let d = stiffness(p, structure, self.spread[m], self.dt);
+        let side = match self.sight {
+            Sight::Rigid | Sight::Both => return d,
+            Sight::Motor => 0,
+            Sight::Table => 1,
+        };
+        let [u, v] = self.combine[m];
+        let mut seen = [[C::default(); 2]; 2];
+        seen[0][0] = u * d[0][side] + v * d[1][side];
+        seen
+    }
+
+    /// Noise of each encoder that the equations see.
+    fn seen(&self, m: usize) -> [f64; 2] {
+        let [n1, n2] = self.noise[m];
+        if self.sight == Sight::Table { [n2, 0.0] } else { [n1, n2] }
+    }
+
+    /// What the noise makes in the equations of a model.
+    pub fn weights(&self, model: &Model) -> Vec<Weight> {
+        (0..self.omega.len())
+            .map(|m| {
+                let v = self.visible(&model.parameters, m);
+                let [n1, n2] = self.seen(m);
+                let (noise, det) = if self.sight == Sight::Both {
+                    let n11 = v[0][0].norm_sqr() * n1 + v[0][1].norm_sqr() * n2;
+                    let n22 = v[1][0].norm_sqr() * n1 + v[1][1].norm_sqr() * n2;
+                    let n12 = v[0][0] * v[1][0].conj() * n1 + v[0][1] * v[1][1].conj() * n2;
+                    ((n11, n22, n12), v[0][0] * v[1][1] - v[0][1] * v[1][0])
+                } else {
+                    ((v[0][0].norm_sqr() * n1, 0.0, C::default()), v[0][0])
+                };
+                let before = self.reference.get(m).map_or(0.0, |r| r.density);
+                Weight { noise, density: det.norm_sqr().max(f64::MIN_POSITIVE).ln() - before }
+            })
+            .collect()
+    }
+
+    /// Corrects the columns of base parameters for the noise that is in the measured motion as it is in the rows, and tells how the
+    /// density of readings grows with each: the score of the likelihood of errors in variables.
+    pub fn score(
+        &self,
+        model: &Model,
+        lacking: &Lacking,
+        s: Discrepancy,
+        base: &[(BaseParameter, f64, usize)],
+        columns: &mut [[Vec<C>; 2]],
+    ) -> Vec<f64> {
+        let both = self.sight == Sight::Both;
+        let one = C::new(1.0, 0.0);
+        let mut grows = vec![0.0; base.len()];
+        let units: Vec<Parameters> = base
+            .iter()
+            .map(|(p, ..)| {
+                let mut unit = Parameters { i1: 0.0, i2: 0.0, b: 0.0, k: 0.0, rho: model.parameters.rho };
+                *p.slot(&mut unit) = 1.0;
+                unit
+            })
+            .collect();
+        for (m, weight) in self.weight.iter().enumerate() {
+            let (a, b, c, _) = self.factor(lacking.weights[m], s);
+            let v = self.visible(&model.parameters, m);
+            // C^-1 r = L^-H L^-1 r, and the readings' share of it: E = V^-1 N C^-1 r = n V^H C^-1 r.
+            let r0 = lacking.rows[0][m];
+            let z0 = r0 * a;
+            let z1 = if both { b * r0 + lacking.rows[1][m] * c } else { C::default() };
+            let y = [z0 * a + b.conj() * z1, z1 * c];
+            let n = self.seen(m);
+            let e = if both {
+                [
+                    (v[0][0].conj() * y[0] + v[1][0].conj() * y[1]) * n[0],
+                    (v[0][1].conj() * y[0] + v[1][1].conj() * y[1]) * n[1],
+                ]
+            } else {
+                [v[0][0].conj() * y[0] * n[0], C::default()]
+            };
+            // V^-1 (1 - N C^-1) = V^-1 S C^-1.
+            let p = if both {
+                [[one * (a * a + b.norm_sqr()), b.conj() * c], [b * c, one * (c * c)]]
+            } else {
+                [[one * (a * a), C::default()], [C::default(), C::default()]]
+            };
+            let sc = [[p[0][0] * s[0], p[0][1] * s[0]], [p[1][0] * s[1], p[1][1] * s[1]]];
+            let det = if both { v[0][0] * v[1][1] - v[0][1] * v[1][0] } else { v[0][0] };
+            let inverse = if both {
+                [[v[1][1] / det, -v[0][1] / det], [-v[1][0] / det, v[0][0] / det]]
+            } else {
+                [[one / det, C::default()], [C::default(), C::default()]]
+            };
+            let of = |x: &[[C; 2]; 2], y: &[[C; 2]; 2], i: usize, j: usize| x[i][0] * y[0][j] + x[i][1] * y[1][j];
+            let vs = [
+                [of(&inverse, &sc, 0, 0), of(&inverse, &sc, 0, 1)],
+                [of(&inverse, &sc, 1, 0), of(&inverse, &sc, 1, 1)],
+            ];
+            for (i, (_, slope, column)) in base.iter().enumerate() {
+                let d = self.visible(&units[i], m);
+                let column = &mut columns[*column];
+                column[0][m] -= (d[0][0] * e[0] + d[0][1] * e[1]) * *slope;
+                if both {
+                    column[1][m] -= (d[1][0] * e[0] + d[1][1] * e[1]) * *slope;
                 }
-                Sight::Motor | Sight::Table => {
-                    let (u, side) =
-                        if sight == Sight::Motor { ([d[1][1], -d[0][1]], 0) } else { ([d[1][0], -d[0][0]], 1) };
-                    let norm = (u[0].norm_sqr() + u[1].norm_sqr()).sqrt();
-                    let u = u.map(|x| x / norm);
-                    let det = u[0] * d[0][side] + u[1] * d[1][side];
-                    noise.push((det.norm_sqr() * noise_of(side, w), 0.0, C::default()));
-                    combine.push(u);
-                }
+                grows[i] += 2.0 * weight * slope * (of(&d, &vs, 0, 0) + of(&d, &vs, 1, 1)).re;
             }
         }
-        Self {
-            n,
-            dt,
-            sight,
-            taper,
-            omega,
-            weight,
-            noise,
-            inertia: reference.parameters.i1 + reference.parameters.i2,
-            combine,
-        }
+        grows
     }
 
     pub fn equations(&self) -> usize {
@@ -146,7 +271,7 @@ impl Band {
     }
 
     /// Spectra of the equations.
-    pub fn rows(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> [Vec<C>; 2] {
+    pub fn lacking(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> Lacking {
         let torque = &tracked.torque;
         // A mode of its own answers the error, too.
         let mode = crate::effects::EFFECTS
@@ -164,9 +289,7 @@ impl Band {
 
         let mut z: Vec<C> = (0..self.n).map(|k| C::new(torque[0][k], torque[1][k]) * self.taper[k]).collect();
         planner.plan_fft_forward(self.n).process(&mut z);
-        // What is likely is the motion: a torque counts by the acceleration that it makes, else an axis of no inertia lacks none.
-        let own = model.parameters.i1 + model.parameters.i2;
-        let scale = self.inertia / own / (self.n as f64).sqrt();
+        let scale = 1.0 / (self.n as f64).sqrt();
         let count = self.omega.len();
         let mut rows = [Vec::with_capacity(count), Vec::with_capacity(count)];
         for m in 0..count {
@@ -188,12 +311,65 @@ impl Band {
                 rows[0].push(u * one + v * two);
             }
         }
-        rows
+        let p = &model.parameters;
+        let most = p.i1.max(p.i2);
+        let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };
+        Lacking { rows, weights: self.weights(model), alike }
+    }
+
+    /// Spectra of the measured motion, which the torque of a base parameter follows; `None` where a position is missing.
+    pub fn motion(&self, record: &Record) -> Option<Motion> {
+        let side = |i: usize| record.channels[2 * i].as_deref();
+        let sides = match self.sight {
+            Sight::Both => [side(0)?, side(1)?],
+            Sight::Rigid => {
+                let y = match (side(0), side(1)) {
+                    (Some(_), Some(_)) => return None,
+                    (a, b) => a.or(b)?,
+                };
+                [y, y]
+            }
+            Sight::Motor | Sight::Table => return None,
+        };
+        let count = self.omega.len();
+        let spectrum = |f: &dyn Fn(usize) -> f64| -> Vec<C> {
+            let inside = |k: usize| if k == 0 || k + 1 >= self.n { 0.0 } else { f(k) * self.taper[k] };
+            let mut z: Vec<C> = (0..self.n).map(|k| C::new(inside(k), 0.0)).collect();
+            FftPlanner::new().plan_fft_forward(self.n).process(&mut z);
+            z.truncate(count);
+            z
+        };
+        let second = |y: &[f64], k: usize| (y[k + 1] - 2.0 * y[k] + y[k - 1]) / (self.dt * self.dt);
+        let twist = |k: usize| sides[0][k] - sides[1][k];
+        Some(Motion {
+            acceleration: sides.map(|y| spectrum(&|k| second(y, k))),
+            twist: spectrum(&twist),
+            rate: spectrum(&|k| (twist(k + 1) - twist(k - 1)) / (2.0 * self.dt)),
+        })
+    }
+
+    /// What a step of a base parameter adds to the rows, along the motion as measured: the linear axis' own torque.
+    pub fn base_column(&self, p: BaseParameter, motion: &Motion, slope: f64) -> [Vec<C>; 2] {
+        let by = slope / (self.n as f64).sqrt();
+        let of = |series: &[C], by: f64| -> Vec<C> { series.iter().map(|s| *s * by).collect() };
+        let none = || vec![C::default(); self.omega.len()];
+        match p {
+            BaseParameter::I1 => [of(&motion.acceleration[0], by), none()],
+            BaseParameter::I2 if self.sight == Sight::Rigid => [of(&motion.acceleration[0], by), none()],
+            BaseParameter::I2 => [none(), of(&motion.acceleration[1], by)],
+            BaseParameter::B => [of(&motion.rate, by), of(&motion.rate, -by)],
+            BaseParameter::K => [of(&motion.twist, by), of(&motion.twist, -by)],
+        }
+    }
+
+    /// Half the sum of squares of the whitened rows.
+    pub fn half_squares(&self, l: &Lacking, s: Discrepancy) -> f64 {
+        0.5 * self.whiten(&l.rows, &l.weights, s).iter().map(|v| v * v).sum::<f64>()
     }
 
     /// Inverse of the covariance's Cholesky factor at each bin: `z0 = a r1`, `z1 = b r1 + c r2`; and log det.
-    fn factor(&self, m: usize, s: Discrepancy) -> (f64, C, f64, f64) {
-        let (n11, n22, n12) = self.noise[m];
+    fn factor(&self, weight: Weight, s: Discrepancy) -> (f64, C, f64, f64) {
+        let (n11, n22, n12) = weight.noise;
         let c11 = n11 + s[0];
         if self.sight != Sight::Both {
             return (1.0 / c11.sqrt(), C::default(), 0.0, c11.ln());
@@ -207,11 +383,11 @@ impl Band {
     }
 
     /// Rows as real numbers of unit variance.
-    pub fn whiten(&self, rows: &[Vec<C>; 2], s: Discrepancy) -> Vec<f64> {
+    pub fn whiten(&self, rows: &[Vec<C>; 2], weights: &[Weight], s: Discrepancy) -> Vec<f64> {
         let count = self.omega.len();
         let mut out = Vec::with_capacity(2 * count * self.equations());
         for (m, (&first, &weight)) in rows[0].iter().zip(&self.weight).enumerate() {
-            let (a, b, c, _) = self.factor(m, s);
+            let (a, b, c, _) = self.factor(weights[m], s);
             let w = (2.0 * weight).sqrt();
             let z0 = first * (a * w);
             out.push(z0.re);
@@ -225,59 +401,84 @@ impl Band {
         out
     }
 
-    pub fn log_det(&self, s: Discrepancy) -> f64 {
-        (0..self.omega.len()).map(|m| self.weight[m] * self.factor(m, s).3).sum()
+    /// Log determinant of the covariance, less the density of readings.
+    fn log_det(&self, weights: &[Weight], s: Discrepancy) -> f64 {
+        weights.iter().zip(&self.weight).map(|(n, w)| w * (self.factor(*n, s).3 - n.density)).sum()
     }
 
-    /// The discrepancy of largest likelihood, by scoring.
-    pub fn discrepancy(&self, rows: &[Vec<C>; 2]) -> Discrepancy {
+    /// The discrepancy of largest likelihood: the best of some sizes of it for both equations alike, then scoring for each as long as
+    /// that helps.
+    pub fn discrepancy(&self, l: &Lacking) -> Discrepancy {
+        let rows = &l.rows;
         let eqs = self.equations();
-        let mut s = [0.0; 2];
-        for i in 0..eqs {
-            let total: f64 = self.weight.iter().sum();
-            s[i] = rows[i].iter().zip(&self.weight).map(|(r, w)| w * r.norm_sqr()).sum::<f64>() / total;
+        let total: f64 = self.weight.iter().sum();
+        let power = |i: usize| rows[i].iter().zip(&self.weight).map(|(r, w)| w * r.norm_sqr()).sum::<f64>() / total;
+        let most = (0..eqs).map(|i| power(i) / l.alike[i]).fold(f64::MIN_POSITIVE, f64::max);
+        let alike = |v: f64| l.alike.map(|a| a * v);
+        let mut s = alike(most);
+        let mut value = self.log_likelihood(l, s);
+        for i in 1..DECADES {
+            let t = alike(most * 0.1_f64.powi(i));
+            let v = self.log_likelihood(l, t);
+            if v > value {
+                (s, value) = (t, v);
+            }
         }
-        let floor = s.map(|v| v * 1e-12);
-        for _ in 0..60 {
-            let mut next = s;
-            let mut moved = 0.0_f64;
-            let (mut num, mut den) = ([0.0; 2], [0.0; 2]);
-            for (m, (&first, &w)) in rows[0].iter().zip(&self.weight).enumerate() {
-                let (a, b, c, _) = self.factor(m, s);
-                let z0 = first * a;
-                if eqs == 1 {
-                    let p = a * a;
-                    num[0] += w * (z0.norm_sqr() * p - p);
-                    den[0] += w * p * p;
-                } else {
-                    let z1 = b * first + rows[1][m] * c;
-                    // P R = L^-H z, P = L^-H L^-1
-                    let pr = [z0 * a + b.conj() * z1, z1 * c];
-                    let p = [a * a + b.norm_sqr(), c * c];
-                    for i in 0..2 {
-                        num[i] += w * (pr[i].norm_sqr() - p[i]);
-                        den[i] += w * p[i] * p[i];
-                    }
-                }
+        for _ in 0..SCORINGS {
+            let next = self.scored(l, s);
+            let v = self.log_likelihood(l, next);
+            if v.is_nan() || v <= value {
+                break;
             }
-            for i in 0..eqs {
-                if den[i] > 0.0 {
-                    next[i] = (s[i] + num[i] / den[i]).clamp(floor[i].max(0.05 * s[i]), f64::INFINITY);
-                    moved = moved.max((next[i] / s[i].max(f64::MIN_POSITIVE) - 1.0).abs());
-                }
-            }
-            s = next;
-            if moved < 1e-4 {
+            let gain = v - value;
+            (s, value) = (next, v);
+            if gain < 1e-3 {
                 break;
             }
         }
         s
     }
 
+    /// A step of scoring from a discrepancy.
+    fn scored(&self, l: &Lacking, s: Discrepancy) -> Discrepancy {
+        let rows = &l.rows;
+        let eqs = self.equations();
+        let (mut num, mut den) = ([0.0; 2], [0.0; 2]);
+        for (m, (&first, &w)) in rows[0].iter().zip(&self.weight).enumerate() {
+            let (a, b, c, _) = self.factor(l.weights[m], s);
+            let z0 = first * a;
+            if eqs == 1 {
+                let p = a * a;
+                num[0] += w * (z0.norm_sqr() * p - p);
+                den[0] += w * p * p;
+            } else {
+                let z1 = b * first + rows[1][m] * c;
+                // P R = L^-H z, P = L^-H L^-1
+                let pr = [z0 * a + b.conj() * z1, z1 * c];
+                let p = [a * a + b.norm_sqr(), c * c];
+                for i in 0..2 {
+                    num[i] += w * (pr[i].norm_sqr() - p[i]);
+                    den[i] += w * p[i] * p[i];
+                }
+            }
+        }
+        let mut next = s;
+        for i in 0..eqs {
+            if den[i] > 0.0 {
+                next[i] = (s[i] + num[i] / den[i]).clamp(0.1 * s[i], 10.0 * s[i]);
+            }
+        }
+        // An equation without any discrepancy beside one with much is a corner of the likelihood, not a finding.
+        let most = (0..eqs).map(|i| next[i] / l.alike[i]).fold(0.0, f64::max);
+        for (v, alike) in next.iter_mut().zip(&l.alike).take(eqs) {
+            *v = v.max(CORNER * most * alike);
+        }
+        next
+    }
+
     /// Log likelihood at that discrepancy.
-    pub fn log_likelihood(&self, rows: &[Vec<C>; 2], s: Discrepancy) -> f64 {
-        let z = self.whiten(rows, s);
-        -0.5 * z.iter().map(|v| v * v).sum::<f64>() - self.log_det(s)
+    pub fn log_likelihood(&self, l: &Lacking, s: Discrepancy) -> f64 {
+        -self.half_squares(l, s) - self.log_det(&l.weights, s)
     }
 
     /// Real values compared.
@@ -286,8 +487,8 @@ impl Band {
     }
 
     /// Share of the values that are independent: of a residual whose power is spread unevenly fewer are.
-    pub fn independent(&self, rows: &[Vec<C>; 2], s: Discrepancy) -> f64 {
-        let z = self.whiten(rows, s);
+    pub fn independent(&self, l: &Lacking, s: Discrepancy) -> f64 {
+        let z = self.whiten(&l.rows, &l.weights, s);
         let per = 2 * self.equations();
         let mut share = 0.0;
         for i in 0..self.equations() {
@@ -304,34 +505,39 @@ impl Band {
     }
 
     /// Power of each equation beyond the noise, N.m squared a sample of the band.
-    pub fn excess(&self, rows: &[Vec<C>; 2]) -> Discrepancy {
-        self.discrepancy(rows)
+    pub fn excess(&self, l: &Lacking) -> Discrepancy {
+        self.discrepancy(l)
     }
 
     /// Mean power of the noise in an equation, N.m squared a sample of the band.
     pub fn noise_power(&self, i: usize) -> f64 {
         let total: f64 = self.weight.iter().sum();
-        self.noise.iter().zip(&self.weight).map(|(n, w)| w * if i == 0 { n.0 } else { n.1 }).sum::<f64>() / total
+        self.reference
+            .iter()
+            .zip(&self.weight)
+            .map(|(n, w)| w * if i == 0 { n.noise.0 } else { n.noise.1 })
+            .sum::<f64>()
+            / total
     }
 
     /// Rms of the residual over that of the noise, each frequency at its weight.
-    pub fn noise_multiple(&self, rows: &[Vec<C>; 2]) -> f64 {
-        let z = self.whiten(rows, [0.0; 2]);
+    pub fn noise_multiple(&self, l: &Lacking) -> f64 {
+        let z = self.whiten(&l.rows, &l.weights, [0.0; 2]);
         (z.iter().map(|v| v * v).sum::<f64>() / self.values()).sqrt()
     }
 
-    /// Rms of the first equation's residual in the band, N.m.
-    pub fn torque_rms(&self, rows: &[Vec<C>; 2]) -> f64 {
-        let sum: f64 = rows.iter().flat_map(|r| r.iter().zip(&self.weight)).map(|(r, w)| 2.0 * w * r.norm_sqr()).sum();
-        (sum / self.n as f64).sqrt()
+    /// Rms in the band of the torque lacking beyond what the noise makes, N.m; of two equations together.
+    pub fn torque_rms(&self, s: Discrepancy) -> f64 {
+        let bins: f64 = 2.0 * self.weight.iter().sum::<f64>() / self.n as f64;
+        (s.iter().take(self.equations()).sum::<f64>() * bins).sqrt()
     }
 
     /// The same over the rms of the torque about its mean.
-    pub fn torque_share(&self, rows: &[Vec<C>; 2], record: &Record) -> f64 {
+    pub fn torque_share(&self, s: Discrepancy, record: &Record) -> f64 {
         let n = record.torque.len() as f64;
         let mean = record.torque.iter().sum::<f64>() / n;
         let rms = (record.torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / n).sqrt();
-        self.torque_rms(rows) / rms.max(f64::MIN_POSITIVE)
+        self.torque_rms(s) / rms.max(f64::MIN_POSITIVE)
     }
 
     /// A series in the band, in time.

@@ -23,25 +23,25 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::assess::{Case, HELD_OUT, Outcome, Replay};
-use super::decide::{self, Verdict};
 use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, Remainder, SCHEMA, Where};
 use super::evidence::{Evidence, Overlay};
-use super::location::{Location, Residual, along};
+use super::lattice;
+use super::location::{Location, Residual, along, without_offset};
 use super::model::{BaseParameter, Free, Model};
 use super::record::{CHANNELS, Record};
-use super::search::Tested;
-use super::{fit as shooting, lattice};
+use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
-use crate::effects::Place;
-use crate::identify::levenberg::Termination;
-use fit::{Fit, Problem};
+use crate::effects::{Effect, Place};
+pub use fit::Fit;
+use fit::Problem;
 use gap::Gap;
 use likelihood::Band;
-use search::{Decision, Search, decide};
+pub use search::{Confusable, Decision, Weighed};
+use search::{Search, decide};
 use tracking::{Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
-const SEARCHED: usize = 32_768;
+const SEARCHED: usize = 16_384;
 
 /// Hypotheses that are told, each with its own run over the held-out data.
 const TOLD: usize = 12;
@@ -60,7 +60,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let may = |e: &crate::effects::Effect| e.may_be_named(case.nominal.structure) && !case.nominal.effects.is_on(*e);
     let suspects = case.suspects.iter().copied().filter(may).collect();
     let problem = Problem::new(&searched.record, &searched.band, case.nominal);
-    let decision = decide(Search { problem, suspects, progress });
+    let decision = decide(Search { problem, suspects, gap: [0.0; 2], progress });
     progress("held-out data");
     let models = [decision.given.model, decision.parameters.model, decision.chosen.model];
     let on_train = gap::measure(&searched.record, &models);
@@ -68,20 +68,11 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     progress("where");
     let located = located(&searched, &models[1], decision.parameters.bandwidth);
     let mut diagnosis = build(case, &decision, &searched, &held, on_train, &on_held, &located);
-    let told = told(&decision, &searched.band);
-    lattice::judge(case, &told, &mut diagnosis);
-    super::words::fill(&mut diagnosis, &told);
+    lattice::judge(case, &decision, &mut diagnosis);
+    super::words::fill(&mut diagnosis, &decision);
     let evidence = Evidence { held: overlays(&held, &on_held), located };
     let replay = Replay { initial: on_held.initial, record: held };
-    Outcome { diagnosis, improved: models[2], models, decision: told, evidence, replay }
-}
-
-/// What a model lacks in torque to follow a record, as a remainder; `None` where it cannot be run along it.
-#[must_use]
-pub fn remainder(record: &Record, model: &Model) -> Option<Remainder> {
-    let p = prepared(record, model);
-    let fit = Problem::new(&p.record, &p.band, *model).given(model)?;
-    Some(remains(&p, &fit))
+    Outcome { diagnosis, improved: models[2], models, decision, evidence, replay }
 }
 
 fn remains(p: &Prepared, fit: &Fit) -> Remainder {
@@ -91,8 +82,8 @@ fn remains(p: &Prepared, fit: &Fit) -> Remainder {
     let place = where_by_torque(&series, rigid);
     let shown = along(&p.record, residual(&series[usize::from(place == "table")], &tracked));
     Remainder {
-        torque_rms: p.band.torque_rms(&fit.rows),
-        share: p.band.torque_share(&fit.rows, &p.record),
+        torque_rms: p.band.torque_rms(fit.discrepancy),
+        share: p.band.torque_share(fit.discrepancy, &p.record),
         noise_multiple: p.band.noise_multiple(&fit.rows),
         place: place.to_owned(),
         summary: words::shows(&shown),
@@ -103,58 +94,29 @@ fn residual(series: &[f64], tracked: &Tracked) -> Residual {
     Residual { r1: series.to_vec(), at_place: series.to_vec(), states: tracked.motion.clone(), ..Residual::default() }
 }
 
-/// The decision in the terms of the drive's loop, the lattice and the words.
-fn told(d: &Decision, band: &Band) -> decide::Decision {
-    let values = band.values();
-    let tested = |f: &Fit| Tested {
-        effects: f.terms.clone(),
-        freedom: f.coordinates.len(),
-        fitted: shooting::Fitted {
-            model: f.model,
-            coordinates: f.coordinates.clone(),
-            std: f.std.iter().map(|s| s / d.independent.sqrt()).collect(),
-            initial: Vec::new(),
-            chi2: band.noise_multiple(&f.rows).powi(2) * values,
-            squares: [0.0; 4],
-            termination: Termination::Cost,
-            iterations: f.iterations,
-        },
-    };
-    decide::Decision {
-        verdict: d.verdict,
-        given: tested(&d.given),
-        parameters: tested(&d.parameters),
-        chosen: tested(&d.chosen),
-        ranking: d
-            .ranking
-            .iter()
-            .map(|w| decide::Weighed { tested: tested(&w.fit), bic: -2.0 * w.evidence, probability: w.probability })
-            .collect(),
-        shares: d.shares.clone(),
-        values,
-        confusable: d
-            .confusable
-            .iter()
-            .map(|c| decide::Confusable { named: c.named, other: c.other, delta_bic: 2.0 * c.difference })
-            .collect(),
-    }
-}
-
 /// The record that the fits see, and the one that they do not.
 fn split(case: &Case<'_>) -> (Record, Record) {
     let n = case.train.len();
+    let own = |r: &Record| without_offset(r, &case.nominal.parameters, case.nominal.structure);
     match case.holdout {
-        Some(other) => (case.train.clone(), other.clone()),
+        Some(other) => (own(case.train), own(other)),
         None => {
             let split = n - (n as f64 * HELD_OUT) as usize;
-            (case.train.part(0..split), case.train.part(split..n))
+            let whole = own(case.train);
+            (whole.part(0..split), whole.part(split..n))
         }
     }
 }
 
 /// The record in the band of its motion.
 fn prepared(record: &Record, nominal: &Model) -> Prepared {
-    let whole = record.part(0..band::smooth(record.len()));
+    let mut whole = record.part(0..band::smooth(record.len()));
+    // A logged speed is mostly the position's difference, late: it adds nothing where the position itself is there.
+    for side in [0, 2] {
+        if whole.channels[side].is_some() {
+            whole.channels[side + 1] = None;
+        }
+    }
     let mask = band::mask(whole.len());
     let limit = band::limit(&whole, &mask, nominal.structure);
     let record = if whole.len() > band::LONG || nominal.structure == Structure::Rigid {
@@ -175,8 +137,24 @@ fn prepared(record: &Record, nominal: &Model) -> Prepared {
 /// Where the torque that a model lacks shows along the record.
 fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
     let tracked = track(model, &p.record, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
-    let series = p.band.filtered(&tracked.torque[0]);
-    let mut located = along(&p.record, residual(&series, &tracked));
+    let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
+    let rigid = model.structure == Structure::Rigid;
+    let mut residual = residual(&series[0], &tracked);
+    let place = match where_by_torque(&series, rigid) {
+        "coupling" => Some(Place::Coupling),
+        "table" => Some(Place::Table),
+        "motor" => Some(Place::Motor),
+        _ => None,
+    };
+    if !rigid {
+        let [_, r2] = series;
+        if place == Some(Place::Table) {
+            residual.at_place.clone_from(&r2);
+        }
+        residual.r2 = r2;
+    }
+    let mut located = along(&p.record, residual);
+    located.place = place;
     located.summary = words::gap_shows(&located);
     located
 }
@@ -190,6 +168,7 @@ fn build(
     holdout: &Gap,
     located: &Location,
 ) -> Diagnosis {
+    let structure = case.nominal.structure;
     let best = decision.ranking.first().map_or(0.0, |w| w.evidence);
     let ranking = decision
         .ranking
@@ -200,7 +179,7 @@ fn build(
             Ranked {
                 id: w.fit.id(),
                 family: first.map_or("none", |i| i.family.as_str()).to_owned(),
-                place: first.map_or("none", |i| place_of(i.place)).to_owned(),
+                place: first.map_or("none", |i| place_of(i.place, structure)).to_owned(),
                 probability: w.probability,
                 delta_bic: 2.0 * (best - w.evidence),
                 chi2: searched.band.noise_multiple(&w.fit.rows).powi(2),
@@ -209,14 +188,17 @@ fn build(
             }
         })
         .collect();
-    let causes = causes(decision, case.motion);
+    let causes = match decision.torque_gain() {
+        Some(gain) if decision.verdict == Verdict::Parameters => vec![gain_of(gain)],
+        _ => causes(decision, case.motion),
+    };
     let verdict = decision.verdict;
     Diagnosis {
         schema: SCHEMA,
         machine: case.machine.clone(),
         verdict,
         sentence: String::new(),
-        location: location(&causes, verdict, located),
+        location: location(&causes, verdict, located, structure),
         causes,
         ranking,
         confusable: Vec::new(),
@@ -239,9 +221,9 @@ fn build(
 }
 
 /// The name of a place: a rigid axis has one for all that acts on its motion.
-fn place_of(place: Place) -> &'static str {
+fn place_of(place: Place, structure: Structure) -> &'static str {
     match place {
-        Place::Motor | Place::Coupling | Place::Table => "axis",
+        Place::Motor | Place::Coupling | Place::Table if structure == Structure::Rigid => "axis",
         place => place.as_str(),
     }
 }
@@ -272,7 +254,7 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
             Cause {
                 id: info.id.to_owned(),
                 family: info.family.as_str().to_owned(),
-                place: place_of(info.place).to_owned(),
+                place: place_of(info.place, fit.model.structure).to_owned(),
                 variant: info.variants[*form].name.to_owned(),
                 probability: decision.probabilities[i],
                 share_of_gap: decision.shares[i],
@@ -282,6 +264,22 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
         .collect();
     causes.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap));
     causes
+}
+
+/// All parameters changed by one factor, as a cause.
+fn gain_of((gain, std): (f64, f64)) -> Cause {
+    let info = Effect::TorqueGain.info();
+    let mut parameters = Map::new();
+    parameters.insert("gain".to_owned(), json!({ "value": gain, "std": number(std), "unit": "1" }));
+    Cause {
+        id: info.id.to_owned(),
+        family: info.family.as_str().to_owned(),
+        place: info.place.as_str().to_owned(),
+        variant: String::new(),
+        probability: 1.0,
+        share_of_gap: 1.0,
+        parameters,
+    }
 }
 
 fn number(v: f64) -> Value {
@@ -306,13 +304,18 @@ fn where_by_torque(series: &[Vec<f64>; 2], rigid: bool) -> &'static str {
     }
 }
 
-fn location(causes: &[Cause], verdict: Verdict, located: &Location) -> Where {
-    let by_place: Map<String, Value> = ["input", "axis", "sensor"]
+fn location(causes: &[Cause], verdict: Verdict, located: &Location, structure: Structure) -> Where {
+    let places: &[&str] = match structure {
+        Structure::Rigid => &["input", "axis", "sensor"],
+        Structure::TwoInertia => &["input", "motor", "coupling", "table", "sensor"],
+    };
+    let unexplained = located.place.map_or("axis", Place::as_str);
+    let by_place: Map<String, Value> = places
         .iter()
         .map(|p| {
             let named: f64 = causes.iter().filter(|c| c.place == *p).map(|c| c.share_of_gap).sum();
             let share = if causes.is_empty() {
-                f64::from(u8::from(*p == "axis" && verdict == Verdict::Unexplained))
+                f64::from(u8::from(*p == unexplained && verdict == Verdict::Unexplained))
             } else {
                 named
             };
@@ -321,7 +324,7 @@ fn location(causes: &[Cause], verdict: Verdict, located: &Location) -> Where {
         .collect();
     let place = match (causes.first(), verdict) {
         (Some(c), Verdict::Effect) => c.place.clone(),
-        (_, Verdict::Unexplained) => "axis".to_owned(),
+        (_, Verdict::Unexplained) => unexplained.to_owned(),
         _ => "none".to_owned(),
     };
     Where {

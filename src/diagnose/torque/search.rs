@@ -9,15 +9,21 @@
 
 use rayon::prelude::*;
 
-use super::super::decide::Verdict;
+use super::super::verdict::Verdict;
 use super::fit::{Fit, Problem, Term};
-use super::likelihood::Band;
+use super::likelihood::{Band, Discrepancy};
 use super::scales::Scales;
 use super::starts::{Regression, StartPoint, starts};
 use crate::effects::Effect;
 
 /// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
 const MATERIAL: f64 = 0.25;
+/// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
+const MINOR: f64 = 0.0025;
+/// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
+const GAIN_LIKENESS: f64 = 0.25;
+/// Smallest relative change of the parameters that is called one.
+const GAIN_SEEN: f64 = 0.02;
 /// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor, which is an estimate itself.
 const AT_FLOOR: f64 = 1.15;
 /// Starts that are fitted of those that the regression ranks first.
@@ -26,8 +32,11 @@ const FITTED: usize = 12;
 const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
-/// Gauss-Newton steps of a fit.
-const STEPS: usize = 12;
+/// Steps of a fit that is looked at, and how many of these are then fitted to their end.
+const PROBE: usize = 5;
+const DEEPENED: usize = 4;
+/// Steps of a fit at most.
+const STEPS: usize = 40;
 /// Share of the gap's power that the causes must explain together to be called its causes.
 const EXPLAINED: f64 = 0.75;
 /// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
@@ -85,12 +94,41 @@ pub struct Decision {
     pub confusable: Vec<Confusable>,
 }
 
+impl Confusable {
+    /// Whether the two are the same but for where they act.
+    #[must_use]
+    pub fn is_of_place(&self) -> bool {
+        let (named, other) = (self.named.info(), self.other.info());
+        named.family == other.family && named.place != other.place
+    }
+}
+
+impl Decision {
+    /// True if the parameters all changed by one factor: a wrong torque constant.
+    #[must_use]
+    pub fn torque_gain(&self) -> Option<(f64, f64)> {
+        let f = &self.parameters;
+        let change = |i: usize| (f.coordinates[i].value(&f.model) / f.coordinates[i].unit).ln();
+        let first = change(0);
+        // A rigid axis has one parameter: its change and a gain are the same thing.
+        let alike = f.coordinates.len() > 1
+            && (1..f.coordinates.len()).all(|i| {
+                let std = f.std[i] / f.coordinates[i].value(&f.model);
+                (change(i) - first).abs() <= GAIN_LIKENESS * first.abs() + 2.0 * std.min(0.2)
+            });
+        let std = f.std[0] / f.coordinates[0].value(&f.model);
+        (alike && first.abs() > GAIN_SEEN).then(|| ((-first).exp(), (-first).exp() * std))
+    }
+}
+
 /// A search over hypotheses.
 pub struct Search<'a> {
     /// The record and how it is compared.
     pub problem: Problem<'a>,
     /// Effects that may be named.
     pub suspects: Vec<Effect>,
+    /// Discrepancy of the axis with its parameters alone: the gap.
+    pub gap: Discrepancy,
     /// Told what is being done.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
@@ -101,7 +139,8 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     (search.progress)("the model as given");
     let nominal = search.problem.nominal;
     let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
-    let parameters = search.problem.fit(&nominal, &[], given.discrepancy, 2 * STEPS).unwrap_or_else(|| given.clone());
+    let parameters = search.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
+    search.gap = parameters.discrepancy;
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = vec![given.clone(), parameters.clone()];
     let mut chosen = search.climb(parameters.clone(), &mut pool);
@@ -163,7 +202,8 @@ impl Search<'_> {
             sets.extend(more);
         }
         sets.retain(|s| s.len() > 1);
-        sets.par_iter()
+        let probed = sets
+            .par_iter()
             .filter_map(|terms| {
                 let mut fit = parameters.clone();
                 for i in 0..terms.len() {
@@ -172,12 +212,13 @@ impl Search<'_> {
                         &start.model,
                         &terms[..=i],
                         fit.discrepancy,
-                        if i + 1 == terms.len() { STEPS } else { 3 },
+                        if i + 1 == terms.len() { PROBE } else { 2 },
                     )?;
                 }
                 Some(fit)
             })
-            .collect()
+            .collect();
+        self.deepened(probed)
     }
 
     fn starts_of(&self, fit: &Fit, term: Term) -> Vec<StartPoint> {
@@ -213,10 +254,11 @@ impl Search<'_> {
         best
     }
 
-    /// Whether the richer explains a material part of what the plainer leaves.
+    /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
     fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
-        let (before, after) = (self.band().excess(&plain.rows), self.band().excess(&rich.rows));
-        (0..self.band().equations()).any(|i| after[i] <= (1.0 - MATERIAL) * before[i])
+        let (before, after) = (plain.discrepancy, rich.discrepancy);
+        (0..self.band().equations())
+            .any(|i| after[i] <= (1.0 - MATERIAL) * before[i] && before[i] - after[i] >= MINOR * self.gap[i])
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
@@ -244,14 +286,29 @@ impl Search<'_> {
         points.extend(richer);
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         points.truncate(FITTED);
-        points
+        let probed = points
             .par_iter()
             .filter_map(|s| {
                 let mut terms = fit.terms.clone();
                 terms.insert(keep, s.term);
-                self.problem.fit(&s.model, &terms, fit.discrepancy, STEPS)
+                self.problem.fit(&s.model, &terms, fit.discrepancy, PROBE)
             })
-            .collect()
+            .collect();
+        self.deepened(probed)
+    }
+
+    /// Fits of a few steps, the best of them fitted to their end.
+    fn deepened(&self, mut probed: Vec<Fit>) -> Vec<Fit> {
+        let share = self.independent(&probed);
+        probed.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
+        probed.par_iter_mut().take(DEEPENED).for_each(|f| {
+            if f.iterations >= PROBE
+                && let Some(more) = self.problem.fit(&f.model, &f.terms, f.discrepancy, STEPS)
+            {
+                *f = more;
+            }
+        });
+        probed
     }
 
     /// The fit without one of its effects.
@@ -319,7 +376,7 @@ impl Search<'_> {
         let explained = self.explained(&parameters, &chosen);
         let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let settled = self.at_floor(&chosen) || white;
-        let left = self.band().torque_share(&chosen.rows, self.problem.record);
+        let left = self.band().torque_share(chosen.discrepancy, self.problem.record);
         let verdict = match chosen.terms.is_empty() {
             false if left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,

@@ -2,7 +2,7 @@
 
 use super::super::model::Model;
 use super::fit::{Fit, Problem, Term};
-use super::likelihood::C;
+use super::likelihood::{C, Weight};
 use super::scales::Scales;
 use super::tracking::track;
 use crate::effects::{Place, Role, Scale, Settings, Start};
@@ -23,6 +23,7 @@ pub struct Regression {
     q: Vec<Vec<f64>>,
     z: Vec<f64>,
     s: [f64; 2],
+    weights: Vec<Weight>,
 }
 
 impl Regression {
@@ -30,15 +31,15 @@ impl Regression {
         let s = fit.discrepancy;
         let mut q: Vec<Vec<f64>> = Vec::new();
         for c in &fit.columns {
-            let mut v = p.band.whiten(c, s);
+            let mut v = p.band.whiten(c, &fit.rows.weights, s);
             orthogonalise(&q, &mut v);
             if normalise(&mut v) {
                 q.push(v);
             }
         }
-        let mut z = p.band.whiten(&fit.rows, s);
+        let mut z = p.band.whiten(&fit.rows.rows, &fit.rows.weights, s);
         orthogonalise(&q, &mut z);
-        Self { q, z, s }
+        Self { q, z, s, weights: fit.rows.weights.clone() }
     }
 
     /// Coefficients of columns for the lacking torque to vanish, and the gain in log likelihood; negative coefficients where not allowed are dropped.
@@ -46,7 +47,7 @@ impl Regression {
         let j: Vec<Vec<f64>> = columns
             .iter()
             .map(|c| {
-                let mut v = p.band.whiten(c, self.s);
+                let mut v = p.band.whiten(c, &self.weights, self.s);
                 orthogonalise(&self.q, &mut v);
                 v
             })
@@ -56,7 +57,7 @@ impl Regression {
         let full: Vec<f64> = columns
             .iter()
             .map(|c| {
-                let v = p.band.whiten(c, self.s);
+                let v = p.band.whiten(c, &self.weights, self.s);
                 dot(&v, &v)
             })
             .collect();
@@ -231,7 +232,7 @@ fn one(
     {
         return None;
     }
-    let rows_of = |s: &Settings| p.rows(&Model { effects: *s, ..fit.model }, fit.bandwidth);
+    let rows_of = |s: &Settings| p.rows(&Model { effects: *s, ..fit.model }, fit.bandwidth).map(|l| l.rows);
     let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
         [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
     };
@@ -255,7 +256,7 @@ fn one(
             let mut s = *shapes;
             s.of_mut(effect)[i] = v1;
             let r = rows_of(&s)?;
-            let c = difference(&r, &fit.rows, 1.0);
+            let c = difference(&r, &fit.rows.rows, 1.0);
             let got = size(&c);
             if got.is_nan() || got <= 0.0 {
                 return None;
@@ -276,7 +277,7 @@ fn one(
     if sizes.is_empty() {
         // The size is among the shapes tried.
         let r = rows_of(shapes)?;
-        columns.push(difference(&r, &fit.rows, 1.0));
+        columns.push(difference(&r, &fit.rows.rows, 1.0));
         signed.push(false);
     }
     // Shapes that enter linearly beside the first size.
@@ -297,7 +298,7 @@ fn one(
         let mut s = at;
         s.of_mut(effect)[i] = q.off + step;
         let r = rows_of(&s)?;
-        let total = difference(&r, &fit.rows, 1.0);
+        let total = difference(&r, &fit.rows.rows, 1.0);
         let c = if matches!(q.start, Start::Phase) { total } else { difference(&total, base.as_ref()?, 1.0) };
         columns.push(c);
         signed.push(true);

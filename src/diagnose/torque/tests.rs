@@ -1,10 +1,10 @@
 //! Rigid axes under control, made by the axis' own step: what a drive's log looks like.
 
 use super::super::assess::{Case, Outcome};
-use super::super::decide::Verdict;
 use super::super::model::Model;
 use super::super::noise::estimate_noise;
 use super::super::record::Record;
+use super::super::verdict::Verdict;
 use super::diagnose;
 use crate::axis::{Axis, Hold, Motion, Parameters, Scheme, Structure};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
@@ -54,17 +54,16 @@ fn diagnosed(record: &Record, nominal: f64) -> Outcome {
 }
 
 fn named(o: &Outcome) -> Vec<&'static str> {
-    let mut ids: Vec<&str> = o.decision.chosen.effects.iter().map(|(e, _)| e.info().family.as_str()).collect();
+    let mut ids: Vec<&str> = o.decision.chosen.terms.iter().map(|(e, _)| e.info().family.as_str()).collect();
     ids.sort_unstable();
     ids
 }
 
 /// What was tried, for a test that fails.
 fn told(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
-    let line = |w: &super::super::decide::Weighed| {
-        let f = &w.tested;
-        let values = f.effects.iter().map(|(e, _)| f.fitted.model.effects.of(*e).to_vec()).collect();
-        (f.ids().join("+"), w.bic, values)
+    let line = |w: &super::Weighed| {
+        let values = w.fit.terms.iter().map(|(e, _)| w.fit.model.effects.of(*e).to_vec()).collect();
+        (w.fit.id(), w.evidence, values)
     };
     o.decision.ranking.iter().take(12).map(line).collect()
 }

@@ -1,0 +1,17 @@
+//! The verdict.
+
+use serde::Serialize;
+
+/// What the diagnosis comes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// One or more effects of the library.
+    Effect,
+    /// The nominal parameters are off.
+    Parameters,
+    /// The model as given explains the record.
+    NoGap,
+    /// Nothing in the library brings the residual to the floor.
+    Unexplained,
+}
