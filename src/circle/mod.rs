@@ -6,7 +6,9 @@
 //!
 //! Y is stacked on X. An axis is taken as identified in place: X carries Y, so X's I2 already contains Y's mass.
 
+pub mod measured;
 pub mod roundness;
+pub mod trace;
 
 use std::f64::consts::TAU;
 

@@ -90,7 +90,7 @@ fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// Centre of the circle `x^2 + y^2 = 2*a*x + 2*b*y + c` that fits best (Kasa, IEEE Trans. Instrum. Meas. 25, 1976).
-fn least_squares_centre(path: &Path) -> Option<(f64, f64)> {
+pub(crate) fn least_squares_centre(path: &Path) -> Option<(f64, f64)> {
     let scale = path.x.iter().chain(&path.y).fold(0.0_f64, |m, v| m.max(v.abs()));
     if path.x.len() < 3 || scale <= 0.0 || !scale.is_finite() {
         return None;

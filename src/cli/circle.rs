@@ -1,5 +1,6 @@
-//! `eixo circle`: the circular test of machine tools (ISO 230-4), in simulation.
+//! `eixo circle`: the circular test of machine tools (ISO 230-4), in simulation and as measured.
 
+use std::f64::consts::TAU;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,15 +10,17 @@ use super::diagnosed;
 use super::outputs;
 use super::drives::{Drives, ideal, machine};
 use crate::circle::roundness::{Roundness, bidirectional};
+use crate::circle::trace::{analyse, turns};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
 use crate::effects::{EFFECTS, Effect};
-use crate::report::circle::{Findings, Run, report, short};
-use crate::report::{html, terminal};
+pub(super) use crate::report::circle::Findings;
+use crate::report::circle::{Run, report, short};
+use crate::report::{Block, Report, ballbar, html, terminal};
 use crate::trace::{Machine, write_columns, write_text};
 
 /// Arguments of `eixo circle`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  eixo circle axis.toml --radius 0.1 --feed 2 --report circle.html\n  eixo circle axis.toml --diagnosed diagnosis.json --report circle.html")]
+#[command(after_help = "Examples:\n  eixo circle axis.toml --radius 0.1 --feed 2 --report circle.html\n  eixo circle axis.toml --diagnosed diagnosis.json --report circle.html\n  eixo circle --measured ccw.csv cw.csv --report ballbar.html")]
 pub struct Args {
     /// The X axis (axis.toml), with Y's mass in its I2, as identified in place; the paper's axis without
     axis: Option<PathBuf>,
@@ -30,6 +33,13 @@ pub struct Args {
     /// What was found on Y; as on X without
     #[arg(long, value_name = "FILE", requires = "diagnosed")]
     diagnosed_y: Option<PathBuf>,
+    /// A measured test in place of a simulated one: one or two files (a ballbar's or a control's export, CSV) of angle and radius or
+    /// deviation, or of X and Y. With an axis file its model stands beside it
+    #[arg(long, value_name = "FILE", num_args = 1..=2, conflicts_with_all = ["diagnosed", "output"])]
+    measured: Vec<PathBuf>,
+    /// Which way the measured turns go, in the order of the files, where they do not say it
+    #[arg(long, value_name = "ccw|cw", value_delimiter = ',', value_parser = direction, requires = "measured")]
+    directions: Vec<bool>,
     /// The circle and the drives.
     #[command(flatten)]
     test: Test,
@@ -39,35 +49,40 @@ pub struct Args {
     /// Write the report as HTML
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Write the figures as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Clockwise or not.
+fn direction(text: &str) -> Result<bool, String> {
+    match text.to_ascii_lowercase().as_str() {
+        "cw" => Ok(true),
+        "ccw" => Ok(false),
+        _ => Err("ccw (counter-clockwise) or cw (clockwise)".to_owned()),
+    }
 }
 
 /// The circle and the drives.
-#[derive(Debug, Clone, Copy, clap::Args)]
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
 pub struct Test {
-    /// Radius of the circle, m
-    #[arg(long, default_value_t = Test::default().radius)]
-    radius: f64,
-    /// Feed along the circle, m/min
-    #[arg(long, default_value_t = Test::default().feed)]
-    feed: f64,
+    /// Radius of the circle, m; 0.05 without, of a measured one what it says itself
+    #[arg(long)]
+    pub(super) radius: Option<f64>,
+    /// Feed along the circle, m/min; 1 without, of a measured one what it says itself
+    #[arg(long)]
+    pub(super) feed: Option<f64>,
     /// Turn clockwise (the figures and the path; both directions are run)
     #[arg(long)]
-    clockwise: bool,
+    pub(super) clockwise: bool,
     /// The drives.
     #[command(flatten)]
-    drives: Drives,
+    pub(super) drives: Drives,
 }
 
-impl Default for Test {
-    fn default() -> Self {
-        Self {
-            radius: 0.05,
-            feed: 1.0,
-            clockwise: false,
-            drives: Drives::default(),
-        }
-    }
-}
+/// Radius of a simulated circle, m, and feed along it, m/min, where none is given.
+const RADIUS: f64 = 0.05;
+const FEED: f64 = 1.0;
 
 /// Runs the command.
 ///
@@ -75,9 +90,16 @@ impl Default for Test {
 /// When an axis file cannot be read, the test cannot be run or a file cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let inputs = [&args.axis, &args.y, &args.diagnosed, &args.diagnosed_y].into_iter().filter_map(Option::as_deref);
-    outputs::check(inputs, [args.output.as_ref(), args.report.as_ref()])?;
+    let inputs = inputs.chain(args.measured.iter().map(PathBuf::as_path));
+    outputs::check(inputs, [args.output.as_ref(), args.report.as_ref(), args.json.as_ref()])?;
     let x = machine(args.axis.as_deref())?;
     let y = machine(args.y.as_deref().or(args.axis.as_deref()))?;
+    if !args.measured.is_empty() {
+        let axes = [x, y];
+        let known = (args.axis.is_some() || args.y.is_some()).then_some(&axes);
+        let found = super::circle_measured::findings(&args.measured, &args.directions, &args.test, known)?;
+        return tell(&args, || ballbar::report(&found), || super::circle_json::measured(&found), &ballbar::short(&found));
+    }
     let found = match &args.diagnosed {
         None => None,
         Some(file) => {
@@ -89,11 +111,24 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let (Some(file), Some(Run { paths: [path, _], .. })) = (&args.output, findings.runs.last()) {
         write_columns(file, &[("x [m]", &path.x), ("y [m]", &path.y)])?;
     }
+    tell(&args, || report(&findings), || super::circle_json::simulated(&findings), &short(&findings))
+}
+
+/// Writes what was asked for and prints the short form.
+fn tell(
+    args: &Args,
+    page: impl Fn() -> Report,
+    json: impl Fn() -> serde_json::Value,
+    short: &[Block],
+) -> anyhow::Result<ExitCode> {
+    if let Some(file) = &args.json {
+        write_text(file, &serde_json::to_vec_pretty(&json())?)?;
+    }
     if let Some(file) = &args.report {
-        write_text(file, html::page(&report(&findings)).as_bytes())?;
+        write_text(file, html::page(&page()).as_bytes())?;
     }
     let colour = std::io::stdout().is_terminal();
-    say!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    say!("{}", terminal::blocks(short, terminal::Layout { colour, ..terminal::Layout::default() }))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -110,8 +145,8 @@ pub(super) fn findings(
     let [x, y] = axes;
     let given = wanted.drives.axes(x, y)?;
     let circle = CircleTest {
-        radius: wanted.radius,
-        feed: wanted.feed / 60.0,
+        radius: wanted.radius.unwrap_or(RADIUS),
+        feed: wanted.feed.unwrap_or(FEED) / 60.0,
         clockwise: wanted.clockwise,
         dt: wanted.drives.dt,
     };
@@ -132,12 +167,17 @@ pub(super) fn findings(
         }
     };
     let mut runs = vec![turn(names[0].to_owned(), first)?];
-    let more = differences(&first, &last);
-    if found.is_some() || !more.is_empty() {
+    let less = differences(&first, &last);
+    if found.is_some() || !less.is_empty() {
         runs.push(turn(names[1].to_owned(), last)?);
     }
-    let alone = if more.len() < 2 { Vec::new() } else { more };
-    let alone = alone.into_iter().map(|(name, axes)| turn(name, axes)).collect::<Result<_, _>>()?;
+    let less = if less.len() < 2 { Vec::new() } else { less };
+    let without = less.into_iter().map(|(name, axes)| turn(format!("without {name}"), axes)).collect::<Result<_, _>>()?;
+    let analysis = runs.last().and_then(|run| {
+        let [one, other] = run.paths.clone();
+        let (turns, _) = turns(&[(circle.clockwise, one), (!circle.clockwise, other)], circle.radius)?;
+        analyse(&turns, circle.radius, Some(circle.feed))
+    });
     let on = |[x, y]: &[ServoAxis; 2], e: Effect| [x.effects.is_on(e), y.effects.is_on(e)];
     let effects = EFFECTS.iter().filter_map(|&e| {
         let place = match on(&last, e) {
@@ -146,7 +186,9 @@ pub(super) fn findings(
             [false, true] => "Y",
             [false, false] => return None,
         };
-        Some(format!("{} on {place}", e.info().id))
+        let at = usize::from(!last[0].effects.is_on(e));
+        let length = in_millimetres(e, last[at].effects.of(e), last[at].parameters.rho);
+        Some(format!("{} on {place}{}", e.info().id, length.map_or_else(String::new, |l| format!(" ({l})"))))
     });
     let machine = if x.name == y.name { x.name.clone() } else { format!("{} and {}", x.name, y.name) };
     Ok(Findings {
@@ -154,7 +196,8 @@ pub(super) fn findings(
         test: circle,
         servos: given.map(|a| a.servo),
         runs,
-        alone,
+        without,
+        analysis,
         effects: effects.collect(),
     })
 }
@@ -162,7 +205,19 @@ pub(super) fn findings(
 /// A parameter that differs by less than this share is not told as a difference of its own.
 const MATERIAL: f64 = 1e-3;
 
-/// What the last pair of axes has and the first has not: each by itself, put on the first.
+/// What an effect's angle is on the table.
+fn in_millimetres(effect: Effect, values: &[f64], rho: f64) -> Option<String> {
+    let of = |name: &str| effect.parameter(name).ok().and_then(|k| values.get(k).copied());
+    let every = |order: f64| (order > 0.0).then(|| format!("every {:.4} mm", 1e3 * TAU * rho / order));
+    match effect {
+        Effect::Backlash => Some(format!("{:.3} um", 2e6 * rho * of("half_gap")?)),
+        Effect::TorqueRipple => every(of("order")?),
+        Effect::Unbalance => every(1.0),
+        _ => None,
+    }
+}
+
+/// What the last pair of axes has and the first has not: the last without each of it.
 fn differences(first: &[ServoAxis; 2], last: &[ServoAxis; 2]) -> Vec<(String, [ServoAxis; 2])> {
     let pair = |change: &dyn Fn(usize) -> ServoAxis| [change(0), change(1)];
     let mut all = Vec::new();
@@ -170,17 +225,17 @@ fn differences(first: &[ServoAxis; 2], last: &[ServoAxis; 2]) -> Vec<(String, [S
     let of = |axis: &ServoAxis| [axis.parameters.i1, axis.parameters.i2, axis.parameters.b, axis.parameters.k];
     let apart = |a: f64, b: f64| (a - b).abs() > MATERIAL * a.abs().max(b.abs());
     if differ(&|i| of(&first[i]).into_iter().zip(of(&last[i])).any(|(a, b)| apart(a, b))) {
-        let moved = |i: usize| ServoAxis { parameters: last[i].parameters, structure: last[i].structure, ..first[i] };
-        all.push(("fitted parameters".to_owned(), pair(&moved)));
+        let back = |i: usize| ServoAxis { parameters: first[i].parameters, structure: first[i].structure, ..last[i] };
+        all.push(("the fitted parameters".to_owned(), pair(&back)));
     }
     for &effect in EFFECTS {
         if differ(&|i| first[i].effects.of(effect) != last[i].effects.of(effect)) {
-            let added = |i: usize| {
-                let mut axis = first[i];
-                axis.effects.of_mut(effect).copy_from_slice(last[i].effects.of(effect));
+            let taken = |i: usize| {
+                let mut axis = last[i];
+                axis.effects.of_mut(effect).copy_from_slice(first[i].effects.of(effect));
                 axis
             };
-            all.push((effect.info().id.to_owned(), pair(&added)));
+            all.push((effect.info().id.to_owned(), pair(&taken)));
         }
     }
     all

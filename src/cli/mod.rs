@@ -28,6 +28,8 @@ pub struct Cli {
 
 mod say;
 
+mod circle_json;
+mod circle_measured;
 mod controlled;
 mod diagnosed;
 mod drives;
@@ -79,7 +81,7 @@ commands! {
     Identify => identify,
     /// Diagnose the gap between the model and a measured trace: where, which effect, how far it shrinks
     Diagnose => diagnose,
-    /// Circular test (ISO 230-4) in simulation: what the axes' effects do to a circle
+    /// Circular test (ISO 230-4), measured or in simulation: what deviates, and what each takes of the circularity
     Circle => circle,
     /// List the effects that a nominal axis leaves out: place, equation, parameters, signature
     Effects => effects,

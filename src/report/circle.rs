@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use super::ballbar;
 use super::chart::{Axis, Chart, Colour, Dash, Series};
 use super::format::{self, Medium};
 use super::polar::{PolarPlot, PolarTrace, Ring};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::circle::roundness::{Roundness, deviations};
+use crate::circle::trace::Analysis;
 use crate::circle::{CircleTest, Feedback, Path, Servo};
 
 /// A pair of axes turned through the circle in both directions.
@@ -33,8 +35,10 @@ pub struct Findings {
     pub servos: [Servo; 2],
     /// Runs to be compared; the last is what the verdict speaks of.
     pub runs: Vec<Run>,
-    /// The first run with one thing more of what the last has, for each such thing.
-    pub alone: Vec<Run>,
+    /// The last run without one of what it has beyond the first, for each such thing.
+    pub without: Vec<Run>,
+    /// What the last run's trace shows.
+    pub analysis: Option<Analysis>,
     /// What acts on the axes in the last run.
     pub effects: Vec<String>,
 }
@@ -50,7 +54,7 @@ impl Findings {
 
     /// Largest deviation of any run, m: all plots have one scale.
     fn reach(&self) -> f64 {
-        let all = self.runs.iter().chain(&self.alone).flat_map(|r| &r.roundness);
+        let all = self.runs.iter().chain(&self.without).flat_map(|r| &r.roundness);
         all.fold(0.0, |m: f64, r| m.max(r.largest.abs()).max(r.smallest.abs()))
     }
 
@@ -103,17 +107,20 @@ pub fn report(f: &Findings) -> Report {
             Block::Figure(Figure::new(unrolled, format!("Turning {}.", f.directions()[0]))),
         ],
     )];
-    if !f.alone.is_empty() {
-        let each = f.alone.iter().map(|run| {
-            Figure::new(f.polar(run, LAST, &format!("{} with {}", capital(&f.runs[0].name), run.name)), caption(run))
+    if !f.without.is_empty() {
+        let each = f.without.iter().map(|run| {
+            Figure::new(
+                f.polar(run, LAST, &format!("{} {}", capital(f.runs.last().map_or("", |r| &r.name)), run.name)),
+                caption(run),
+            )
         });
         sections.push(Section::new(
-            "What each does by itself",
-            vec![
-                Block::Paragraph("One cause at a time, on the same scale as above.".to_owned()),
-                Block::Figures(each.collect()),
-            ],
+            "What each takes",
+            vec![Block::Table(takes(f)), Block::Paragraph(LEFT_OUT.to_owned()), Block::Figures(each.collect())],
         ));
+    }
+    if let Some(a) = &f.analysis {
+        sections.extend(ballbar::shown(a, None));
     }
     sections.push(Section::new("Figures", vec![Block::Table(table(f)), Block::Paragraph(READING.to_owned())]));
     sections.push(Section::new("The drives", vec![Block::Table(drives(f)), Block::Paragraph(STACKED.to_owned())]));
@@ -145,12 +152,38 @@ const READING: &str = "A peak at a reversal is friction that the drive has not y
      along the axes is a scale, an ellipse at 45 degrees a difference of the loops (it turns with the direction) or axes that are not \
      square (it does not).";
 
+const LEFT_OUT: &str = "One cause is left out at a time, and all others stay: what acts only beside another (play needs the friction that holds the \
+     table at one side of it) is told by what goes with it. The shares do not add up to one. The plots have one scale.";
+
 const STACKED: &str = "Y is stacked on X: X carries the mass of Y, which X's I2 contains as it was identified in place, or with --carried.";
 
 /// The short form for the terminal.
 #[must_use]
 pub fn short(f: &Findings) -> Vec<Block> {
-    vec![Block::Verdict(verdict(f)), Block::Table(table(f))]
+    let mut blocks = vec![Block::Verdict(verdict(f)), Block::Table(table(f))];
+    if !f.without.is_empty() {
+        blocks.push(Block::Table(takes(f)));
+    }
+    blocks.extend(f.analysis.as_ref().map(|a| Block::Table(ballbar::ranking(a, None))));
+    blocks
+}
+
+/// What the circularity loses without each of what the last run has beyond the first.
+fn takes(f: &Findings) -> Table {
+    let mut table = Table::new(
+        "What each takes, left out of all",
+        ["left out", "G(b) without it", "takes", "share of the circularity"],
+    );
+    let whole = f.runs.last().map_or(0.0, |r| r.both);
+    let mut each: Vec<&Run> = f.without.iter().collect();
+    each.sort_by(|a, b| a.both.total_cmp(&b.both));
+    for run in each {
+        let taken = whole - run.both;
+        let share = if whole > 0.0 { Cell::Bar((taken / whole).max(0.0)) } else { Cell::Empty };
+        let name = run.name.strip_prefix("without ").unwrap_or(&run.name);
+        table.row(vec![Cell::text(name), micro(run.both), micro(taken), share]);
+    }
+    table
 }
 
 /// Micrometres; a nanometre is below what such a test shows.
@@ -185,7 +218,7 @@ type Figures = fn(&Run) -> f64;
 type Gain = fn(&Servo) -> f64;
 
 fn table(f: &Findings) -> Table {
-    let names = f.runs.iter().chain(&f.alone).map(|run| run.name.as_str());
+    let names = f.runs.iter().chain(&f.without).map(|run| run.name.as_str());
     let mut table = Table::new("Circular test", std::iter::once("figure").chain(names));
     let rows: [(&str, Figures); 16] = [
         ("circular deviation G", |r| r.roundness[0].deviation),
@@ -206,7 +239,7 @@ fn table(f: &Findings) -> Table {
         ("  the other way round", |r| r.roundness[1].ellipse_diagonal),
     ];
     for (name, value) in rows {
-        let cells = f.runs.iter().chain(&f.alone).map(|run| micro(value(run)));
+        let cells = f.runs.iter().chain(&f.without).map(|run| micro(value(run)));
         table.row(std::iter::once(Cell::text(name)).chain(cells).collect());
     }
     table

@@ -4,6 +4,7 @@
 //! Nothing here reads a file, a clock or the terminal, so the same report gives the same bytes. Every text may come
 //! from outside (column names, file names, model names): it is escaped where HTML is made and nowhere else.
 
+pub mod ballbar;
 pub mod chain;
 pub mod chart;
 pub mod circle;

@@ -1,0 +1,450 @@
+//! The deviations of a trace, each in its size and by what the circularity loses without it.
+
+use std::f64::consts::TAU;
+
+use super::fit::Fit;
+use super::reversals::{self, Reversal};
+use super::shapes::{Axis, Shape, known};
+use super::tones::{Scan, Tone};
+use super::{Point, Turn, points, remainder, wrapped};
+use crate::circle::Path;
+use crate::circle::roundness::{Roundness, bidirectional};
+
+/// Most points of a turn that are worked on; a longer trace is averaged over groups of neighbours.
+const MOST: usize = 7200;
+/// Most cyclic errors along one axis, and most vibrations.
+const TONES: usize = 2;
+/// A tone below this share of the circularity is not told.
+const MATERIAL: f64 = 0.01;
+/// A nanometre: below it is nothing to be seen by such a test, m.
+const FLOOR: f64 = 1e-9;
+
+/// What deviates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Lost motion of an axis.
+    Backlash(Axis),
+    /// Short peaks behind the reversals of an axis.
+    Spikes(Axis),
+    /// X and Y are not at right angles.
+    Squareness,
+    /// An ellipse at 45 degrees of which one direction alone is known.
+    Diagonal,
+    /// X and Y have unlike scales.
+    Scaling,
+    /// X and Y are unlike in time.
+    Servo,
+    /// A sine of the position.
+    Cyclic(Axis),
+    /// Play across a guide.
+    Lateral(Axis),
+    /// A bent guide.
+    Straightness(Axis),
+    /// Jerks while an axis creeps.
+    StickSlip(Axis),
+    /// A sine of the time.
+    Vibration,
+    /// What none of these explains.
+    Remainder,
+}
+
+impl Kind {
+    /// Its name in files.
+    #[must_use]
+    pub const fn id(self) -> &'static str {
+        match self {
+            Self::Backlash(Axis::X) => "backlash_x",
+            Self::Backlash(Axis::Y) => "backlash_y",
+            Self::Spikes(Axis::X) => "reversal_spikes_x",
+            Self::Spikes(Axis::Y) => "reversal_spikes_y",
+            Self::Squareness => "squareness",
+            Self::Diagonal => "diagonal_ellipse",
+            Self::Scaling => "scaling_mismatch",
+            Self::Servo => "servo_mismatch",
+            Self::Cyclic(Axis::X) => "cyclic_error_x",
+            Self::Cyclic(Axis::Y) => "cyclic_error_y",
+            Self::Lateral(Axis::X) => "lateral_play_x",
+            Self::Lateral(Axis::Y) => "lateral_play_y",
+            Self::Straightness(Axis::X) => "straightness_x",
+            Self::Straightness(Axis::Y) => "straightness_y",
+            Self::StickSlip(Axis::X) => "stick_slip_x",
+            Self::StickSlip(Axis::Y) => "stick_slip_y",
+            Self::Vibration => "vibration",
+            Self::Remainder => "remainder",
+        }
+    }
+
+    /// Its name in words.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Backlash(Axis::X) => "backlash X",
+            Self::Backlash(Axis::Y) => "backlash Y",
+            Self::Spikes(Axis::X) => "reversal spikes X",
+            Self::Spikes(Axis::Y) => "reversal spikes Y",
+            Self::Squareness => "squareness",
+            Self::Diagonal => "squareness or servo mismatch",
+            Self::Scaling => "scaling mismatch",
+            Self::Servo => "servo mismatch",
+            Self::Cyclic(Axis::X) => "cyclic error X",
+            Self::Cyclic(Axis::Y) => "cyclic error Y",
+            Self::Lateral(Axis::X) => "lateral play X",
+            Self::Lateral(Axis::Y) => "lateral play Y",
+            Self::Straightness(Axis::X) => "straightness X",
+            Self::Straightness(Axis::Y) => "straightness Y",
+            Self::StickSlip(Axis::X) => "stick-slip X",
+            Self::StickSlip(Axis::Y) => "stick-slip Y",
+            Self::Vibration => "vibration",
+            Self::Remainder => "not explained",
+        }
+    }
+
+    /// What its size is.
+    #[must_use]
+    pub const fn measure(self) -> Measure {
+        match self {
+            Self::Backlash(_) | Self::Lateral(_) => Measure::Play,
+            Self::Spikes(_) => Measure::Height,
+            Self::Squareness | Self::Scaling => Measure::Ratio,
+            Self::Diagonal | Self::Servo | Self::Cyclic(_) | Self::Vibration => Measure::Amplitude,
+            Self::Straightness(_) => Measure::Bow,
+            Self::StickSlip(_) | Self::Remainder => Measure::Rms,
+        }
+    }
+}
+
+/// What a size is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// A whole play, m.
+    Play,
+    /// A height above the levels before and behind, m, outward positive.
+    Height,
+    /// An angle or a difference of lengths, m/m.
+    Ratio,
+    /// An amplitude, m.
+    Amplitude,
+    /// The height of a bow over the diameter, m.
+    Bow,
+    /// A root of the mean square, m.
+    Rms,
+}
+
+impl Measure {
+    /// In words.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Play => "play",
+            Self::Height => "largest height",
+            Self::Ratio => "per metre",
+            Self::Amplitude => "amplitude",
+            Self::Bow => "bow",
+            Self::Rms => "rms",
+        }
+    }
+
+    /// The unit that it is told in, of which a metre (or metre per metre) has a million.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Ratio => "um/m",
+            _ => "um",
+        }
+    }
+}
+
+/// One deviation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// What it is.
+    pub kind: Kind,
+    /// Its size in the SI unit of its measure. A play is positive where the table stays behind; an angle is positive where
+    /// +X and +Y enclose more than 90 degrees; a scaling or servo mismatch where X is longer or later.
+    pub size: f64,
+    /// Standard error of the size, where it comes from the fit.
+    pub error: Option<f64>,
+    /// The circularity without it, m.
+    pub without: f64,
+    /// What it takes of the circularity, m: negative where it hides another.
+    pub contribution: f64,
+    /// The play at the positive and at the negative end, m.
+    pub ends: Option<[f64; 2]>,
+    /// Heights at +X, +Y, -X, -Y of each turn, m.
+    pub heights: Vec<[f64; 4]>,
+    /// Length of a cycle along the axis, m.
+    pub pitch: Option<f64>,
+    /// Cycles to the turn.
+    pub per_turn: Option<f64>,
+    /// Frequency, Hz, where the feed is known.
+    pub frequency: Option<f64>,
+    /// How much later X is than Y, s, where the feed is known.
+    pub late: Option<f64>,
+}
+
+/// What a trace shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// The deviations, that which takes most of the circularity first; the remainder among them.
+    pub effects: Vec<Effect>,
+    /// The circularity they are shares of, m: bi-directional with two directions.
+    pub circularity: f64,
+    /// Standard deviation of what is left, m.
+    pub left: f64,
+    /// Mean radial deviation, m.
+    pub mean: f64,
+    /// The turns as they were worked on.
+    pub turns: Vec<Turn>,
+    /// The sum of all deviations but the remainder, at the points of the turns, m.
+    pub model: Vec<Vec<f64>>,
+}
+
+/// Takes a trace apart. `feed` in m/s gives times and frequencies. None where there are too few points to determine the
+/// shapes.
+#[must_use]
+pub fn analyse(turns: &[Turn], radius: f64, feed: Option<f64>) -> Option<Analysis> {
+    let turns: Vec<Turn> = turns.iter().map(thinned).collect();
+    let both = turns.iter().any(|t| t.clockwise) && turns.iter().any(|t| !t.clockwise);
+    let all = points(&turns);
+    let start = known(both);
+    if all.len() < 8 * start.len() {
+        return None;
+    }
+    let whole = circularity(&turns, radius, &vec![0.0; all.len()])?;
+    let mut stretches = reversals::find(&all, turns.len());
+    let mut fit = Fit::of(&all, &reversals::outside(&all, &stretches), start.clone())?;
+    // A stretch that has grown changes the fit, which may make another grow.
+    for _ in 0..4 {
+        if !reversals::extend(&all, &fit.residual(&all), &mut stretches) {
+            break;
+        }
+        fit = Fit::of(&all, &reversals::outside(&all, &stretches), start.clone())?;
+    }
+    let keep = reversals::outside(&all, &stretches);
+    let mut tones: Vec<Tone> = Vec::new();
+    while tones.len() < 3 * TONES {
+        let residual = fit.residual(&all);
+        let Some(tone) = Scan::new(&all, &keep, &residual).strongest(&tones) else { break };
+        let alike = |t: &Tone| match (*t, tone) {
+            (Tone::Cyclic(a, _), Tone::Cyclic(b, _)) => a == b,
+            (Tone::Line(_), Tone::Line(_)) => true,
+            _ => false,
+        };
+        if tones.iter().filter(|t| alike(t)).count() >= TONES {
+            break;
+        }
+        let shapes = fit.shapes.iter().copied().chain(tone.shapes(turns.len())).collect();
+        let Some(with) = Fit::of(&all, &keep, shapes) else { break };
+        if amplitude(&with, tone, turns.len()).0 < FLOOR.max(MATERIAL * whole) {
+            break;
+        }
+        fit = with;
+        tones.push(tone);
+        settle(&all, &keep, &mut fit, &mut tones, &start, turns.len());
+    }
+    let trace = Trace { all, turns, radius, feed, fit, stretches, keep, whole };
+    Some(trace.apart(&tones))
+}
+
+/// Rounds in which the frequencies settle beside the known shapes, which had taken a part of each tone.
+const ROUNDS: usize = 3;
+
+/// Moves each tone to where it fits best beside all else.
+fn settle(all: &[Point], keep: &[bool], fit: &mut Fit, tones: &mut [Tone], start: &[Shape], turns: usize) {
+    for _ in 0..ROUNDS {
+        for k in 0..tones.len() {
+            let own = tones[k].shapes(turns);
+            let rest: Vec<f64> = all.iter().map(|p| p.deviation - fit.at(p, |s| !own.contains(&s))).collect();
+            tones[k] = Scan::new(all, keep, &rest).settled(tones[k]);
+            let shapes = start.iter().copied().chain(tones.iter().flat_map(|t| t.shapes(turns))).collect();
+            if let Some(moved) = Fit::of(all, keep, shapes) {
+                *fit = moved;
+            }
+        }
+    }
+}
+
+/// Averages groups of neighbours where a turn has more points than are needed.
+fn thinned(turn: &Turn) -> Turn {
+    let group = turn.angle.len().div_ceil(MOST).max(1);
+    if group == 1 {
+        return turn.clone();
+    }
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let angle = turn
+        .angle
+        .chunks(group)
+        .map(|c| wrapped(c[0] + mean(&c.iter().map(|a| wrapped(a - c[0])).collect::<Vec<_>>())));
+    Turn {
+        clockwise: turn.clockwise,
+        angle: angle.collect(),
+        deviation: turn.deviation.chunks(group).map(mean).collect(),
+    }
+}
+
+/// The circularity of the turns less what is taken out of each point.
+fn circularity(turns: &[Turn], radius: f64, out: &[f64]) -> Option<f64> {
+    let mut rest = out;
+    let mut paths: Vec<Path> = Vec::with_capacity(turns.len());
+    for turn in turns {
+        let (mine, others) = rest.split_at(turn.angle.len());
+        rest = others;
+        let deviation = turn.deviation.iter().zip(mine).map(|(d, o)| d - o).collect();
+        paths.push(Turn { deviation, ..turn.clone() }.path(radius));
+    }
+    match <[Path; 2]>::try_from(paths) {
+        Ok(two) => bidirectional(&two),
+        Err(one) => Roundness::of(one.first()?, radius).map(|r| r.deviation),
+    }
+}
+
+/// Amplitude of a tone and its standard error: of a line the root of the mean square over the turns.
+fn amplitude(fit: &Fit, tone: Tone, turns: usize) -> (f64, f64) {
+    let parts: Vec<(f64, f64)> = tone.shapes(turns).into_iter().map(|s| fit.of_shape(s)).collect();
+    let pairs = (parts.len() / 2).max(1) as f64;
+    let size = (parts.iter().map(|(c, _)| c * c).sum::<f64>() / pairs).sqrt();
+    let error = (parts.iter().map(|(_, e)| e * e).sum::<f64>() / parts.len().max(1) as f64 / pairs).sqrt();
+    (size, error)
+}
+
+/// A trace with its fit.
+struct Trace {
+    all: Vec<Point>,
+    turns: Vec<Turn>,
+    radius: f64,
+    feed: Option<f64>,
+    fit: Fit,
+    stretches: Vec<Reversal>,
+    keep: Vec<bool>,
+    whole: f64,
+}
+
+impl Trace {
+    /// What some shapes make of each point.
+    fn made(&self, wanted: impl Fn(Shape) -> bool + Copy) -> Vec<f64> {
+        self.all.iter().map(|p| self.fit.at(p, wanted)).collect()
+    }
+
+    /// An effect that is these values at the points.
+    fn effect(&self, kind: Kind, (size, error): (f64, f64), made: &[f64]) -> Effect {
+        let without = circularity(&self.turns, self.radius, made).unwrap_or(self.whole);
+        Effect {
+            kind,
+            size,
+            error: Some(error),
+            without,
+            contribution: self.whole - without,
+            ends: None,
+            heights: Vec::new(),
+            pitch: None,
+            per_turn: None,
+            frequency: None,
+            late: None,
+        }
+    }
+
+    fn apart(self, tones: &[Tone]) -> Analysis {
+        let n = self.all.len();
+        let of = |shape: Shape| self.fit.of_shape(shape);
+        let scaled = |(c, e): (f64, f64), by: f64| (c * by, e * by.abs());
+        let both = self.fit.shapes.contains(&Shape::Servo);
+        let mut effects = Vec::new();
+        // Everything that is told of a point, added up.
+        let mut model = vec![0.0; n];
+        let mut tell = |effects: &mut Vec<Effect>, effect: Effect, made: &[f64]| {
+            model.iter_mut().zip(made).for_each(|(m, v)| *m += v);
+            effects.push(effect);
+        };
+
+        let parts: Vec<_> = self.stretches.iter().map(|r| (r, reversals::parts(&self.all, &self.fit, r))).collect();
+        for axis in Axis::ALL {
+            let mut made = self.made(|s| matches!(s, Shape::Backlash(a, _) if a == axis));
+            let mut spikes = vec![0.0; n];
+            let mut heights = vec![[0.0; 4]; self.turns.len()];
+            for (r, part) in parts.iter().filter(|(r, _)| r.axis() == axis) {
+                heights[r.turn][r.quarter] = part.height;
+                for (((i, _), play), spike) in r.members.iter().zip(&part.play).zip(&part.spike) {
+                    made[*i] = *play;
+                    spikes[*i] = *spike;
+                }
+            }
+            let [plus, minus] = [true, false].map(|end| of(Shape::Backlash(axis, end)));
+            let mean = (0.5 * (plus.0 + minus.0), 0.5 * plus.1.hypot(minus.1));
+            let effect = Effect { ends: Some([plus.0, minus.0]), ..self.effect(Kind::Backlash(axis), mean, &made) };
+            tell(&mut effects, effect, &made);
+            let largest = heights.iter().flatten().fold(0.0_f64, |h, v| if v.abs() > h.abs() { *v } else { h });
+            let effect = Effect { heights, error: None, ..self.effect(Kind::Spikes(axis), (largest, 0.0), &spikes) };
+            tell(&mut effects, effect, &spikes);
+        }
+
+        let made = self.made(|s| s == Shape::Squareness);
+        let effect = if both {
+            // d = phi*R/2*sin(2a) for axes that enclose pi/2 - phi.
+            self.effect(Kind::Squareness, scaled(of(Shape::Squareness), -2.0 / self.radius), &made)
+        } else {
+            self.effect(Kind::Diagonal, of(Shape::Squareness), &made)
+        };
+        tell(&mut effects, effect, &made);
+        let made = self.made(|s| s == Shape::Scaling);
+        let effect = self.effect(Kind::Scaling, scaled(of(Shape::Scaling), 2.0 / self.radius), &made);
+        tell(&mut effects, effect, &made);
+        if both {
+            let made = self.made(|s| s == Shape::Servo);
+            let late = self.feed.map(|v| 2.0 * of(Shape::Servo).0 / v);
+            let effect = Effect { late, ..self.effect(Kind::Servo, of(Shape::Servo), &made) };
+            tell(&mut effects, effect, &made);
+        }
+        for axis in Axis::ALL {
+            if both {
+                let made = self.made(|s| s == Shape::Lateral(axis));
+                let effect = self.effect(Kind::Lateral(axis), of(Shape::Lateral(axis)), &made);
+                tell(&mut effects, effect, &made);
+            }
+            let made = self.made(|s| s == Shape::Straightness(axis));
+            let effect = self.effect(Kind::Straightness(axis), of(Shape::Straightness(axis)), &made);
+            tell(&mut effects, effect, &made);
+        }
+        for tone in tones {
+            let shapes = tone.shapes(self.turns.len());
+            let made: Vec<f64> = self.all.iter().map(|p| self.fit.at(p, |s| shapes.contains(&s))).collect();
+            let size = amplitude(&self.fit, *tone, self.turns.len());
+            let effect = match *tone {
+                Tone::Cyclic(axis, f) => {
+                    Effect { pitch: Some(self.radius / f), ..self.effect(Kind::Cyclic(axis), size, &made) }
+                }
+                Tone::Line(f) => Effect {
+                    per_turn: Some(f),
+                    frequency: self.feed.map(|v| f * v / (TAU * self.radius)),
+                    ..self.effect(Kind::Vibration, size, &made)
+                },
+            };
+            tell(&mut effects, effect, &made);
+        }
+
+        let frame = self.made(|s| matches!(s, Shape::Mean | Shape::Centre(_)));
+        let mut left: Vec<f64> = (0..n).map(|i| self.all[i].deviation - frame[i] - model[i]).collect();
+        for (axis, (rms, made)) in Axis::ALL.into_iter().zip(remainder::stick_slip(&self.all, &self.keep, &left)) {
+            let effect = Effect { error: None, ..self.effect(Kind::StickSlip(axis), (rms, 0.0), &made) };
+            left.iter_mut().zip(&made).for_each(|(l, v)| *l -= v);
+            effects.push(effect);
+        }
+        let rms = (left.iter().map(|l| l * l).sum::<f64>() / n as f64).sqrt();
+        effects.push(Effect { error: None, ..self.effect(Kind::Remainder, (rms, 0.0), &left) });
+        effects.sort_by(|a, b| b.contribution.total_cmp(&a.contribution));
+
+        let mut from = 0;
+        let cut = |turn: &Turn| {
+            let part = from..from + turn.angle.len();
+            from = part.end;
+            part.map(|i| model[i] + frame[i]).collect()
+        };
+        Analysis {
+            circularity: self.whole,
+            left: rms,
+            mean: of(Shape::Mean).0,
+            model: self.turns.iter().map(cut).collect(),
+            turns: self.turns,
+            effects,
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! `eixo circle --measured`: what a measured circular test shows.
+
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+use super::circle::{Findings as Simulated, Test};
+use crate::circle::measured::{Given, Measured, read};
+use crate::circle::roundness::{Roundness, bidirectional};
+use crate::circle::trace::{Analysis, Axis, Kind, analyse, hysteresis};
+use crate::report::ballbar::{Findings, Norm};
+use crate::trace::Machine;
+
+/// Reads and analyses the test; with axes, beside what their model draws.
+///
+/// # Errors
+/// When a file is no circular test or has too few points.
+pub(super) fn findings(
+    files: &[PathBuf],
+    directions: &[bool],
+    test: &Test,
+    axes: Option<&[Machine; 2]>,
+) -> anyhow::Result<Findings> {
+    let given = Given { radius: test.radius, feed: test.feed.map(|f| f / 60.0), clockwise: directions.to_vec() };
+    let measured = read(files, &given)?;
+    let too_few = || anyhow::anyhow!("the turns have too few points to tell the deviations apart; sample faster");
+    let analysis = analyse(&measured.turns, measured.radius, measured.feed).ok_or_else(too_few)?;
+    let norm = norm(&measured, &analysis).ok_or_else(|| anyhow::anyhow!("the points are no circle"))?;
+    let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+    let mut found = Findings {
+        name: names.join(" and "),
+        as_parameters: axes.map_or_else(Vec::new, |axes| as_parameters(&analysis, axes)),
+        measured,
+        norm,
+        analysis,
+        model: None,
+    };
+    if let Some(axes) = axes {
+        let same = Test {
+            radius: Some(found.measured.radius),
+            feed: found.measured.feed.map(|f| 60.0 * f).or(test.feed),
+            ..*test
+        };
+        let Simulated { analysis, .. } = super::circle::findings(axes, None, &same)?;
+        found.model = analysis;
+    }
+    Ok(found)
+}
+
+fn norm(m: &Measured, a: &Analysis) -> Option<Norm> {
+    let paths: Vec<_> = m.turns.iter().map(|t| t.path(m.radius)).collect();
+    let each: Option<Vec<Roundness>> = paths.iter().map(|p| Roundness::of(p, m.radius)).collect();
+    let each = each?;
+    let both = match <[_; 2]>::try_from(paths) {
+        Ok(two) => Some(bidirectional(&two)?),
+        Err(_) => None,
+    };
+    let h = if let [one, other] = m.turns.as_slice() { hysteresis(one, other) } else { None };
+    Some(Norm {
+        clockwise: m.turns.iter().map(|t| t.clockwise).collect(),
+        deviation: each.iter().map(|r| r.deviation).collect(),
+        radial: each.iter().map(|r| (r.largest, r.smallest)).collect(),
+        both,
+        hysteresis: h,
+        mean: a.mean,
+    })
+}
+
+/// What the sizes are as parameters of the effects of a model whose screw is known.
+fn as_parameters(a: &Analysis, [x, y]: &[Machine; 2]) -> Vec<String> {
+    let of = |axis: Axis| if axis == Axis::X { x.parameters.rho } else { y.parameters.rho };
+    let told = a.effects.iter().filter(|e| e.contribution > 0.0 && e.size.abs() > 3.0 * e.error.unwrap_or(0.0));
+    told.filter_map(|e| match e.kind {
+        Kind::Backlash(axis) if e.size > 0.0 => Some(format!(
+            "The {} of {:.2} um is [effects.backlash] half_gap = {:.4e} (half of it over the {:.4e} m/rad of {}).",
+            e.kind.name(),
+            1e6 * e.size,
+            0.5 * e.size / of(axis),
+            of(axis),
+            axis.name()
+        )),
+        Kind::Cyclic(axis) => {
+            let pitch = e.pitch?;
+            Some(format!(
+                "The {} every {:.3} mm is {:.4} to the turn of the motor: order = {:.4} of [effects.torque_ripple] where a torque \
+                 makes it.",
+                e.kind.name(),
+                1e3 * pitch,
+                TAU * of(axis) / pitch,
+                TAU * of(axis) / pitch
+            ))
+        }
+        _ => None,
+    })
+    .collect()
+}
