@@ -32,6 +32,8 @@ for report, label, name in PICTURES:
             break
     font = "svg{font:16px system-ui,'Segoe UI',Roboto,'Liberation Sans',Arial,sans-serif}"
     ground = f"<style>{style}{font}</style><rect width='100%' height='100%' fill='#fff'/>"
+    # What the page's script reads is of no use in a picture.
+    drawing = re.sub(r' data-[a-z]+="[^"]*"', "", drawing)
     head, rest = drawing.split(">", 1)
     width, height = re.search(r'viewBox="0 0 (\d+) (\d+)"', head).groups()
     path = Path(__file__).resolve().parent.parent / "docs" / name

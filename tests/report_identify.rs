@@ -135,7 +135,7 @@ fn example(name: &str) -> Identification {
 
 #[test]
 fn every_table_and_figure_of_the_result_is_on_the_page() {
-    let page = html::page(&identify::report(&example("x-axis")));
+    let page = html::page(&identify::report(&example("x-axis"), None));
     std::fs::write(concat!(env!("CARGO_TARGET_TMPDIR"), "/identify.html"), &page)
         .expect("the tests' folder can be written");
     for needle in [
@@ -159,12 +159,12 @@ fn a_trace_that_no_method_can_use_is_told_so() {
     let mut found = example("x-axis");
     found.methods.retain(|m| m.failure.is_some());
     found.recommended = None;
-    let page = html::page(&identify::report(&found));
+    let page = html::page(&identify::report(&found, None));
     assert!(page.contains("No method could identify the axis from this trace.") && page.contains("K is not excited"));
 }
 
 #[test]
 fn a_hostile_file_name_stays_text() {
-    let page = html::page(&identify::report(&example("<img src=x onerror=alert(1)>")));
+    let page = html::page(&identify::report(&example("<img src=x onerror=alert(1)>"), None));
     assert!(!page.contains("<img") && page.contains("&lt;img"));
 }

@@ -195,6 +195,7 @@ pub(super) fn findings(
         machine,
         test: circle,
         servos: given.map(|a| a.servo),
+        motion: [x.signals.motion, y.signals.motion],
         runs,
         without,
         analysis,
@@ -210,7 +211,7 @@ fn in_millimetres(effect: Effect, values: &[f64], rho: f64) -> Option<String> {
     let of = |name: &str| effect.parameter(name).ok().and_then(|k| values.get(k).copied());
     let every = |order: f64| (order > 0.0).then(|| format!("every {:.4} mm", 1e3 * TAU * rho / order));
     match effect {
-        Effect::Backlash => Some(format!("{:.3} um", 2e6 * rho * of("half_gap")?)),
+        Effect::Backlash => Some(format!("{:.3} µm", 2e6 * rho * of("half_gap")?)),
         Effect::TorqueRipple => every(of("order")?),
         Effect::Unbalance => every(1.0),
         _ => None,

@@ -28,6 +28,9 @@ fn effect(e: &Effect, a: &Analysis) -> Value {
     put("standard_error", e.error.map_or(Value::Null, um));
     put("takes_um", um(e.contribution));
     put("without_um", um(e.without));
+    if let Some(both) = e.pair {
+        put("takes_with_other_axis_um", um(both));
+    }
     put("share", if a.circularity > 0.0 { json!(e.contribution / a.circularity) } else { json!(0.0) });
     if let Some([plus, minus]) = e.ends {
         put("at_positive_end_um", um(plus));

@@ -24,7 +24,7 @@ pub(super) fn findings(
     let measured = read(files, &given)?;
     let too_few = || anyhow::anyhow!("the turns have too few points to tell the deviations apart; sample faster");
     let analysis = analyse(&measured.turns, measured.radius, measured.feed).ok_or_else(too_few)?;
-    let norm = norm(&measured, &analysis).ok_or_else(|| anyhow::anyhow!("the points are no circle"))?;
+    let norm = norm(&measured).ok_or_else(|| anyhow::anyhow!("the points are no circle"))?;
     let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
     let mut found = Findings {
         name: names.join(" and "),
@@ -46,7 +46,7 @@ pub(super) fn findings(
     Ok(found)
 }
 
-fn norm(m: &Measured, a: &Analysis) -> Option<Norm> {
+fn norm(m: &Measured) -> Option<Norm> {
     let paths: Vec<_> = m.turns.iter().map(|t| t.path(m.radius)).collect();
     let each: Option<Vec<Roundness>> = paths.iter().map(|p| Roundness::of(p, m.radius)).collect();
     let each = each?;
@@ -61,7 +61,8 @@ fn norm(m: &Measured, a: &Analysis) -> Option<Norm> {
         radial: each.iter().map(|r| (r.largest, r.smallest)).collect(),
         both,
         hysteresis: h,
-        mean: a.mean,
+        mean: m.turns.iter().map(|t| t.deviation.iter().sum::<f64>() / t.deviation.len() as f64).sum::<f64>()
+            / m.turns.len() as f64,
     })
 }
 

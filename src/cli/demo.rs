@@ -85,7 +85,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     steps.next("computing the paper's tables again");
     let findings =
-        Findings { consistent, euler, tables: reproduce()?, crest_factor: excitation.crest_factor(), lines: LINES };
+        Findings { record: trace, consistent, euler, tables: reproduce()?, crest_factor: excitation.crest_factor(), lines: LINES };
 
     let diagnosis = hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
 

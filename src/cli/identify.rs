@@ -22,7 +22,7 @@ use crate::identify::run::{Method, Request, identify};
 use crate::identify::stream;
 use crate::report::{Block, Cell, Table, terminal};
 use crate::trace::stream::Stream;
-use crate::trace::{Hold, Loaded, Machine, Mapping, Signal, load, write_text};
+use crate::trace::{Hold, Loaded, Machine, Mapping, Signal, Trace, load, write_text};
 
 /// Estimators on offer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -146,8 +146,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let settings =
             format!("{:?} {:?} {:?} {}", request(&args, true), args.hold, args.believed, args.stream);
         return args.many.run("identify", &FACTS, settings, &args.traces, args.axis.as_deref(), &|item| {
-            let (_, result) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
-            found(&result)
+            let (_, result, record) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
+            found(&result, record.as_ref())
         });
     }
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref());
@@ -161,7 +161,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     {
         write_text(path, &serde_json::to_vec_pretty(&refused.json())?)?;
     }
-    let (machine, result) = done?;
+    let (machine, result, record) = done?;
     let mut said = blocks(&result);
     if machine.controller.is_some() && result.recommended.is_some() {
         said.extend(super::controlled::identified(path, &machine, &improved(&machine, &result)?)?);
@@ -171,7 +171,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
     if let Some(path) = &args.report {
-        write_text(path, crate::report::html::page(&crate::report::identify::report(&result)).as_bytes())?;
+        write_text(path, crate::report::html::page(&crate::report::identify::report(&result, record.as_ref())).as_bytes())?;
     }
     if let Some(path) = &args.axis_out {
         write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
@@ -185,7 +185,7 @@ fn examine(
     axis: Option<&Path>,
     args: &Args,
     progress: &mut dyn FnMut(&str),
-) -> anyhow::Result<(Machine, Identification)> {
+) -> anyhow::Result<(Machine, Identification, Option<Trace>)> {
     let mut machine = match axis {
         Some(axis) => Machine::read(axis)?,
         None => Machine { name: "axis".to_owned(), ..Machine::default() },
@@ -211,7 +211,7 @@ fn examine(
         anyhow::ensure!(!request.methods.is_empty(), "--stream: only --method ls and rls are computed piece by piece");
         let mut result = stream::identify(&stream, &machine, &request, &file, progress).context(file)?;
         result.warnings.splice(0..0, seen.warnings);
-        return Ok((machine, result));
+        return Ok((machine, result, None));
     }
     let (from, to) = (args.believed.from, args.believed.to);
     let loaded = load(path, &Mapping { from, to, ..machine.signals.clone() })?;
@@ -224,7 +224,7 @@ fn examine(
     let seen = judged(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
     let mut result = identify(&seen.trace, &machine, &request(args, axis.is_some()), &file, progress).context(file)?;
     result.warnings.splice(0..0, seen.warnings);
-    Ok((machine, result))
+    Ok((machine, result, Some(seen.trace)))
 }
 
 fn request(args: &Args, reference: bool) -> Request {
@@ -244,7 +244,7 @@ fn request(args: &Args, reference: bool) -> Request {
 }
 
 /// An identification as a row of the summary: the method to trust.
-fn found(result: &Identification) -> anyhow::Result<Found> {
+fn found(result: &Identification, record: Option<&Trace>) -> anyhow::Result<Found> {
     let best = result.recommended.as_ref().context("no method gives an estimate to trust")?;
     let method = &result.methods[best.method];
     let fit = method.outputs.iter().map(|o| o.fit_percent / 100.0).reduce(f64::min);
@@ -268,7 +268,7 @@ fn found(result: &Identification) -> anyhow::Result<Found> {
         parameters: method.parameters.iter().map(tracked).collect(),
         warnings: result.warnings.clone(),
         result: json!(result),
-        report: crate::report::identify::report(result),
+        report: crate::report::identify::report(result, record),
     })
 }
 

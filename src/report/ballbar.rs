@@ -70,12 +70,19 @@ const fn way(clockwise: bool) -> &'static str {
 
 /// What belongs to the size, in words.
 fn detail(e: &Effect, turns: &[Turn]) -> String {
-    let um = |m: f64| text(&micro(m));
+    let um = |m: f64| format::number(if m.abs() < 1e-9 { 0.0 } else { 1e6 * m }, 3, Medium::Page);
+    if e.size.abs() < 1e-9 && e.ends.is_none() {
+        return "none".to_owned();
+    }
+    if e.error.is_some_and(|error| e.size.abs() < 2.0 * error) {
+        return "within its error".to_owned();
+    }
     let number = |v: f64, digits: usize| format::number(v, digits, Medium::Page);
     match e.kind {
         Kind::Backlash(axis) => e.ends.map_or_else(String::new, |[plus, minus]| {
+            let name = axis.name();
             let over = if e.size < -2.0 * e.error.unwrap_or(0.0) { "; over-compensated" } else { "" };
-            format!("play: {} at +{1}, {2} at −{1}{over}", um(plus), axis.name(), um(minus))
+            format!("play: +{name} {}, −{name} {} µm{over}", um(plus), um(minus))
         }),
         Kind::Spikes(axis) => {
             let quarters = if axis.name() == "X" { [0, 2] } else { [1, 3] };
@@ -84,9 +91,8 @@ fn detail(e: &Effect, turns: &[Turn]) -> String {
                 let name = axis.name();
                 format!("{} +{name} {a}, −{name} {b}", if t.clockwise { "cw" } else { "ccw" })
             });
-            format!("height: {}", each.collect::<Vec<_>>().join("; "))
+            format!("height: {} µm", each.collect::<Vec<_>>().join("; "))
         }
-        Kind::Squareness if e.size == 0.0 => String::new(),
         Kind::Squareness => format!("+X and +Y enclose {} than 90°", if e.size > 0.0 { "more" } else { "less" }),
         Kind::Scaling => format!("X is {} than Y", if e.size > 0.0 { "longer" } else { "shorter" }),
         Kind::Servo => match e.late {
@@ -110,8 +116,12 @@ fn detail(e: &Effect, turns: &[Turn]) -> String {
 
 /// The deviations by what each takes of the circularity; beside them those of a model.
 #[must_use]
-pub fn ranking(a: &Analysis, model: Option<&Analysis>) -> Table {
-    let mut columns = vec!["deviation", "size", "±", "takes", "share"];
+pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table {
+    let mut columns = vec!["deviation", "size", "±", "takes", "share", "X and Y"];
+    // A terminal has no room for the errors beside what they belong to.
+    if medium == Medium::Terminal {
+        columns.retain(|c| *c != "±");
+    }
     if model.is_some() {
         columns.push("in the model");
     }
@@ -119,14 +129,19 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>) -> Table {
     let mut table = Table::new("What the trace shows", columns);
     let mut told: Vec<Kind> = Vec::new();
     for e in &a.effects {
+        let unseen = e.size.abs() < 1e-9 || e.error.is_some_and(|error| e.size.abs() < 2.0 * error);
+        if medium == Medium::Terminal && unseen && e.kind != Kind::Remainder {
+            continue;
+        }
         let mut cells = vec![
             Cell::text(e.kind.name()),
             size(e),
             e.error.map_or(Cell::Empty, |error| {
-                if error < 1e-10 { Cell::Empty } else { size(&Effect { size: error, ..e.clone() }) }
+                if error < 1e-9 { Cell::Empty } else { size(&Effect { size: error, ..e.clone() }) }
             }),
             micro(e.contribution),
             if a.circularity > 0.0 { Cell::Bar((e.contribution / a.circularity).max(0.0)) } else { Cell::Empty },
+            e.pair.filter(|_| e.size.abs() >= 1e-9).map_or(Cell::Empty, micro),
         ];
         if let Some(model) = model {
             let same = |m: &&Effect| {
@@ -138,8 +153,11 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>) -> Table {
             };
             cells.push(model.effects.iter().find(same).map_or(Cell::Empty, size));
         }
+        if medium == Medium::Terminal {
+            cells.remove(2);
+        }
         cells.push(Cell::Text(detail(e, &a.turns)));
-        if told.is_empty() && e.contribution > 0.0 {
+        if told.is_empty() && e.weight() > 0.0 {
             table.strong_row(cells)
         } else {
             table.row(cells)
@@ -152,26 +170,41 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>) -> Table {
 /// How the table is to be read.
 pub(super) const READING: &str = "All deviations are fitted at once, over both directions. \"takes\" is what the circularity loses when that one \
      alone is taken out of the trace; as shapes overlap, the shares do not add up to one, and one that hides another takes less than \
-     nothing.";
+     nothing. Where X and Y are alike, one alone takes next to nothing, as the other still holds the ring open: the column \
+     \"X and Y\" is what both take together. The order is that of the larger: alone, or half of both.";
 
-/// What to do about the deviations that take most.
+/// Whether an effect counts by what it takes together with the other axis'.
+fn by_both(e: &Effect) -> bool {
+    e.weight() > e.contribution
+}
+
+/// What to do about the deviations that take most; X and Y of one kind are one step.
 #[must_use]
 pub fn steps(a: &Analysis) -> Vec<String> {
-    let worth = |e: &&Effect| e.contribution > WORTH * a.circularity && e.kind != Kind::Remainder;
+    let worth = |e: &&Effect| e.weight() > WORTH * a.circularity && e.kind != Kind::Remainder;
+    let mut told: Vec<&str> = Vec::new();
     let one = |e: &Effect| {
         let r = remedy(e.kind);
         let named = [("Siemens", r.siemens), ("Heidenhain", r.heidenhain), ("Fanuc", r.fanuc)];
         let named: Vec<String> = named.iter().filter_map(|(who, what)| Some(format!("{who}: {}", (*what)?))).collect();
         let control = if named.is_empty() { String::new() } else { format!(" ({})", named.join("; ")) };
-        format!(
-            "{}, {}. Machine: {}. Control: {}{control}.",
-            capital(e.kind.name()),
-            text(&size(e)),
-            r.mechanics,
-            r.control
-        )
+        let alike = |o: &&Effect| o.kind.of_both().is_some() && o.kind.of_both() == e.kind.of_both();
+        let which: Vec<String> = a
+            .effects
+            .iter()
+            .filter(|o| o.kind == e.kind || alike(o))
+            .filter(worth)
+            .map(|o| format!("{} {}", o.kind.name(), text(&size(o))))
+            .collect();
+        format!("{}. Machine: {}. Control: {}{control}.", capital(&which.join(", ")), r.mechanics, r.control)
     };
-    a.effects.iter().filter(worth).take(MOST).map(one).collect()
+    let new = |e: &&Effect| {
+        let name = e.kind.of_both().unwrap_or(e.kind.id());
+        let first = !told.contains(&name);
+        told.push(name);
+        first
+    };
+    a.effects.iter().filter(worth).filter(new).take(MOST).map(one).collect()
 }
 
 fn capital(text: &str) -> String {
@@ -211,16 +244,14 @@ fn figures(f: &Findings) -> Table {
 fn verdict(f: &Findings) -> Verdict {
     let a = &f.analysis;
     let what = if f.norm.both.is_some() { "The bi-directional circular deviation" } else { "The circular deviation" };
-    let first = a.effects.first().filter(|e| e.contribution > 0.0);
+    let first = a.effects.first().filter(|e| e.weight() > 0.0);
     let sentence = match first {
-        Some(e) if e.kind != Kind::Remainder => {
-            format!(
-                "{what} is {}; {} takes most of it: {}.",
-                text(&micro(a.circularity)),
-                e.kind.name(),
-                text(&micro(e.contribution))
-            )
-        }
+        Some(e) if e.kind != Kind::Remainder => format!(
+            "{what} is {}, of which {} go with {}.",
+            text(&micro(a.circularity)),
+            text(&micro(if by_both(e) { e.pair.unwrap_or(0.0) } else { e.contribution })),
+            if by_both(e) { e.kind.of_both().unwrap_or_default() } else { e.kind.name() }
+        ),
         _ => format!("{what} is {}; none of the known deviations takes most of it.", text(&micro(a.circularity))),
     };
     let mut detail = format!("Radius {} mm", format::number(1e3 * f.measured.radius, 4, Medium::Page));
@@ -256,6 +287,10 @@ fn polar(f: &Findings) -> PolarPlot {
 
 /// The trace over the angle with what was found in it, a figure for each direction.
 pub(super) fn unrolled(a: &Analysis) -> Vec<Figure> {
+    let both = || a.turns.iter().flat_map(|t| &t.deviation).chain(a.model.iter().flatten()).copied();
+    let (low, high) = both().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
+    let margin = 0.05 * (high - low).max(1e-9);
+    let range = super::Range::Fixed(low - margin, high + margin);
     let figure = |(turn, model): (&Turn, &Vec<f64>)| {
         let mut order: Vec<(f64, f64, f64)> = turn
             .angle
@@ -270,7 +305,7 @@ pub(super) fn unrolled(a: &Analysis) -> Vec<Figure> {
         let chart = Chart::new(
             capital(way(turn.clockwise)),
             Axis::linear("angle", "°").over(super::Range::Fixed(0.0, 360.0)),
-            Axis::linear("deviation", "m"),
+            Axis::linear("deviation", "m").over(range),
         )
         .with(Series::line("trace", degrees.clone(), d).in_colour(Colour::Ink).with_dash(Dash::Broad))
         .with(Series::line("sum of what was found", degrees, m).in_colour(Colour::Blue));
@@ -308,7 +343,7 @@ pub fn report(f: &Findings) -> Report {
 
 /// The sections on what the trace shows: the ranking, what to do, the trace over the angle.
 pub(super) fn shown(a: &Analysis, model: Option<&Analysis>) -> Vec<Section> {
-    let mut blocks = vec![Block::Table(ranking(a, model)), Block::Paragraph(READING.to_owned())];
+    let mut blocks = vec![Block::Table(ranking(a, model, Medium::Page)), Block::Paragraph(READING.to_owned())];
     let steps = steps(a);
     let mut sections = Vec::new();
     blocks.push(Block::Figures(unrolled(a)));
@@ -325,7 +360,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
     let mut blocks = vec![
         Block::Verdict(verdict(f)),
         Block::Table(figures(f)),
-        Block::Table(ranking(&f.analysis, f.model.as_ref())),
+        Block::Table(ranking(&f.analysis, f.model.as_ref(), Medium::Terminal)),
     ];
     let steps = steps(&f.analysis);
     if !steps.is_empty() {

@@ -102,12 +102,32 @@ pub struct Series {
     pub colour: Option<Colour>,
     /// Its dash.
     pub dash: Dash,
+    /// Whether it belongs to the model before or after: where a plot has both, the page can switch between them.
+    pub when: Option<When>,
+}
+
+/// Which of two models a series belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    /// The model as it was given.
+    Before,
+    /// The model as it was improved.
+    After,
+}
+
+impl When {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Before => "before",
+            Self::After => "after",
+        }
+    }
 }
 
 impl Series {
     /// A series of this shape.
     pub fn new(name: impl Into<String>, shape: Shape, x: impl Into<Arc<[f64]>>, y: impl Into<Arc<[f64]>>) -> Self {
-        Self { name: name.into(), x: x.into(), y: y.into(), shape, colour: None, dash: Dash::Solid }
+        Self { name: name.into(), x: x.into(), y: y.into(), shape, colour: None, dash: Dash::Solid, when: None }
     }
 
     /// A line.
@@ -134,6 +154,13 @@ impl Series {
     #[must_use]
     pub fn in_colour(mut self, colour: Colour) -> Self {
         self.colour = Some(colour);
+        self
+    }
+
+    /// The same as part of this model.
+    #[must_use]
+    pub fn of_model(mut self, when: When) -> Self {
+        self.when = Some(when);
         self
     }
 

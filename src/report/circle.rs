@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::ballbar;
-use super::chart::{Axis, Chart, Colour, Dash, Series};
+use super::chart::{Axis, Chart, Colour, Dash, Series, When};
 use super::format::{self, Medium};
 use super::polar::{PolarPlot, PolarTrace, Ring};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::circle::roundness::{Roundness, deviations};
 use crate::circle::trace::Analysis;
 use crate::circle::{CircleTest, Feedback, Path, Servo};
+use crate::trace::Motion;
 
 /// A pair of axes turned through the circle in both directions.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +34,8 @@ pub struct Findings {
     pub test: CircleTest,
     /// The drives of X and Y.
     pub servos: [Servo; 2],
+    /// How X and Y move: the units of their gains.
+    pub motion: [Motion; 2],
     /// Runs to be compared; the last is what the verdict speaks of.
     pub runs: Vec<Run>,
     /// The last run without one of what it has beyond the first, for each such thing.
@@ -92,7 +95,8 @@ pub fn report(f: &Findings) -> Report {
             angle.iter().zip(&deviation).map(|(a, d)| (a.to_degrees().rem_euclid(360.0), *d)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (degrees, sorted): (Vec<f64>, Vec<f64>) = order.into_iter().unzip();
-        unrolled.series.push(Series::line(&*run.name, degrees, sorted).in_colour(colour).with_dash(dash));
+        let line = Series::line(&*run.name, degrees, sorted).in_colour(colour).with_dash(dash);
+        unrolled.series.push(line.of_model(if last { When::After } else { When::Before }));
     }
     let polars = f.runs.iter().enumerate().map(|(k, run)| {
         let last = k + 1 == f.runs.len();
@@ -164,7 +168,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
     if !f.without.is_empty() {
         blocks.push(Block::Table(takes(f)));
     }
-    blocks.extend(f.analysis.as_ref().map(|a| Block::Table(ballbar::ranking(a, None))));
+    blocks.extend(f.analysis.as_ref().map(|a| Block::Table(ballbar::ranking(a, None, Medium::Terminal))));
     blocks
 }
 
@@ -247,18 +251,25 @@ fn table(f: &Findings) -> Table {
 
 fn drives(f: &Findings) -> Table {
     let mut table = Table::new("Loops of the drives", ["gain", "X", "Y"]);
-    let rows: [(&str, Gain, &str); 6] = [
-        ("position gain kp", |s| s.gains.kp, "1/s"),
-        ("velocity gain kv", |s| s.gains.kv, "N.m.s/rad"),
-        ("integral gain ki", |s| s.gains.ki, "N.m/rad"),
-        ("velocity fed forward", |s| s.gains.velocity_forward, ""),
-        ("acceleration fed forward", |s| s.gains.acceleration_forward, ""),
-        ("torque limit", |s| s.gains.limit, "N.m"),
+    let rows: [(&str, Gain, [&str; 2]); 6] = [
+        ("position gain kp", |s| s.gains.kp, ["1/s"; 2]),
+        ("velocity gain kv", |s| s.gains.kv, ["N.m.s/rad", "N.s/m"]),
+        ("integral gain ki", |s| s.gains.ki, ["N.m/rad", "N/m"]),
+        ("velocity fed forward", |s| s.gains.velocity_forward, [""; 2]),
+        ("acceleration fed forward", |s| s.gains.acceleration_forward, [""; 2]),
+        ("limit of torque or force", |s| s.gains.limit, ["N.m", "N"]),
     ];
-    for (name, value, unit) in rows {
-        table.row(
-            std::iter::once(Cell::text(name)).chain(f.servos.iter().map(|s| Cell::quantity(value(s), unit))).collect(),
-        );
+    for (name, value, units) in rows {
+        let cell = |(s, motion): (&Servo, &Motion)| {
+            let value = value(s);
+            // A drive without a limit has none to tell.
+            if value.is_finite() {
+                Cell::quantity(value, units[usize::from(*motion == Motion::Linear)])
+            } else {
+                Cell::text("none")
+            }
+        };
+        table.row(std::iter::once(Cell::text(name)).chain(f.servos.iter().zip(&f.motion).map(cell)).collect());
     }
     let feedback = |s: &Servo| match s.feedback {
         Feedback::Motor => Cell::text("motor encoder"),

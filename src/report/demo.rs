@@ -4,10 +4,13 @@ use super::identify;
 use super::{Block, Cell, Report, Section, Table, Tone, Verdict};
 use crate::identify::result::{Identification, MethodResult};
 use crate::identify::tables::PaperTables;
+use crate::trace::Trace;
 
 /// What the demonstration found.
 #[derive(Debug, Clone)]
 pub struct Findings {
+    /// The record.
+    pub record: Trace,
     /// Identified by regressions that are consistent with the simulation.
     pub consistent: Identification,
     /// Identified by the paper's Euler regression.
@@ -23,7 +26,7 @@ pub struct Findings {
 /// The whole report.
 #[must_use]
 pub fn report(f: &Findings) -> Report {
-    let mut report = identify::report(&f.consistent);
+    let mut report = identify::report(&f.consistent, Some(&f.record));
     report.title = "The XY table's axis, from FMU to parameters".to_owned();
     let mut sections = vec![Section::new("", vec![Block::Verdict(verdict(f)), Block::KeyValues(experiment(f))])];
     // The identification's own head becomes a section like the others.

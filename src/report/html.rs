@@ -1,18 +1,42 @@
-//! One self-contained HTML page: inline style and SVG, no script, nothing fetched.
+//! One self-contained HTML page: inline style and SVG and one small script of ours, nothing fetched. Without the script the
+//! page is whole; with it plots can be zoomed and read.
 //!
 //! Every text is escaped by the template (maud escapes all that is not markup of ours); what could steer a terminal or
-//! the direction of the text is taken out of the finished page. The page's own policy forbids scripts and the network.
+//! the direction of the text is taken out of the finished page. The page's own policy forbids the network, and every script but
+//! the one whose hash it names.
 
 use maud::{DOCTYPE, Markup, html};
+use sha2::{Digest, Sha256};
 
-use super::chart::{Colour, Dash, Shape};
+use super::chart::{Colour, Dash, Shape, When};
 use super::format::{self, Medium};
 use super::plot::{self, Size};
 use super::{Block, Cell, Drawing, Figure, Report, Section, Table, Tone, Verdict, chain, polar};
 
 const STYLE: &str = include_str!("style.css");
-const POLICY: &str =
-    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; form-action 'none'; base-uri 'none'";
+const SCRIPT: &str = include_str!("script.js");
+
+/// What the page may do: show its own style, and run the script of this hash (Content Security Policy Level 3, section 2.3.1).
+fn policy() -> String {
+    format!(
+        "default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{}'; img-src data:; form-action 'none'; base-uri 'none'",
+        base64(&Sha256::digest(SCRIPT))
+    )
+}
+
+/// RFC 4648, section 4.
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::new();
+    for three in bytes.chunks(3) {
+        let word = three.iter().fold(0_u32, |w, b| w << 8 | u32::from(*b)) << (8 * (3 - three.len()));
+        for k in 0..4 {
+            let letter = LETTERS[(word >> (18 - 6 * k) & 63) as usize];
+            out.push(if k > three.len() { '=' } else { char::from(letter) });
+        }
+    }
+    out
+}
 
 /// The page as one string.
 #[must_use]
@@ -31,7 +55,7 @@ pub fn page(report: &Report) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta http-equiv="Content-Security-Policy" content=(policy());
                 title { (report.title) }
                 style { (maud::PreEscaped(STYLE)) }
             }
@@ -45,10 +69,25 @@ pub fn page(report: &Report) -> String {
                 }
                 main { @for (i, s) in report.sections.iter().enumerate() { (section(i, s)) } }
                 @if !report.footer.is_empty() { footer { (report.footer) } }
+                @if has_plots(report) { script { (maud::PreEscaped(SCRIPT)) } }
             }
         }
     };
     format::printable(&markup.into_string()).into_owned()
+}
+
+/// Whether there is anything for the script to do.
+fn has_plots(report: &Report) -> bool {
+    fn any(blocks: &[Block]) -> bool {
+        let plot = |f: &Figure| !matches!(f.drawing, Drawing::Chain(_));
+        blocks.iter().any(|b| match b {
+            Block::Figure(f) => plot(f),
+            Block::Figures(all) => all.iter().any(plot),
+            Block::Details(_, inner) => any(inner),
+            _ => false,
+        })
+    }
+    report.sections.iter().any(|s| any(&s.blocks))
 }
 
 fn section(index: usize, section: &Section) -> Markup {
@@ -113,16 +152,24 @@ fn table(t: &Table) -> Markup {
             cells.peek().is_some() && cells.all(Cell::is_numeric)
         })
         .collect();
+    // What fits on no phone is set a row after the other there, each cell behind its heading; print shrinks by the columns.
+    let room = match t.columns.len() {
+        0..4 => "",
+        4..8 => " many",
+        _ => " many very",
+    };
     let class = |c: usize| numeric.get(c).copied().unwrap_or(false).then_some("num");
     html! {
-        div class="scroll" role="region" tabindex="0" aria-label=(t.caption) {
+        div class={ "scroll" (room) } role="region" tabindex="0" aria-label=(t.caption) {
             table {
                 @if !t.caption.is_empty() { caption { (t.caption) } }
                 thead { tr { @for (c, name) in t.columns.iter().enumerate() { th scope="col" class=[class(c)] { (heading(name)) } } } }
                 tbody {
                     @for r in &t.rows {
                         tr class=[r.strong.then_some("strong")] {
-                            @for (c, cell) in r.cells.iter().enumerate() { td class=[class(c)] { (cell_markup(cell)) } }
+                            @for (c, cell) in r.cells.iter().enumerate() {
+                                td class=[class(c)] data-head=[t.columns.get(c).map(|n| heading(n))] { (cell_markup(cell)) }
+                            }
                         }
                     }
                 }
@@ -173,14 +220,16 @@ fn figure(f: &Figure, wide: Size) -> Markup {
                     @if !c.title.is_empty() { h3 { (c.title) } }
                     (legend(c.series.iter().enumerate().map(|(i, s)| {
                         let sign = match s.shape { Shape::Points => Sign::Dot, Shape::Band { .. } => Sign::Patch, _ => Sign::Line(s.dash) };
-                        (s.name.as_str(), s.colour.unwrap_or(Colour::nth(i)), sign)
+                        Entry { index: i, name: &s.name, colour: s.colour.unwrap_or(Colour::nth(i)), sign, when: s.when }
                     })))
                     div class="wide" { (plot::svg(c, wide)) }
                     div class="narrow" { (plot::svg(c, narrow)) }
                 }
                 Drawing::Polar(p) => {
                     @if !p.title.is_empty() { h3 { (p.title) } }
-                    (legend(p.traces.iter().enumerate().map(|(i, t)| (t.name.as_str(), t.colour.unwrap_or(Colour::nth(i)), Sign::Line(t.dash)))))
+                    (legend(p.traces.iter().enumerate().map(|(i, t)| {
+                        Entry { index: i, name: &t.name, colour: t.colour.unwrap_or(Colour::nth(i)), sign: Sign::Line(t.dash), when: None }
+                    })))
                     div class="square" { (polar::svg(p, square)) }
                 }
                 Drawing::Chain(c) => {
@@ -201,21 +250,30 @@ enum Sign {
     Patch,
 }
 
-fn legend<'a>(entries: impl Iterator<Item = (&'a str, Colour, Sign)>) -> Markup {
-    let named: Vec<_> = entries.filter(|(name, ..)| !name.is_empty()).collect();
+/// A line of the legend: which series it is of.
+struct Entry<'a> {
+    index: usize,
+    name: &'a str,
+    colour: Colour,
+    sign: Sign,
+    when: Option<When>,
+}
+
+fn legend<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Markup {
+    let named: Vec<Entry> = entries.filter(|e| !e.name.is_empty()).collect();
     html! {
         @if !named.is_empty() {
             ul class="legend" {
-                @for (name, colour, sign) in &named {
-                    li {
-                        svg class=(colour.class()) viewBox="0 0 28 12" width="28" height="12" aria-hidden="true" {
-                            @match sign {
+                @for e in &named {
+                    li data-s=(e.index) data-when=[e.when.map(When::name)] {
+                        svg class=(e.colour.class()) viewBox="0 0 28 12" width="28" height="12" aria-hidden="true" {
+                            @match &e.sign {
                                 Sign::Line(dash) => { path class=(dash.class()) stroke-dasharray=[dash.pattern()] d="M1 6H27" {} }
                                 Sign::Dot => { path class="dots" d="M7 6h0M14 6h0M21 6h0" {} }
                                 Sign::Patch => { path class="band" d="M1 1H27V11H1Z" {} }
                             }
                         }
-                        (name)
+                        (e.name)
                     }
                 }
             }

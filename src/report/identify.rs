@@ -1,24 +1,27 @@
 //! The report of an identification: estimates with their errors, how well they fit, how they were reached.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, Shape};
 use super::format::{self, Medium};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::identify::earned::FOLLOWS;
+use crate::identify::frequency;
 use crate::identify::result::{
     Estimate, FrequencyResponse, Identification, MethodResult, OutputFit, ResponseOf, Series as Curve,
 };
-use crate::trace::Signal;
+use crate::trace::{Signal, Trace};
 
 /// Dashes of series that may lie on one another.
 const DASHES: [Dash; 3] = [Dash::Solid, Dash::Dashed, Dash::Dotted];
 
-/// The whole report.
+/// The whole report; with the record it opens with what was measured and what the estimates make of it.
 #[must_use]
-pub fn report(found: &Identification) -> Report {
+pub fn report(found: &Identification, record: Option<&Trace>) -> Report {
     let mut top = vec![Block::Verdict(verdict(found))];
     top.extend(found.warnings.iter().cloned().map(Block::Warning));
+    top.extend(follows(found, record));
     if let Some(best) = recommended(found) {
         top.push(Block::Table(estimates(best)));
     }
@@ -291,6 +294,68 @@ fn fit(found: &Identification) -> Vec<Block> {
     blocks
 }
 
+/// Most outputs that are drawn at the head of the page.
+const DRAWN: usize = 2;
+
+/// Measured against simulated, of the method to trust.
+fn follows(found: &Identification, record: Option<&Trace>) -> Option<Block> {
+    let best = recommended(found)?;
+    let record = compared(found, record?, best);
+    let figure = |o: &OutputFit| {
+        let (time, measured, simulated) = pair(o, best, &record)?;
+        let time: Arc<[f64]> = time.into();
+        let chart = Chart::new(
+            format!("{}, measured and simulated", o.signal.name()),
+            Axis::linear("time", o.residual.x_unit),
+            Axis::linear(o.signal.name(), o.residual.y_unit),
+        )
+        .with(Series::line("measured", time.clone(), measured).in_colour(Colour::Ink).with_dash(Dash::Broad))
+        .with(Series::line(format!("simulated with {}", best.title), time, simulated).in_colour(Colour::Blue));
+        let per = format::number(o.fit_percent, 4, Medium::Page);
+        Some(Figure::new(chart, format!("Fit {per} %: how much of the deviation from the mean is followed.")))
+    };
+    let figures: Vec<Figure> = best.outputs.iter().filter_map(figure).take(DRAWN).collect();
+    match figures.len() {
+        0 => None,
+        1 => figures.into_iter().next().map(Block::Figure),
+        _ => Some(Block::Figures(figures)),
+    }
+}
+
+/// What the simulation was compared with: the record, or the average of its periods.
+fn compared<'a>(found: &Identification, record: &'a Trace, best: &MethodResult) -> Cow<'a, Trace> {
+    let end = best.outputs.iter().filter_map(|o| o.residual.x.last()).fold(f64::NEG_INFINITY, |m, t| m.max(*t));
+    let short = record.len() > 1 && end < record.time(record.len() - 1) - 0.5 * record.dt;
+    let average = || frequency::average(record, &frequency::measure(record, found.trace.period?)?).ok();
+    match short.then(average).flatten() {
+        Some(average) => Cow::Owned(average),
+        None => Cow::Borrowed(record),
+    }
+}
+
+/// Time, measured and simulated values of an output; none where the values are not those that were compared.
+fn pair(o: &OutputFit, m: &MethodResult, record: &Trace) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
+    if o.signal == Signal::T {
+        // A rigid axis is compared in torque, in means over windows: the record itself is not what was compared.
+        let e = m.excitation.as_ref().filter(|e| e.estimate.x == e.error.x)?;
+        let measured = e.estimate.y.iter().zip(&e.error.y).map(|(estimate, error)| estimate - error).collect();
+        return Some((e.estimate.x.clone(), measured, e.estimate.y.clone()));
+    }
+    let values = record.get(o.signal)?;
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let rms = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt();
+    if (rms - o.rms).abs() > 1e-6 * o.rms {
+        return None;
+    }
+    let at = |t: f64| {
+        let k = ((t - record.start) / record.dt).round();
+        (k >= 0.0).then_some(k as usize).and_then(|k| values.get(k)).copied()
+    };
+    let measured = o.residual.x.iter().map(|t| at(*t)).collect::<Option<Vec<f64>>>()?;
+    let simulated = measured.iter().zip(&o.residual.y).map(|(y, e)| y - e).collect();
+    Some((o.residual.x.clone(), measured, simulated))
+}
+
 fn line(name: &str, curve: &Curve) -> Series {
     Series::line(name, curve.x.as_slice(), curve.y.as_slice())
 }
@@ -343,14 +408,54 @@ fn magnitude(f: &Arc<[f64]>, o: &ResponseOf) -> Chart {
 }
 
 fn phase(f: &Arc<[f64]>, o: &ResponseOf) -> Chart {
-    let degrees = |p: &[f64]| -> Vec<f64> { p.iter().map(|p| p.to_degrees()).collect() };
+    let (measured, model) = unwrapped(&o.phase, &o.model_phase);
     Chart::new(
         format!("Phase from torque to {}", o.signal.name()),
         Axis::log("frequency", "Hz"),
         Axis::linear("phase", "°"),
     )
-    .with(Series::points("measured", f.clone(), degrees(&o.phase)).in_colour(Colour::Ink))
-    .with(Series::line("model", f.clone(), degrees(&o.model_phase)).in_colour(Colour::Blue))
+    .with(Series::points("measured", f.clone(), measured).in_colour(Colour::Ink))
+    .with(Series::line("model", f.clone(), model).in_colour(Colour::Blue))
+}
+
+/// Phases in degrees without jumps of a turn: the model's along the frequency, which has no noise, and each measured one
+/// within half a turn of it.
+fn unwrapped(measured: &[f64], model: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let near = |angle: f64, to: f64| angle + 360.0 * ((to - angle) / 360.0).round();
+    let mut last: Option<f64> = None;
+    let model: Vec<f64> = model
+        .iter()
+        .map(|p| {
+            let p = p.to_degrees();
+            // A lag is told below zero.
+            let next = last.map_or(if p > 90.0 { p - 360.0 } else { p }, |l| near(p, l));
+            if next.is_finite() {
+                last = Some(next);
+            }
+            next
+        })
+        .collect();
+    let measured = measured.iter().zip(&model).map(|(p, m)| near(p.to_degrees(), *m)).collect();
+    (measured, model)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_that_passes_half_a_turn_does_not_jump() {
+        // A lag from -100 to -500 degrees, wrapped as an argument is, and measured with some degrees of noise.
+        let true_ones: Vec<f64> = (0..41).map(|k| -100.0 - 10.0 * f64::from(k)).collect();
+        let wrap = |d: f64| ((d + 180.0).rem_euclid(360.0) - 180.0).to_radians();
+        let model: Vec<f64> = true_ones.iter().map(|d| wrap(*d)).collect();
+        let measured: Vec<f64> = true_ones.iter().enumerate().map(|(k, d)| wrap(d + 40.0 * (k as f64).sin())).collect();
+        let (measured, model) = unwrapped(&measured, &model);
+        for (k, d) in true_ones.iter().enumerate() {
+            assert!((model[k] - d).abs() < 1e-9, "{k}: {} against {d}", model[k]);
+            assert!((measured[k] - d - 40.0 * (k as f64).sin()).abs() < 1e-9, "{k}: {}", measured[k]);
+        }
+    }
 }
 
 fn has_reference(found: &Identification) -> bool {

@@ -25,7 +25,7 @@ mod residual;
 mod scale;
 
 pub use chain::{ChainDiagram, Place, Symbol};
-pub use chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, Shape};
+pub use chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, Shape, When};
 pub use polar::PolarPlot;
 
 /// A whole report.

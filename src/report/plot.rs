@@ -84,7 +84,9 @@ pub(super) fn svg(chart: &Chart, size: Size) -> Markup {
     if stems && y_axis.range == Range::Auto {
         y_axis.range = Range::WithZero;
     }
-    let y = Scale::new(&y_axis, y_values, (height / if chart.y.log { 36.0 } else { 55.0 }) as usize, 0.05);
+    let lines: Vec<f64> =
+        chart.marks.iter().filter_map(|m| if let Mark::Y(at, _) = m { Some(*at) } else { None }).collect();
+    let y = Scale::holding(&y_axis, y_values, &lines, (height / if chart.y.log { 36.0 } else { 55.0 }) as usize, 0.05);
     let x_pad = if stems { 0.02 } else { 0.0 };
     let x = Scale::new(&chart.x, x_values, (width / 95.0) as usize, x_pad);
 
@@ -102,8 +104,10 @@ pub(super) fn svg(chart: &Chart, size: Size) -> Markup {
     };
     let zero = if chart.y.log { h } else { clamp(sy(0.0), h) };
 
+    let data = serde_json::json!({ "l": left, "t": top, "x": x.reading(&chart.x), "y": y.reading(&chart.y) });
     html! {
-        svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (px(width)) " " (px(height)) } role="img" aria-label=(summary(chart)) {
+        svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (px(width)) " " (px(height)) } role="img" aria-label=(summary(chart))
+            data-plot=(data) {
             title { (chart.title) }
             g class="grid" {
                 @for t in &x.ticks {
@@ -127,7 +131,7 @@ pub(super) fn svg(chart: &Chart, size: Size) -> Markup {
                 }
                 @for (i, s) in chart.series.iter().enumerate() {
                     @let colour = s.colour.unwrap_or(Colour::nth(i));
-                    g class=(colour.class()) {
+                    g class=(colour.class()) data-s=(i) {
                         @if !s.name.is_empty() { title { (s.name) } }
                         (draw(s, &place, zero, w))
                     }
@@ -262,6 +266,17 @@ fn mark_labels(
             Mark::Span(a, b, label) => (sx(a.min(*b)).max(0.0) + 4.0, 13.0, label),
             Mark::Y(at, label) => ((w - text_width(label) - 4.0).max(0.0), sy(*at) - 5.0, label),
         };
+        // A line that is too far off to be drawn is told at the edge it lies beyond.
+        let beyond = match m {
+            Mark::Y(at, _) if sy(*at) < -1e-6 => Some(("↑", 13.0)),
+            Mark::Y(at, _) if sy(*at) > h + 1e-6 => Some(("↓", h - 5.0)),
+            _ => None,
+        };
+        let (label, y) = match beyond {
+            Some((sign, y)) if !label.is_empty() => (format!("{label} {sign}"), y),
+            _ => (label.clone(), y),
+        };
+        let label = &label;
         if label.is_empty() || !x.is_finite() || !y.is_finite() || x < 0.0 || x > w || y < 0.0 || y > h {
             continue;
         }

@@ -80,9 +80,12 @@ pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
     let at = |angle: f64, r: f64| (cx + r * angle.cos(), cy - r * angle.sin());
     let (exponent, unit) = scale::factor(2.0 * step, &plot.unit);
     let label = |d: f64| format::number(d / 10f64.powi(exponent), 2, Medium::Page).trim_end_matches(".0").to_owned();
+    let data = serde_json::json!({ "x": {}, "polar": {
+        "cx": cx, "cy": cy, "base": full * BASE, "k": scale, "axis": { "e": exponent, "u": unit },
+    } });
     html! {
         svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (px(size.width)) " " (px(size.height)) } role="img"
-            aria-label={ "Polar plot: " (plot.title) ". Largest deviation " (format::number(largest, 3, Medium::Page)) " " (format::unit(&plot.unit, Medium::Page)) "." } {
+            aria-label={ "Polar plot: " (plot.title) ". Largest deviation " (format::number(largest, 3, Medium::Page)) " " (format::unit(&plot.unit, Medium::Page)) "." } data-plot=(data) {
             title { (plot.title) }
             g class="grid" fill="none" {
                 @for k in -2..=2 {
@@ -101,7 +104,7 @@ pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
                 path class={ "ring " (ring.colour.class()) } fill-rule="evenodd" d={ (circle(ring.low)) (circle(ring.high)) } {}
             }
             @for (i, t) in plot.traces.iter().enumerate() {
-                g class=(t.colour.unwrap_or(Colour::nth(i)).class()) {
+                g class=(t.colour.unwrap_or(Colour::nth(i)).class()) data-s=(i) {
                     title { (t.name) }
                     @let points = t.angle.iter().zip(t.deviation.iter()).map(|(a, d)| at(*a, radius(*d)));
                     @for run in decimate::runs(points) {

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series};
+use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
 use super::{Block, Cell, Figure, Table};
 use crate::diagnose::location::{FrequencyPart, StateCurve};
 use crate::diagnose::{Diagnosis, Location, Overlay};
@@ -26,9 +26,14 @@ pub(super) fn overlay(o: &Overlay, after_name: &str, motion: Motion) -> Vec<Bloc
             .with(
                 Series::line("model as given", time.clone(), o.before.as_slice())
                     .in_colour(Colour::Vermillion)
-                    .with_dash(Dash::Dashed),
+                    .with_dash(Dash::Dashed)
+                    .of_model(When::Before),
             )
-            .with(Series::line(after_name, time.clone(), o.after.as_slice()).in_colour(Colour::Blue));
+            .with(
+                Series::line(after_name, time.clone(), o.after.as_slice())
+                    .in_colour(Colour::Blue)
+                    .of_model(When::After),
+            );
     let minus = |model: &[f64]| -> Vec<f64> { o.measured.iter().zip(model).map(|(y, m)| y - m).collect() };
     let error = |title: &str| {
         Chart::new(
@@ -37,9 +42,13 @@ pub(super) fn overlay(o: &Overlay, after_name: &str, motion: Motion) -> Vec<Bloc
             Axis::linear(format!("measured minus model, {}", o.channel), unit),
         )
     };
-    let left = Series::line(after_name, time.clone(), minus(&o.after)).in_colour(Colour::Blue);
+    let left = Series::line(after_name, time.clone(), minus(&o.after)).in_colour(Colour::Blue).of_model(When::After);
     let both = error("Error")
-        .with(Series::line("model as given", time.clone(), minus(&o.before)).in_colour(Colour::Vermillion))
+        .with(
+            Series::line("model as given", time.clone(), minus(&o.before))
+                .in_colour(Colour::Vermillion)
+                .of_model(When::Before),
+        )
         .with(left.clone());
     let remainder = error("What is left")
         .with(left)

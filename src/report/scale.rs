@@ -17,6 +17,9 @@ pub(super) struct Scale {
     high: f64,
     log: bool,
     pub ticks: Vec<Tick>,
+    /// The power of ten that is taken out of the ticks, and the unit that carries it.
+    pub exponent: i32,
+    pub unit: String,
     /// Label and unit with the power of ten or the offset taken out of the ticks.
     pub title: String,
 }
@@ -24,6 +27,18 @@ pub(super) struct Scale {
 impl Scale {
     /// The scale for finite `values`, with about `wanted` ticks. `pad` widens automatic limits on both sides.
     pub fn new(axis: &Axis, values: impl Iterator<Item = f64> + Clone, wanted: usize, pad: f64) -> Self {
+        Self::holding(axis, values, &[], wanted, pad)
+    }
+
+    /// The same, widened to hold the values of reference lines too, but for those so far off that the data would shrink to
+    /// nothing: below a quarter of the axis.
+    pub fn holding(
+        axis: &Axis,
+        values: impl Iterator<Item = f64> + Clone,
+        lines: &[f64],
+        wanted: usize,
+        pad: f64,
+    ) -> Self {
         // Numbers near the ends of the floating point have no room for ticks around them.
         let usable = values.filter(|v| v.abs() < 1e150 && (!axis.log || *v > 1e-150));
         let mut low = f64::INFINITY;
@@ -42,6 +57,16 @@ impl Scale {
                 }
             }
         }
+        if low < high && !matches!(axis.range, Range::Fixed(..)) {
+            let (a, b) = if axis.log { (low.ln(), high.ln()) } else { (low, high) };
+            for line in lines.iter().copied().filter(|v| v.is_finite() && (!axis.log || *v > 0.0)) {
+                let at = if axis.log { line.ln() } else { line };
+                if at > b - 4.0 * (b - a) && at < a + 4.0 * (b - a) {
+                    low = low.min(line);
+                    high = high.max(line);
+                }
+            }
+        }
         if !(low.is_finite() && high.is_finite()) {
             (low, high) = if axis.log { (0.1, 1.0) } else { (0.0, 1.0) };
         }
@@ -51,6 +76,19 @@ impl Scale {
         } else {
             Self::linear(axis, low, high, wanted, if fixed { 0.0 } else { pad })
         }
+    }
+
+    /// What the page's script needs to read a value off the axis.
+    pub fn reading(&self, axis: &Axis) -> serde_json::Value {
+        serde_json::json!({
+            "lo": self.low,
+            "hi": self.high,
+            "log": self.log,
+            "e": self.exponent,
+            "u": self.unit,
+            "u0": axis.unit,
+            "n": axis.label,
+        })
     }
 
     /// Where a value lies, as a share of the axis; not a number when the axis cannot show it.
@@ -101,7 +139,8 @@ impl Scale {
             let sign = if offset < 0.0 { '+' } else { '−' };
             label = format!("{label} {sign} {}", shortest(offset.abs()));
         }
-        Self { low, high, log: false, ticks, title: titled(&label, &unit) }
+        let title = titled(&label, &unit);
+        Self { low, high, log: false, ticks, exponent: factor_exponent, unit, title }
     }
 
     fn log(axis: &Axis, mut low: f64, mut high: f64, wanted: usize, pad: f64) -> Self {
@@ -141,7 +180,8 @@ impl Scale {
                 ticks.push(Tick { share, label: has_label.then(|| log_label(digit, exponent)) });
             }
         }
-        Self { low, high, log: true, ticks, title: titled(&axis.label, &format::unit(&axis.unit, Medium::Page)) }
+        let unit = format::unit(&axis.unit, Medium::Page);
+        Self { low, high, log: true, ticks, exponent: 0, title: titled(&axis.label, &unit), unit }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The deviations of a trace, each in its size and by what the circularity loses without it.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
 use super::fit::Fit;
@@ -71,6 +72,19 @@ impl Kind {
             Self::StickSlip(Axis::Y) => "stick_slip_y",
             Self::Vibration => "vibration",
             Self::Remainder => "remainder",
+        }
+    }
+
+    /// Its name for X and Y together; none where it is of no one axis.
+    #[must_use]
+    pub const fn of_both(self) -> Option<&'static str> {
+        match self {
+            Self::Backlash(_) => Some("backlash of X and Y"),
+            Self::Spikes(_) => Some("reversal spikes of X and Y"),
+            Self::Cyclic(_) => Some("cyclic errors of X and Y"),
+            Self::Lateral(_) => Some("lateral play of X and Y"),
+            Self::Straightness(_) => Some("straightness of X and Y"),
+            _ => None,
         }
     }
 
@@ -154,6 +168,14 @@ impl Measure {
     }
 }
 
+impl Effect {
+    /// What the ranking goes by: what it takes alone, or its half of what it takes with the same on the other axis, m.
+    #[must_use]
+    pub fn weight(&self) -> f64 {
+        self.pair.map_or(self.contribution, |both| self.contribution.max(0.5 * both))
+    }
+}
+
 /// One deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
@@ -168,6 +190,9 @@ pub struct Effect {
     pub without: f64,
     /// What it takes of the circularity, m: negative where it hides another.
     pub contribution: f64,
+    /// What it takes together with the same on the other axis, m: where X and Y are alike, one alone takes next to nothing,
+    /// as the other still holds the ring open.
+    pub pair: Option<f64>,
     /// The play at the positive and at the negative end, m.
     pub ends: Option<[f64; 2]>,
     /// Heights at +X, +Y, -X, -Y of each turn, m.
@@ -185,7 +210,7 @@ pub struct Effect {
 /// What a trace shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
-    /// The deviations, that which takes most of the circularity first; the remainder among them.
+    /// The deviations, that of the largest weight first; the remainder among them.
     pub effects: Vec<Effect>,
     /// The circularity they are shares of, m: bi-directional with two directions.
     pub circularity: f64,
@@ -334,6 +359,7 @@ impl Trace {
             error: Some(error),
             without,
             contribution: self.whole - without,
+            pair: None,
             ends: None,
             heights: Vec::new(),
             pitch: None,
@@ -351,8 +377,13 @@ impl Trace {
         let mut effects = Vec::new();
         // Everything that is told of a point, added up.
         let mut model = vec![0.0; n];
+        let mut pairs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
         let mut tell = |effects: &mut Vec<Effect>, effect: Effect, made: &[f64]| {
             model.iter_mut().zip(made).for_each(|(m, v)| *m += v);
+            if let Some(both) = effect.kind.of_both() {
+                let sum = pairs.entry(both).or_insert_with(|| vec![0.0; n]);
+                sum.iter_mut().zip(made).for_each(|(m, v)| *m += v);
+            }
             effects.push(effect);
         };
 
@@ -430,7 +461,16 @@ impl Trace {
         }
         let rms = (left.iter().map(|l| l * l).sum::<f64>() / n as f64).sqrt();
         effects.push(Effect { error: None, ..self.effect(Kind::Remainder, (rms, 0.0), &left) });
-        effects.sort_by(|a, b| b.contribution.total_cmp(&a.contribution));
+        for (both, sum) in &pairs {
+            let seen =
+                |e: &&Effect| e.kind.of_both() == Some(*both) && e.size.abs() > FLOOR.max(2.0 * e.error.unwrap_or(0.0));
+            let axes: BTreeSet<&str> = effects.iter().filter(seen).map(|e| e.kind.id()).collect();
+            if axes.len() == 2 {
+                let taken = self.whole - circularity(&self.turns, self.radius, sum).unwrap_or(self.whole);
+                effects.iter_mut().filter(|e| e.kind.of_both() == Some(both)).for_each(|e| e.pair = Some(taken));
+            }
+        }
+        effects.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
 
         let mut from = 0;
         let cut = |turn: &Turn| {
