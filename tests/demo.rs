@@ -40,6 +40,24 @@ fn the_demonstration_ends_in_reports_with_the_papers_figures_and_the_hidden_caus
         assert!(report.contains(&format!("<h3>{title}</h3>")), "{title}");
     }
     assert!(report.contains("Table 5."));
+    // It opens with the machine that disagrees, then the circle; the paper's figures stand folded behind them.
+    let at = |what: &str| report.find(what).unwrap_or_else(|| panic!("{what}"));
+    let order = [
+        "the gap is here",
+        "How far the gap shrinks</h2>",
+        "What it does to a circle</h2>",
+        "<details>",
+        "<h3>Excitation</h3>",
+    ];
+    assert!(order.windows(2).all(|w| at(w[0]) < at(w[1])), "{order:?}");
+    for (page, others) in [
+        ("report.html", ["diagnosis.html", "circle.html"]),
+        ("diagnosis.html", ["report.html", "circle.html"]),
+        ("circle.html", ["report.html", "diagnosis.html"]),
+    ] {
+        let page = text(&out, page);
+        assert!(others.iter().all(|o| page.contains(&format!("href=\"{o}\""))), "{others:?}");
+    }
     assert!(text(&out, "diagnosis.html").contains("the gap is here"));
     assert!(text(&out, "circle.html").contains("coulomb_motor on X"));
     assert!(std::fs::read(out.join("axis.fmu")).expect("an FMU").starts_with(b"PK"));

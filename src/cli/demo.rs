@@ -26,8 +26,8 @@ use crate::fmu::simulate::{Inputs, Options, Rows, parse_setting};
 use crate::identify::excitation::{Kind, Multisine};
 use crate::identify::run::{Method, Request, identify};
 use crate::identify::tables::reproduce;
-use crate::report::demo::{Findings, report, short};
-use crate::report::{Block, diagnose as diagnosis, html, terminal};
+use crate::report::demo::{Findings, linked, report, short};
+use crate::report::{Block, Report, diagnose as diagnosis, html, terminal};
 use crate::trace::{Hold, Machine, Motion, Signal, Trace, write_csv, write_text};
 
 /// Arguments of `eixo demo`.
@@ -87,11 +87,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let findings =
         Findings { record: trace, consistent, euler, tables: reproduce()?, crest_factor: excitation.crest_factor(), lines: LINES };
 
-    let diagnosis = hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
+    let Hidden { said: diagnosis, diagnosis: found, circle } = hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
 
     steps.next("writing the report");
     write_text(&file("identification.json"), &serde_json::to_vec_pretty(&findings.consistent)?)?;
-    write_text(&file("report.html"), html::page(&report(&findings)).as_bytes())?;
+    write_text(&file("report.html"), html::page(&report(&findings, &found, &circle)).as_bytes())?;
     steps.finish();
 
     let layout = terminal::Layout { colour: std::io::stdout().is_terminal(), ..terminal::Layout::default() };
@@ -123,8 +123,15 @@ const SEED: u64 = 20_060_718;
 /// Periods of the excitation: the last third of the record is held out.
 const PERIODS: usize = 4;
 
+/// What the hidden friction showed: for the terminal, and the reports of the diagnosis and of the circle.
+struct Hidden {
+    said: Vec<Block>,
+    diagnosis: Report,
+    circle: Report,
+}
+
 /// Lets the FMU play a machine with friction that the model does not know, and diagnoses it.
-fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) -> anyhow::Result<Vec<Block>> {
+fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) -> anyhow::Result<Hidden> {
     let file = |name: &str| folder.join(name);
     steps.next("simulating a machine with hidden friction");
     let period = Multisine::new(Kind::Schroeder, SAMPLES, 1, LINES, RMS, 0.0, 0)?.period();
@@ -167,7 +174,8 @@ fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Step
         trace: "machine.csv",
         motion: Motion::Rotary,
     };
-    write_text(&file("diagnosis.html"), html::page(&diagnosis::report(&findings)).as_bytes())?;
+    let report = diagnosis::report(&findings);
+    write_text(&file("diagnosis.html"), html::page(&linked(report.clone(), "diagnosis.html")).as_bytes())?;
 
     steps.next("turning a circle");
     let (parameters, effects) = (outcome.improved.parameters, outcome.improved.effects);
@@ -175,10 +183,11 @@ fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Step
     machine.name = "an XY table with the diagnosed axis".to_owned();
     let found = [found.clone(), found];
     let circle = super::circle::findings(&[machine.clone(), machine], Some(&found), &super::circle::Test::default())?;
-    write_text(&file("circle.html"), html::page(&crate::report::circle::report(&circle)).as_bytes())?;
+    let drawn = crate::report::circle::report(&circle);
+    write_text(&file("circle.html"), html::page(&linked(drawn.clone(), "circle.html")).as_bytes())?;
     let mut blocks = diagnosis::short(&findings);
     blocks.extend(crate::report::circle::short(&circle).into_iter().take(1));
-    Ok(blocks)
+    Ok(Hidden { said: blocks, diagnosis: report, circle: drawn })
 }
 
 /// Progress on the terminal: a line that says what is being done.

@@ -1,4 +1,5 @@
-//! The report of the demonstration: the paper's experiment through the FMU, its figures and its tables.
+//! The report of the demonstration: a machine that disagrees with its model, what that does to a circle, and, folded, the
+//! paper's experiment through the FMU with its figures and tables.
 
 use super::identify;
 use super::{Block, Cell, Report, Section, Table, Tone, Verdict};
@@ -23,9 +24,63 @@ pub struct Findings {
     pub lines: usize,
 }
 
-/// The whole report.
+/// The pages of the demonstration, by file and what each shows.
+const PAGES: [(&str, &str); 3] = [
+    (
+        "report.html",
+        "the demonstration: where the gap lies, what causes it, what it does to a circle; the paper's experiment",
+    ),
+    ("diagnosis.html", "the whole diagnosis: evidence, every cause that was tried, what to do next"),
+    ("circle.html", "the whole circular test: what each effect takes, the trace over the angle, the drives"),
+];
+
+/// A page with links to the others.
 #[must_use]
-pub fn report(f: &Findings) -> Report {
+pub fn linked(mut page: Report, own: &str) -> Report {
+    let mut table = Table::new("Pages of this demonstration", ["page", "what it shows"]);
+    for (file, what) in PAGES.into_iter().filter(|(file, _)| *file != own) {
+        table.row(vec![Cell::Link(file.to_owned(), file.to_owned()), Cell::text(what)]);
+    }
+    page.sections.push(Section::new("The other pages", vec![Block::Table(table)]));
+    page
+}
+
+/// Sections of the diagnosis that say where the gap lies, what causes it and how far it shrinks.
+const DIAGNOSIS: usize = 3;
+
+/// The whole report, from the reports of the diagnosis and of the circle.
+#[must_use]
+pub fn report(f: &Findings, diagnosis: &Report, circle: &Report) -> Report {
+    let mut sections: Vec<Section> = diagnosis.sections.iter().take(DIAGNOSIS).cloned().collect();
+    if let Some(first) = sections.first_mut() {
+        let what = "An FMU with hidden friction plays a machine; its noisy positions are diagnosed with a model that knows of no \
+                    friction.";
+        first.blocks.insert(0, Block::Paragraph(what.to_owned()));
+    }
+    if let Some(first) = circle.sections.first() {
+        sections.push(Section::new("What it does to a circle", first.blocks.clone()));
+    }
+    let mut paper = paper(f);
+    let mut folded = Vec::new();
+    for (k, section) in paper.sections.drain(..).enumerate() {
+        if k == 0 {
+            folded.extend(section.blocks);
+        } else {
+            folded.push(Block::Details(section.heading, section.blocks));
+        }
+    }
+    sections.push(Section::new("The paper's experiment, from FMU to parameters", folded));
+    let page = Report {
+        title: "A machine that disagrees with its model".to_owned(),
+        subject: "where, what, how far, and what a part would show of it; then the paper's own experiment".to_owned(),
+        sections,
+        footer: paper.footer,
+    };
+    linked(page, "report.html")
+}
+
+/// The paper's experiment.
+fn paper(f: &Findings) -> Report {
     let mut report = identify::report(&f.consistent, Some(&f.record));
     report.title = "The XY table's axis, from FMU to parameters".to_owned();
     let mut sections = vec![Section::new("", vec![Block::Verdict(verdict(f)), Block::KeyValues(experiment(f))])];

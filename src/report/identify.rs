@@ -439,25 +439,6 @@ fn unwrapped(measured: &[f64], model: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (measured, model)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_phase_that_passes_half_a_turn_does_not_jump() {
-        // A lag from -100 to -500 degrees, wrapped as an argument is, and measured with some degrees of noise.
-        let true_ones: Vec<f64> = (0..41).map(|k| -100.0 - 10.0 * f64::from(k)).collect();
-        let wrap = |d: f64| ((d + 180.0).rem_euclid(360.0) - 180.0).to_radians();
-        let model: Vec<f64> = true_ones.iter().map(|d| wrap(*d)).collect();
-        let measured: Vec<f64> = true_ones.iter().enumerate().map(|(k, d)| wrap(d + 40.0 * (k as f64).sin())).collect();
-        let (measured, model) = unwrapped(&measured, &model);
-        for (k, d) in true_ones.iter().enumerate() {
-            assert!((model[k] - d).abs() < 1e-9, "{k}: {} against {d}", model[k]);
-            assert!((measured[k] - d - 40.0 * (k as f64).sin()).abs() < 1e-9, "{k}: {}", measured[k]);
-        }
-    }
-}
-
 fn has_reference(found: &Identification) -> bool {
     found.methods.iter().flat_map(|m| m.parameters.iter().chain(&m.modal)).any(|e| e.reference.is_some())
 }
@@ -651,4 +632,23 @@ fn excited(spectrum: &Curve) -> Option<f64> {
     let last = spectrum.x.iter().zip(&spectrum.y).filter(|(_, y)| **y > 1e-2 * largest).map(|(x, _)| *x).next_back()?;
     let end = spectrum.x.last().copied()?;
     (1.5 * last < end).then_some(1.5 * last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_that_passes_half_a_turn_does_not_jump() {
+        // A lag from -100 to -500 degrees, wrapped as an argument is, and measured with some degrees of noise.
+        let true_ones: Vec<f64> = (0..41).map(|k| -100.0 - 10.0 * f64::from(k)).collect();
+        let wrap = |d: f64| ((d + 180.0).rem_euclid(360.0) - 180.0).to_radians();
+        let model: Vec<f64> = true_ones.iter().map(|d| wrap(*d)).collect();
+        let measured: Vec<f64> = true_ones.iter().enumerate().map(|(k, d)| wrap(d + 40.0 * (k as f64).sin())).collect();
+        let (measured, model) = unwrapped(&measured, &model);
+        for (k, d) in true_ones.iter().enumerate() {
+            assert!((model[k] - d).abs() < 1e-9, "{k}: {} against {d}", model[k]);
+            assert!((measured[k] - d - 40.0 * (k as f64).sin()).abs() < 1e-9, "{k}: {}", measured[k]);
+        }
+    }
 }

@@ -348,6 +348,20 @@ mod tests {
     }
 
     #[test]
+    fn reference_lines_stand_inside_the_axis_but_for_those_far_off() {
+        let data = [-1.0, 1.0];
+        for axis in [Axis::linear("a", "m"), Axis::linear("a", "m").over(Range::WithZero)] {
+            let s = Scale::holding(&axis, data.into_iter(), &[3.0, -2.5, f64::NAN], 5, 0.05);
+            assert!(s.share(3.0) < 1.0 && s.share(-2.5) > 0.0, "{s:?}");
+            // A line a hundred times as far as the data would leave nothing to be seen of them.
+            let s = Scale::holding(&axis, data.into_iter(), &[100.0], 5, 0.05);
+            assert!(s.share(100.0) > 1.0 && s.share(1.0) > 0.9, "{s:?}");
+        }
+        let s = Scale::holding(&Axis::log("a", "m"), [1.0, 10.0].into_iter(), &[100.0, -1.0], 5, 0.05);
+        assert!(s.share(100.0) < 1.0, "{s:?}");
+    }
+
+    #[test]
     fn degenerate_data_still_give_an_axis() {
         for values in
             [&[][..], &[f64::NAN], &[0.0], &[3.5, 3.5], &[1.0, 1.0 + 1e-16], &[f64::INFINITY, -1.0], &[1e300, -1e300]]

@@ -129,7 +129,7 @@ fn signs(line: &str) -> String {
     let mut out = String::with_capacity(line.len());
     for piece in line.split_inclusive([',', ';', '\t']) {
         let (field, end) = match piece.char_indices().last() {
-            Some((k, c)) if matches!(c, ',' | ';' | '\t') => piece.split_at(k),
+            Some((k, ',' | ';' | '\t')) => piece.split_at(k),
             _ => (piece, ""),
         };
         out.push_str(&sign(field));

@@ -34,7 +34,7 @@ pub(super) struct Reversal {
 
 impl Reversal {
     pub const fn axis(&self) -> Axis {
-        if self.quarter % 2 == 0 { Axis::X } else { Axis::Y }
+        if self.quarter.is_multiple_of(2) { Axis::X } else { Axis::Y }
     }
 
     const fn positive(&self) -> bool {

@@ -66,7 +66,7 @@ impl Machine {
                     self.spikes[q] * shape
                 })
                 .sum();
-            if k % 23 == 0 {
+            if k.is_multiple_of(23) {
                 jerk = if a.sin().abs() < 0.5 { self.jerks * normal() } else { 0.0 };
             }
             let shake = self.vibration.0 * (TAU * self.vibration.1 * t).sin();
@@ -117,11 +117,11 @@ fn every_deviation_of_a_machine_that_has_them_all_is_found_in_its_size() {
     let a = ALL.analysis();
     near(size(&a, Kind::Backlash(Axis::X)), 6.0, 0.2, "backlash X");
     near(size(&a, Kind::Backlash(Axis::Y)), 3.0, 0.2, "backlash Y");
-    let spikes = [Axis::X, Axis::Y].map(|axis| effect(&a, Kind::Spikes(axis)).heights.clone());
-    for turn in 0..2 {
-        for (q, height) in [8.0, 5.0, 6.0, 4.0].into_iter().enumerate() {
-            // The step of the play and a spike in it add up: what stands out beyond both is told of the spike.
-            near(1e6 * spikes[q % 2][turn][q], height, 0.6, &format!("spike {q} of turn {turn}"));
+    for (q, height) in [8.0, 5.0, 6.0, 4.0].into_iter().enumerate() {
+        let axis = if q.is_multiple_of(2) { Axis::X } else { Axis::Y };
+        // The step of the play and a spike in it add up: what stands out beyond both is told of the spike.
+        for turn in &effect(&a, Kind::Spikes(axis)).heights {
+            near(1e6 * turn[q], height, 0.6, &format!("spike {q}"));
         }
     }
     near(size(&a, Kind::Squareness), -30.0, 0.6, "squareness");
