@@ -145,6 +145,19 @@ pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, Me
             )));
         }
     }
+    // A file of arrays may hold some of other lengths.
+    let rows = table.rows();
+    for (c, header) in table.headers.iter().enumerate().filter(|(c, _)| columns[*c].0.is_some()) {
+        if let Ok(values) = table.column(c)
+            && values.len() != rows
+        {
+            return Err(failed(format!(
+                "column {} has {} values and another {rows}; a circular test needs as many of each",
+                header.name,
+                values.len()
+            )));
+        }
+    }
     let find = |wanted: Role| columns.iter().position(|(r, _)| *r == Some(wanted));
     let mut notes = Vec::new();
     let direction = find(Role::Direction).map(|c| table.column(c)).transpose()?.map(<[f64]>::to_vec);

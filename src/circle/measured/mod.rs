@@ -119,7 +119,8 @@ pub fn read(files: &[PathBuf], given: &Given) -> Result<Measured, MeasuredError>
     let (turns, centre) = turns(&paths, radius).ok_or_else(no_circle)?;
     for (turn, run) in turns.iter().zip(&chosen) {
         let worst = turn.deviation.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-        if worst > 0.1 * radius {
+        let broken = turn.deviation.iter().chain(&turn.angle).any(|d| !d.is_finite());
+        if worst > 0.1 * radius || broken {
             return Err(MeasuredError::File {
                 file: run.file.clone(),
                 what: format!(
@@ -269,7 +270,7 @@ fn split(table: &Table, said: &Said, file: &str, given: &Given) -> Result<Vec<Ru
                 let spare = 0.5 * (covered - TAU);
                 let way = |k: usize| (own[k] - own[0]).abs();
                 let first = (0..own.len()).find(|k| way(*k) >= spare).unwrap_or(0);
-                let last = (0..own.len()).rfind(|k| way(*k) <= spare + TAU).unwrap_or(own.len() - 1);
+                let last = (0..own.len()).rfind(|k| way(*k) <= spare + TAU).unwrap_or(own.len() - 1).max(first);
                 points = points.part(first, last + 1);
                 notes.push(format!("{:.0} degrees were measured; the middle turn is used.", covered.to_degrees()));
             }

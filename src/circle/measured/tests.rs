@@ -168,6 +168,15 @@ fn what_is_no_circular_test_is_said_with_file_place_and_way_out() {
         let error = read_text("a.csv", &text, &given).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(word), "{word}: {error}");
     }
+    // Numbers without sense are refused, not drawn.
+    for extreme in ["1e300", "-1e308", "1e-300", "0"] {
+        for head in ["x [m],y [m]\n", "angle [deg],radius [m]\n", "angle [rad],deviation [m]\n"] {
+            let text = rows(head, 0.0, 360.0, 720, &|_| extreme.to_owned());
+            if let Ok(m) = read_text("a.csv", &text, &Given { radius: Some(0.05), ..given.clone() }) {
+                assert!(m.turns.iter().flat_map(|t| &t.deviation).all(|d| d.is_finite()), "{head} {extreme}");
+            }
+        }
+    }
     let whole = rows("angle [deg],radius [mm]\n", 0.0, 360.0, 720, &fifty);
     let error = read_text("a.csv", &whole, &Given { radius: Some(-1.0), ..given.clone() }).unwrap_err().to_string();
     assert!(error.contains("greater than zero"), "{error}");
