@@ -106,9 +106,6 @@ fn evidence() -> Evidence {
     Evidence {
         located: Location {
             place: Some(Place::Motor),
-            by_place: Vec::new(),
-            weak: Some("One encoder sees the table through the model.".into()),
-            coarse: [None; 4],
             spread: Spread::Throughout,
             by_time: (0..8).map(|k| slot(f64::from(k))).collect(),
             by_frequency: vec![part("odd_lines", 0.8), part("turn_order_6", 0.1), part("mean", 1e-4)],
