@@ -1,4 +1,5 @@
-//! A cause that explains the record to the noise, but not the one held out, is none.
+//! A cause that explains the record to the noise, but not the one held out: the held-out record has no part in the verdict, and the
+//! sentence says that it contradicts it.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -12,7 +13,7 @@ use run::answered_in;
 const AXIS: &str = "[parameters]\nI1 = 2.37e-4\nI2 = 6.07e-6\nB = 5.4e-4\nK = 1.76e-2\n";
 
 #[test]
-fn a_load_that_hangs_on_the_other_side_in_the_held_out_record_explains_nothing() {
+fn a_load_that_hangs_on_the_other_side_in_the_held_out_record_is_said_to_be_contradicted() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let done = |arguments: &[&str]| answered_in(at, arguments);
@@ -29,8 +30,9 @@ fn a_load_that_hangs_on_the_other_side_in_the_held_out_record_explains_nothing()
         done(&["diagnose", "train.csv", "--axis", "axis.toml", "--holdout", holdout, "--json", "found.json"]);
         let found: Value = serde_json::from_slice(&std::fs::read(at.join("found.json")).unwrap()).unwrap();
         assert_eq!(found["ranking"][0]["id"], "load_motor");
-        found["verdict"].as_str().unwrap().to_owned()
+        assert_eq!(found["verdict"], "effect");
+        found["sentence"].as_str().unwrap().contains("contradicts")
     };
-    assert_eq!(verdict("same.csv"), "effect");
-    assert_eq!(verdict("other.csv"), "unexplained");
+    assert!(!verdict("same.csv"));
+    assert!(verdict("other.csv"));
 }

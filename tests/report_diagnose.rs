@@ -151,7 +151,6 @@ fn an_effect_is_named_with_its_place_its_size_and_what_it_means() {
         "odd lines that were not excited",
         "order 6 of the turn",
         "Explains 93 % of the residual",
-        "One encoder sees the table through the model.",
         "theta1 on held-out data",
     ] {
         assert!(page.contains(needle), "{needle}");

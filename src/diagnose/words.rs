@@ -19,7 +19,12 @@ pub fn fill(d: &mut Diagnosis, decision: &Decision) {
         ),
         Verdict::Effect => {
             let names: Vec<String> = d.causes.iter().map(|c| describe(&c.id, &c.place)).collect();
-            format!("{}: {} of the gap on held-out data closes with it.", names.join(", and "), percent(d.gap.closure))
+            let names = names.join(", and ");
+            if d.gap.closure < 0.0 {
+                format!("{names}, by the fitted record; the held-out record contradicts it: the error grows there.")
+            } else {
+                format!("{names}: {} of the gap on held-out data closes with it.", percent(d.gap.closure))
+            }
         }
         Verdict::Unexplained if only_rounding(d, decision) => {
             "Unexplained: what is left is the rounding of the readings, which is not among the effects that may be named."
