@@ -9,6 +9,7 @@
 
 use rayon::prelude::*;
 
+use super::super::model::Free;
 use super::super::verdict::Verdict;
 use super::fit::{Fit, Problem, Term};
 use super::likelihood::{Band, Discrepancy};
@@ -349,7 +350,7 @@ impl Search<'_> {
                 (0..best.terms.len()).into_par_iter().filter_map(|i| self.without(&best, i)).collect();
             pool.extend(all.iter().cloned());
             all.retain(|plain| {
-                !self.is_material(plain, &best) || {
+                !self.is_material(plain, &best) || is_lost(plain, &best) || {
                     let share = self.independent(std::slice::from_ref(&best));
                     self.evidence(plain, share) >= self.evidence(&best, share)
                 }
@@ -468,6 +469,17 @@ impl Search<'_> {
         let sum: f64 = lost.iter().sum();
         lost.iter().map(|l| if sum > 0.0 { l / sum } else { 1.0 / lost.len() as f64 }).collect()
     }
+}
+
+/// Whether the effect that the plainer lacks is below two standard errors of the richer's fit.
+fn is_lost(plain: &Fit, rich: &Fit) -> bool {
+    rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|(effect, _)| {
+        rich.coordinates
+            .iter()
+            .zip(&rich.std)
+            .filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == *effect) && !c.is_shape())
+            .all(|(c, std)| c.value(&rich.model).abs() < 2.0 * std)
+    })
 }
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
