@@ -1,5 +1,6 @@
 //! A record on its way to a verdict: cut, read, examined, and refused where it cannot carry one.
 
+use std::ops::Range;
 use std::path::Path;
 
 use crate::examine::{Examination, Input, Severity, examine};
@@ -29,8 +30,10 @@ pub fn finite(text: &str) -> Result<f64, String> {
 
 /// A record that was examined.
 pub struct Examined {
-    /// The longest usable piece.
+    /// The longest usable piece; or all from the first usable sample to the last.
     pub trace: Trace,
+    /// Stretches of that which are not usable.
+    pub idle: Vec<Range<usize>>,
     /// What the user should know: of the reading, and of the record.
     pub warnings: Vec<String>,
 }
@@ -69,7 +72,8 @@ impl Refused {
     }
 }
 
-/// Reads and examines a record; `known`: the machine's parameters are given and not the default.
+/// Reads and examines a record, from its first usable sample to the last; `known`: the machine's parameters are given and not the
+/// default.
 ///
 /// # Errors
 /// When it cannot be read; [`Refused`] when it cannot be believed and the user does not say so.
@@ -77,14 +81,29 @@ pub fn examined(path: &Path, machine: &Machine, known: bool, believed: Believed)
     let mut mapping = machine.signals.clone();
     (mapping.from, mapping.to) = (believed.from.or(mapping.from), believed.to.or(mapping.to));
     let loaded = load(path, &mapping)?;
-    judged(loaded, path, machine, known, believed.trust)
+    judged(loaded, path, machine, known, believed.trust, Extent::Whole)
+}
+
+/// What is taken of a record that has stretches of no use.
+pub enum Extent {
+    /// Its longest usable piece.
+    Longest,
+    /// All from the first usable sample to the last.
+    Whole,
 }
 
 /// Examines a record that was read.
 ///
 /// # Errors
 /// [`Refused`].
-pub fn judged(loaded: Loaded, path: &Path, machine: &Machine, known: bool, trust: bool) -> anyhow::Result<Examined> {
+pub fn judged(
+    loaded: Loaded,
+    path: &Path,
+    machine: &Machine,
+    known: bool,
+    trust: bool,
+    extent: Extent,
+) -> anyhow::Result<Examined> {
     let Loaded { mut trace, stamps, mut warnings } = loaded;
     // The table's position is its angle, where the lead of the screw is known.
     if let (false, Some(x2)) = (trace.has(Signal::Theta2), trace.get(Signal::X2))
@@ -105,7 +124,16 @@ pub fn judged(loaded: Loaded, path: &Path, machine: &Machine, known: bool, trust
             .filter(|f| f.severity != Severity::Note)
             .map(|f| format!("[{}] {}", f.id, f.sentence())),
     );
-    if let Some(piece) = examination.longest().filter(|p| p.len() < trace.len() && p.len() >= 64 && !trust) {
+    let usable = &examination.usable;
+    let taken = match extent {
+        Extent::Longest => examination.longest(),
+        Extent::Whole => usable.first().zip(usable.last()).map(|(first, last)| first.start..last.end),
+    };
+    let mut idle = Vec::new();
+    if let (Extent::Whole, Some(taken), false) = (&extent, &taken, trust) {
+        idle.extend(usable.windows(2).map(|w| w[0].end - taken.start..w[1].start - taken.start));
+    }
+    if let Some(piece) = taken.filter(|p| p.len() < trace.len() && p.len() >= 64 && !trust) {
         warnings.push(format!(
             "{}: {} of {} samples are used, {:.6} s to {:.6} s; another part is taken with --from and --to",
             path.display(),
@@ -116,5 +144,5 @@ pub fn judged(loaded: Loaded, path: &Path, machine: &Machine, known: bool, trust
         ));
         trace = trace.slice(piece);
     }
-    Ok(Examined { trace, warnings })
+    Ok(Examined { trace, idle, warnings })
 }

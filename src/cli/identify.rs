@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::say::say;
 use super::FINDINGS;
-use super::examined::{Believed, Refused, judged};
+use super::examined::{Believed, Extent, Refused, judged};
 use super::many::Many;
 use super::outputs;
 use crate::axis::{Scheme, Structure};
@@ -205,7 +205,7 @@ fn examine(
         let stream = Stream::open(path, &machine.signals)?;
         // The head of the record stands for it: a defect of a sensor or a unit shows there as well.
         let head = Loaded { trace: stream.head(EXAMINED)?, stamps: None, warnings: Vec::new() };
-        let seen = judged(head, path, &machine, axis.is_some(), args.believed.trust)?;
+        let seen = judged(head, path, &machine, axis.is_some(), args.believed.trust, Extent::Longest)?;
         let mut request = request(args, axis.is_some());
         request.methods.retain(|m| stream::METHODS.contains(m));
         anyhow::ensure!(!request.methods.is_empty(), "--stream: only --method ls and rls are computed piece by piece");
@@ -221,7 +221,7 @@ fn examine(
         needed.push(Signal::Theta2);
     }
     needed.into_iter().try_for_each(|s| loaded.trace.require(s).map(|_| ())).context(file.clone())?;
-    let seen = judged(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
+    let seen = judged(loaded, path, &machine, axis.is_some(), args.believed.trust, Extent::Longest)?;
     let mut result = identify(&seen.trace, &machine, &request(args, axis.is_some()), &file, progress).context(file)?;
     result.warnings.splice(0..0, seen.warnings);
     Ok((machine, result, Some(seen.trace)))

@@ -243,6 +243,7 @@ mod tests {
                 torque: silent(3000),
                 channels: [Some(silent(3000)), None, Some(silent(3000)), None],
                 noise: [1e-9; 4],
+                idle: Vec::new(),
             };
             let nothing = silent(3000);
             let made =

@@ -17,8 +17,7 @@ use crate::effects::{Effect, Place};
 const SAME: f64 = 0.1;
 
 /// Whether rounding makes the better part of the noise of a channel.
-#[must_use]
-pub fn dominates(noise: &NoiseEstimate) -> bool {
+fn dominates(noise: &NoiseEstimate) -> bool {
     noise.quantum.iter().zip(&noise.std).any(|(q, std)| q.is_some_and(|q| q * q / 12.0 > 0.5 * std * std))
 }
 

@@ -10,6 +10,7 @@ pub mod location;
 mod model;
 mod noise;
 mod record;
+mod repair;
 mod torque;
 mod verdict;
 mod words;

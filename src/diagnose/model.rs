@@ -1,24 +1,20 @@
 //! A model under test: parameters, structure, effects; and which of its numbers a fit may move.
 
 use crate::axis::{Parameters, Structure};
-use crate::effects::{Effect, Role, Settings};
-use crate::scalar::Scalar;
+use crate::effects::{Effect, MEMORY, Memory, Role, Settings, memory_of};
 
-/// The axis with its effects, as numbers of one kind.
+/// The axis with its effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Model<S = f64> {
+pub struct Model {
     /// Nominal or fitted parameters.
-    pub parameters: Parameters<S>,
+    pub parameters: Parameters,
     /// One inertia or two.
     pub structure: Structure,
     /// The effects' parameters.
-    pub effects: Settings<S>,
-    /// Where each of [`LOOPS`] stands in its loop when the record begins, -1 to 1.
-    pub loops: [S; LOOPS.len()],
+    pub effects: Settings,
+    /// What the effects remember when the record begins.
+    pub memory: Memory<f64>,
 }
-
-/// Effects whose torque hangs on all the motion before the record: what they remember at its beginning is fitted.
-pub const LOOPS: [Effect; 3] = [Effect::PreslidingMotor, Effect::PreslidingTable, Effect::CouplingHysteresis];
 
 /// A parameter of the nominal axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,7 +61,7 @@ impl BaseParameter {
     }
 
     /// Its place in the parameters.
-    pub fn slot<S>(self, p: &mut Parameters<S>) -> &mut S {
+    pub fn slot(self, p: &mut Parameters) -> &mut f64 {
         match self {
             Self::I1 => &mut p.i1,
             Self::I2 => &mut p.i2,
@@ -75,7 +71,8 @@ impl BaseParameter {
     }
 
     /// Its value.
-    pub fn value<S: Copy>(self, p: &Parameters<S>) -> S {
+    #[must_use]
+    pub const fn value(self, p: &Parameters) -> f64 {
         match self {
             Self::I1 => p.i1,
             Self::I2 => p.i2,
@@ -92,8 +89,8 @@ pub enum Free {
     Base(BaseParameter),
     /// Of an effect: which parameter.
     Effect(Effect, usize),
-    /// Where an effect, one of [`LOOPS`], stands when the record begins.
-    Loop(usize),
+    /// Where an effect stands in its loop when the record begins.
+    Loop(Effect),
 }
 
 /// Smallest share of its start that a size may shrink to.
@@ -166,12 +163,13 @@ impl Coordinate {
         match self.free {
             Free::Base(p) => p.value(&model.parameters),
             Free::Effect(e, i) => model.effects.of(e)[i],
-            Free::Loop(i) => model.loops[i],
+            Free::Loop(e) => model.memory[memory_of(e).start],
         }
     }
 
     /// The value at x.
-    pub fn at<S: Scalar>(&self, x: S) -> S {
+    #[must_use]
+    pub fn at(&self, x: f64) -> f64 {
         if self.log { x.exp() * self.unit } else { x * self.unit }
     }
 
@@ -183,10 +181,10 @@ impl Coordinate {
 }
 
 impl Model {
-    /// A model whose loops begin in their middle.
+    /// A model of an axis as its file describes it.
     #[must_use]
     pub const fn new(parameters: Parameters, structure: Structure, effects: Settings) -> Self {
-        Self { parameters, structure, effects, loops: [0.0; LOOPS.len()] }
+        Self { parameters, structure, effects, memory: [0.0; MEMORY] }
     }
 
     /// One hundredth of the critical damping.
@@ -195,19 +193,15 @@ impl Model {
         0.02 * (p.k / p.twist_mobility()).sqrt()
     }
 
-    /// The model at coordinates `x`, over the scalar of x.
-    pub fn at<S: Scalar>(&self, coordinates: &[Coordinate], x: &[S]) -> Model<S> {
-        let mut model = Model {
-            parameters: Parameters::lift(&self.parameters),
-            structure: self.structure,
-            effects: Settings::lift(&self.effects),
-            loops: self.loops.map(S::from),
-        };
+    /// The model at coordinates `x`.
+    #[must_use]
+    pub fn at(&self, coordinates: &[Coordinate], x: &[f64]) -> Self {
+        let mut model = *self;
         for (c, &x) in coordinates.iter().zip(x) {
             match c.free {
                 Free::Base(p) => *p.slot(&mut model.parameters) = c.at(x),
                 Free::Effect(e, i) => model.effects.of_mut(e)[i] = c.at(x),
-                Free::Loop(i) => model.loops[i] = c.at(x),
+                Free::Loop(e) => model.memory[memory_of(e).start] = c.at(x),
             }
         }
         model

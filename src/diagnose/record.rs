@@ -20,6 +20,8 @@ pub struct Record {
     pub channels: [Option<Vec<f64>>; 4],
     /// Standard deviation of the noise of each channel, in its unit; means nothing where the channel is `None`.
     pub noise: [f64; 4],
+    /// Stretches that tell nothing (the drive is off, the axis stands): they are followed, and not weighed.
+    pub idle: Vec<std::ops::Range<usize>>,
 }
 
 impl Record {
@@ -39,6 +41,11 @@ impl Record {
             torque: self.torque[range.clone()].to_vec(),
             channels: std::array::from_fn(|c| self.channels[c].as_ref().map(|v| v[range.clone()].to_vec())),
             noise: self.noise,
+            idle: (self.idle.iter())
+                .map(|r| r.start.max(range.start)..r.end.min(range.end))
+                .filter(|r| !r.is_empty())
+                .map(|r| r.start - range.start..r.end - range.start)
+                .collect(),
         }
     }
 
@@ -52,17 +59,5 @@ impl Record {
     #[must_use]
     pub fn time(&self, k: usize) -> f64 {
         self.start + k as f64 * self.dt
-    }
-
-    /// Whether anything of the motor is measured.
-    #[must_use]
-    pub const fn sees_motor(&self) -> bool {
-        self.channels[0].is_some() || self.channels[1].is_some()
-    }
-
-    /// Whether anything of the table is measured.
-    #[must_use]
-    pub const fn sees_table(&self) -> bool {
-        self.channels[2].is_some() || self.channels[3].is_some()
     }
 }

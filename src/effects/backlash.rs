@@ -27,6 +27,7 @@ impl Force for Backlash {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] <= 4.0 * x.twist,
         variants: &[Variant { name: "", free: &[0] }],
     };

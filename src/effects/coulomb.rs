@@ -78,6 +78,7 @@ impl DryFriction for CoulombMotor {
         memory: 0,
         named: true,
         textbook: true,
+        odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
         variants: VARIANTS,
     };
@@ -105,6 +106,7 @@ impl DryFriction for CoulombTable {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
         variants: VARIANTS,
     };

@@ -57,6 +57,7 @@ impl Force for CouplingHysteresis {
         memory: 1,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[1] <= 6.0 * x.twist,
         variants: &[Variant { name: "", free: &[0, 1] }, Variant { name: "sharp", free: &[0, 1, 2] }],
     };

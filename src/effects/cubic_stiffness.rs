@@ -20,6 +20,7 @@ impl Force for CubicStiffness {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };

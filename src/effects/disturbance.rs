@@ -27,6 +27,7 @@ impl Force for Disturbance {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0].abs() <= x.torque && x.holds(std::f64::consts::TAU * p[1]),
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };

@@ -89,6 +89,7 @@ impl Force for FlexibleMode {
         memory: 3,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: is_a_mode,
         variants: VARIANTS,
     };
@@ -119,6 +120,7 @@ impl Force for MotorMode {
         memory: 3,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: is_a_mode,
         variants: VARIANTS,
     };

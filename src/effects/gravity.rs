@@ -29,6 +29,7 @@ impl Force for Gravity {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| {
             p[0].hypot(p[1]) * (0.25 * p[2] * x.travel()).min(1.0) <= x.torque
                 && p[2] * x.travel() >= 0.5

@@ -2,15 +2,15 @@
 
 use super::Effect;
 use super::info::{Family, Place};
-use crate::axis::Structure;
+use crate::axis::{Motion, Structure};
 
 impl Effect {
-    /// Whether the effect can be told from a record of an axis of that structure: a rigid one has no coupling and no second
-    /// encoder, and of two laws that differ by their side alone the motor's stands for both.
+    /// Whether the effect can be told from a record of an axis of that structure and motion: a rigid one has no coupling and no second
+    /// encoder, and of two laws that differ by their side alone the motor's stands for both; a weight on a slide pulls alike everywhere.
     #[must_use]
-    pub fn may_be_named(self, structure: Structure) -> bool {
+    pub fn may_be_named(self, structure: Structure, motion: Motion) -> bool {
         let info = self.info();
-        if !info.named {
+        if !info.named || (motion == Motion::Linear && info.family == Family::Gravity) {
             return false;
         }
         if structure == Structure::TwoInertia {

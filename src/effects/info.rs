@@ -237,6 +237,8 @@ pub struct EffectInfo {
     pub named: bool,
     /// Whether it belongs to the textbook's friction model, whose combinations a diagnosis always compares.
     pub textbook: bool,
+    /// How often it is the cause before any record speaks, against another effect of the list.
+    pub odds: f64,
     /// Whether parameters are what physics lets the effect be on a record.
     pub bounds: fn(&[f64], &Extent<'_>) -> bool,
     /// The forms a diagnosis fits, the simplest first.

@@ -199,6 +199,7 @@ impl Input for TorqueGain {
         memory: 0,
         named: false,
         textbook: false,
+        odds: 1.0,
         bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };
@@ -242,6 +243,7 @@ impl Input for Saturation {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] >= 0.3 * x.torque && p[0] < x.torque,
         variants: &[Variant { name: "", free: &[0] }],
     };
@@ -273,6 +275,7 @@ impl Input for Delay {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] <= 12.0 * x.dt,
         variants: &[Variant { name: "", free: &[0] }],
     };
@@ -321,6 +324,7 @@ impl Input for ActuatorLag {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] * x.band <= 20.0,
         variants: &[Variant { name: "", free: &[0] }],
     };

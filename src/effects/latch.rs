@@ -33,6 +33,7 @@ impl Sensor for Latch {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 0.1,
         bounds: |p, x| p[0] <= 0.0 && p[0] >= -12.0 * x.dt && p[1] * x.band <= 5.0,
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "filtered", free: &[1] }],
     };

@@ -26,6 +26,7 @@ impl Force for LoadMotor {
         memory: 0,
         named: true,
         textbook: true,
+        odds: 1.0,
         bounds: |_, _| true,
         variants: VARIANTS,
     };
@@ -54,6 +55,7 @@ impl Force for LoadTable {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |_, _| true,
         variants: VARIANTS,
     };

@@ -107,10 +107,10 @@ macro_rules! effects {
                 match self { $(Self::$name => when!(input, $shape, true, false),)* }
             }
 
-            /// True for an effect on the positions' way out.
+            /// Whether it runs along a loop: its one internal state is where it stands there, -1 to 1.
             #[must_use]
-            pub const fn is_sensor(self) -> bool {
-                match self { $(Self::$name => when!(sensor, $shape, true, false),)* }
+            pub const fn loops(self) -> bool {
+                self.info().memory == 1
             }
 
             /// The parameter of a dry friction that is its level's share of the torque transmitted.

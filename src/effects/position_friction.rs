@@ -28,6 +28,7 @@ impl DryFriction for PositionFriction {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| {
             p[0] <= x.torque
                 && p[2] <= 0.25 * x.travel()

@@ -52,6 +52,7 @@ impl Force for PreslidingMotor {
         memory: 1,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
         variants: VARIANTS,
     };
@@ -78,6 +79,7 @@ impl Force for PreslidingTable {
         memory: 1,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
         variants: VARIANTS,
     };

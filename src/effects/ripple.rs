@@ -41,6 +41,7 @@ impl Force for TorqueRipple {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0].abs() <= x.torque && x.turns(p[1]),
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
@@ -71,6 +72,7 @@ impl Force for Unbalance {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0].abs() <= x.torque && x.turns(1.0),
         variants: &[Variant { name: "", free: &[0, 1] }],
     };

@@ -250,6 +250,7 @@ impl Sensor for SensorDelay {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, x| p[0] <= 12.0 * x.dt,
         variants: &[Variant { name: "", free: &[0] }],
     };
@@ -286,6 +287,7 @@ impl Sensor for LeadError {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |_, _| true,
         variants: &[
             Variant { name: "scale", free: &[0] },
@@ -318,6 +320,7 @@ impl Sensor for EncoderQuantisation {
         memory: 0,
         named: false,
         textbook: false,
+        odds: 1.0,
         bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };

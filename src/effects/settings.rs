@@ -257,22 +257,6 @@ impl<S: Scalar> Settings<S> {
         effect.with_law(React { p: self.of(effect), base, moment, memory })
     }
 
-    /// Puts the third inertia at a twist and a rate against the table, rad and rad/s, swinging freely.
-    #[cfg(feature = "cli")]
-    pub fn set_mode(&self, memory: &mut Memory<S>, twist: S, rate: S) {
-        let (p, at) = (self.of(Effect::FlexibleMode), MEMORY_OFFSETS[Effect::FlexibleMode as usize]);
-        let pull = p[1] * twist + p[2] * rate;
-        memory[at] = twist;
-        memory[at + 1] = rate;
-        memory[at + 2] = if p[0].re() > 0.0 { pull / p[0] } else { S::default() };
-    }
-
-    /// Puts an effect that loops where it stands in its loop, -1 to 1.
-    #[cfg(feature = "cli")]
-    pub fn set_loop(memory: &mut Memory<S>, effect: Effect, share: S) {
-        memory[MEMORY_OFFSETS[effect as usize]] = share;
-    }
-
     /// The torque on the motor over a step, from the torque commanded over it.
     pub fn transform_input(&self, on: &ActiveEffects, ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
         on.inputs.as_slice().iter().fold(ramp, |ramp, &e| e.transform_input(self.of(e), ramp, h, history))

@@ -37,6 +37,7 @@ impl Force for ViscousMotor {
         memory: 0,
         named: true,
         textbook: true,
+        odds: 1.0,
         bounds: |p, _| p[1].abs() <= 0.95,
         variants: VARIANTS,
     };
@@ -63,6 +64,7 @@ impl Force for ViscousTable {
         memory: 0,
         named: true,
         textbook: false,
+        odds: 1.0,
         bounds: |p, _| p[1].abs() <= 0.95,
         variants: VARIANTS,
     };

@@ -12,7 +12,7 @@ use serde::Serialize;
 /// Part of a residual in a class of lines, or in a band.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrequencyPart {
-    /// The residual: `r1`, `r2`, `coupling`, `sensor`.
+    /// The residual: `r1` or `r2`.
     pub residual: &'static str,
     /// What the part is: `mean`, `excited_lines`, `even_lines`, `odd_lines`, `foreign`, `turn_order_<n>`, or `band`.
     pub kind: String,

@@ -24,7 +24,7 @@ pub struct Bin {
 /// A residual against one variable.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateCurve {
-    /// The residual: `r1`, `r2`, or the input at the place found: `coupling`, `sensor`.
+    /// The residual: `r1` or `r2`.
     pub residual: &'static str,
     /// Its unit on a rotary axis.
     pub unit: &'static str,

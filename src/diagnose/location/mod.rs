@@ -1,7 +1,7 @@
 //! Where the gap lies, whatever its cause: in the chain, in time, in frequency, in state.
 //!
-//! The residual torques `r1`, `r2` are what the model lacks to follow the record ([`super::torque`]), in the sign of `I1*a1 + B*(w1 - w2) + K*(th1 - th2) - T`
-//! and `I2*a2 - B*(w1 - w2) - K*(th1 - th2)`: positive where a torque drives the axis that the model does not know.
+//! The residual torques `r1`, `r2` are what the model lacks to follow the record ([`super::torque`]), in the sign of
+//! `I1*a1 + B*(w1 - w2) + K*(th1 - th2) - T` and `I2*a2 - B*(w1 - w2) - K*(th1 - th2)`: positive where a torque drives the axis that the model does not know.
 
 mod by_frequency;
 mod by_state;
@@ -45,26 +45,20 @@ pub struct Location {
 pub struct Residual {
     /// Torque on the motor that the model does not know, N.m.
     pub r1: Vec<f64>,
-    /// Its standard deviation, N.m.
-    pub r1_std: Vec<f64>,
     /// The same on the table; empty for a rigid axis.
     pub r2: Vec<f64>,
-    /// Its standard deviation, N.m.
-    pub r2_std: Vec<f64>,
-    /// The unknown input at the place found: N.m, or rad of the table's encoder; zero where there is none.
+    /// That of the two at the place found, N.m.
     pub at_place: Vec<f64>,
     /// Smoothed `[theta1, omega1, theta2, omega2]`.
     pub states: Vec<[f64; 4]>,
-    /// Base parameters that were estimated together with the residual torques.
-    pub parameters: Option<Parameters>,
 }
 
 /// Where a residual torque on the one inertia of a rigid axis shows: in time, frequency and state.
 #[must_use]
 pub fn along(record: &Record, residual: Residual) -> Location {
     let flexible = !residual.r2.is_empty();
-    let by_state = state_curves(record, &residual, None, flexible);
-    let by_frequency = frequency_parts(record, &residual, None);
+    let by_state = state_curves(record, &residual, flexible);
+    let by_frequency = frequency_parts(record, &residual);
     let slots = by_time::by_time(
         record.start,
         record.dt,
@@ -103,37 +97,25 @@ pub fn without_offset(record: &Record, p: &Parameters, structure: Structure) -> 
     record
 }
 
-/// What the series at the place found is called, with its unit.
-fn name_of(place: Option<Place>) -> Option<(&'static str, &'static str)> {
-    match place {
-        Some(Place::Coupling) => Some(("coupling", "N.m")),
-        Some(Place::Sensor) => Some(("sensor", "rad")),
-        _ => None,
-    }
-}
-
-/// The series to look at: both residual torques, and the input at the place where it is neither.
-fn series<'a>(residual: &'a Residual, place: Option<Place>) -> Vec<((&'static str, &'static str), &'a [f64])> {
-    let mut all: Vec<((&'static str, &'static str), &'a [f64])> = vec![(("r1", "N.m"), &residual.r1)];
+/// The series to look at: both residual torques.
+fn series(residual: &Residual) -> Vec<((&'static str, &'static str), &[f64])> {
+    let mut all: Vec<((&'static str, &'static str), &[f64])> = vec![(("r1", "N.m"), &residual.r1)];
     if !residual.r2.is_empty() {
         all.push((("r2", "N.m"), &residual.r2));
-    }
-    if let Some(name) = name_of(place) {
-        all.push((name, &residual.at_place));
     }
     all
 }
 
-fn frequency_parts(record: &Record, residual: &Residual, place: Option<Place>) -> Vec<FrequencyPart> {
+fn frequency_parts(record: &Record, residual: &Residual) -> Vec<FrequencyPart> {
     let period = find_period(&record.torque);
     let theta1: Vec<f64> = residual.states.iter().map(|s| s[0]).collect();
-    series(residual, place)
+    series(residual)
         .into_iter()
         .flat_map(|((name, _), r)| by_frequency::by_frequency(name, r, &record.torque, &theta1, record.dt, period))
         .collect()
 }
 
-fn state_curves(record: &Record, residual: &Residual, place: Option<Place>, flexible: bool) -> Vec<StateCurve> {
+fn state_curves(record: &Record, residual: &Residual, flexible: bool) -> Vec<StateCurve> {
     let column = |f: &dyn Fn(&[f64; 4]) -> f64| residual.states.iter().map(f).collect::<Vec<_>>();
     let mut variables: Vec<by_state::Variable<'_>> = vec![
         ("omega1", "rad/s", column(&|s| s[1])),
@@ -150,7 +132,7 @@ fn state_curves(record: &Record, residual: &Residual, place: Option<Place>, flex
             ("twist rate", "rad/s", column(&|s| s[1] - s[3])),
         ]);
     }
-    series(residual, place)
+    series(residual)
         .into_iter()
         .flat_map(|(name, r)| variables.iter().filter_map(move |v| by_state::curve(name, r, v)).collect::<Vec<_>>())
         .collect()

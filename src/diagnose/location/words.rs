@@ -27,7 +27,6 @@ pub fn against(curves: &[StateCurve], residual: &str) -> Option<String> {
     let natural = |c: &&StateCurve| {
         let side = match residual {
             "r1" => ["omega1", "theta1 within the turn", "theta1", "T"],
-            "coupling" => ["twist", "twist rate", "omega1", "T"],
             _ => ["omega2", "theta2 within the turn", "theta2", "twist"],
         };
         side.iter().position(|s| *s == c.against).unwrap_or(side.len())

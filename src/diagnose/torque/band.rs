@@ -15,15 +15,24 @@ const STANDS: f64 = 4.0;
 /// Samples from which a record of two inertias is brought to the rate of its band, too.
 pub const LONG: usize = 20_000;
 
-/// Window with soft ends.
-pub fn mask(n: usize) -> Vec<f64> {
+/// Samples over which the window falls to an idle stretch.
+const SOFT: usize = 24;
+
+/// Window with soft ends, and none of it over idle stretches.
+pub fn mask(record: &Record) -> Vec<f64> {
+    let n = record.len();
+    let rise = |d: f64, edge: f64| {
+        if d >= edge { 1.0 } else { 0.5 * (1.0 - (std::f64::consts::PI * (d + 0.5) / edge).cos()) }
+    };
     let edge = (n as f64 * 0.05).max(8.0);
-    (0..n)
-        .map(|k| {
-            let d = (k.min(n - 1 - k)) as f64;
-            if d >= edge { 1.0 } else { 0.5 * (1.0 - (std::f64::consts::PI * (d + 0.5) / edge).cos()) }
-        })
-        .collect()
+    let mut mask: Vec<f64> = (0..n).map(|k| rise((k.min(n - 1 - k)) as f64, edge)).collect();
+    for idle in &record.idle {
+        for (k, w) in mask.iter_mut().enumerate().take(idle.end + SOFT).skip(idle.start.saturating_sub(SOFT)) {
+            let beside = idle.start.saturating_sub(k + 1).max(k.saturating_sub(idle.end));
+            *w *= if idle.contains(&k) { 0.0 } else { rise(beside as f64, SOFT as f64) };
+        }
+    }
+    mask
 }
 
 /// Smoothed spectra of the acceleration of a side and of its noise.
@@ -181,7 +190,8 @@ pub fn decimate(record: &Record, limit: f64) -> Record {
         record.channels[c].as_ref().map(|y| filter(y, c.is_multiple_of(2), &|f| Complex::new(low(f), 0.0)))
     });
     let noise = record.noise.map(|s| s / (every as f64).sqrt());
-    let out = Record { start: record.start, dt: slow, hold: Hold::Linear, torque, channels, noise };
+    let idle = record.idle.iter().map(|r| r.start / every..r.end / every).collect();
+    let out = Record { start: record.start, dt: slow, hold: Hold::Linear, torque, channels, noise, idle };
     let m = smooth(out.len());
     out.part(0..m)
 }

@@ -6,8 +6,8 @@
 //! C = D diag(n1, n2) D^H + diag(s1^2, s2^2)
 //! ```
 //!
-//! `n` the noise of the encoders seen as positions, `D` the axis' dynamic stiffness (of a reference model, the same for all
-//! hypotheses), `s^2` the discrepancy of each equation, white in the band, of the size that makes the likelihood largest (Kennedy,
+//! `n` the noise of the encoders seen as positions, `D` each model's own dynamic stiffness (with the density of readings over torques,
+//! `ln |det D|^2`, in the likelihood), `s^2` the discrepancy of each equation, white in the band, of the size that makes the likelihood largest (Kennedy,
 //! O'Hagan, JRSS B 63(3), 2001; Whittle, JRSS B 15, 1953). Without discrepancy this is the likelihood of output error, with a
 //! large one that of inverse dynamics. A side that is not measured is eliminated.
 
@@ -25,6 +25,8 @@ const DECADES: i32 = 12;
 const SCORINGS: usize = 30;
 /// Least variance of one equation's discrepancy over that of the other's, as accelerations.
 const CORNER: f64 = 2.5e-3;
+/// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor.
+const AT_FLOOR: f64 = 1.15;
 /// Bins over which the window spreads the noise.
 const SPREAD: f64 = 3.0;
 
@@ -57,6 +59,8 @@ pub struct Band {
     spread: Vec<f64>,
     /// What the noise makes of the reference.
     reference: Vec<Weight>,
+    /// Share of the record that is weighed.
+    weighed: f64,
 }
 
 /// What the encoders' noise makes in the equations of a model at a bin, and how dense its readings lie.
@@ -114,23 +118,15 @@ impl Band {
         };
         let mean = (mask.iter().map(|w| w * w).sum::<f64>() / n as f64).sqrt();
         let taper: Vec<f64> = mask.iter().map(|w| w / mean).collect();
+        let weighed = 1.0 - record.idle.iter().map(std::ops::Range::len).sum::<usize>() as f64 / n as f64;
         let step = std::f64::consts::TAU / (n as f64 * dt);
         let count = ((limit * std::f64::consts::TAU / step) as usize).clamp(4.min(n / 2), n / 2 - 1) + 1;
         let omega: Vec<f64> = (0..count).map(|m| m as f64 * step).collect();
         let weight = (0..count).map(|m| if m == 0 { 0.5 } else { 1.0 }).collect();
         let noise_of = |i: usize, w: f64| -> f64 {
-            let (y, v) = (record.channels[2 * i].is_some(), record.channels[2 * i + 1].is_some());
-            let (sy, sv) = (record.noise[2 * i].powi(2), record.noise[2 * i + 1].powi(2));
-            let low = w.max(0.5 * step);
-            match (y, v) {
-                (true, true) => {
-                    let c = record.noise[2 * i + 1] / record.noise[2 * i];
-                    let c = c.min(1.0 / dt);
-                    let f = c * c / (c * c + w * w);
-                    sy * f + (1.0 - f) * sv / (low * low) * f64::from(w > 0.0)
-                }
-                (true, false) => sy,
-                _ => sv / (low * low),
+            match record.channels[2 * i] {
+                Some(_) => record.noise[2 * i].powi(2),
+                None => (record.noise[2 * i + 1] / w.max(0.5 * step)).powi(2),
             }
         };
         // The window spreads what stands a few bins higher.
@@ -151,7 +147,8 @@ impl Band {
                 }
             })
             .collect();
-        let mut band = Self { n, dt, sight, taper, omega, weight, noise, combine, spread, reference: Vec::new() };
+        let mut band =
+            Self { n, dt, sight, taper, omega, weight, noise, combine, spread, reference: Vec::new(), weighed };
         band.reference = band.weights(reference);
         band
     }
@@ -501,12 +498,7 @@ impl Band {
             }
             share += (2.0 * a * a / (n * b)).min(1.0);
         }
-        share / self.equations() as f64
-    }
-
-    /// Power of each equation beyond the noise, N.m squared a sample of the band.
-    pub fn excess(&self, l: &Lacking) -> Discrepancy {
-        self.discrepancy(l)
+        self.weighed * share / self.equations() as f64
     }
 
     /// Mean power of the noise in an equation, N.m squared a sample of the band.
@@ -524,6 +516,11 @@ impl Band {
     pub fn noise_multiple(&self, l: &Lacking) -> f64 {
         let z = self.whiten(&l.rows, &l.weights, [0.0; 2]);
         (z.iter().map(|v| v * v).sum::<f64>() / self.values()).sqrt()
+    }
+
+    /// Whether a residual is at the noise's floor, which is an estimate itself.
+    pub fn at_floor(&self, l: &Lacking) -> bool {
+        self.noise_multiple(l).powi(2) < AT_FLOOR
     }
 
     /// Rms in the band of the torque lacking beyond what the noise makes, N.m; of two equations together.

@@ -8,6 +8,7 @@
 //! On a rigid axis motor, coupling and table are one place, called `axis`.
 
 mod band;
+mod descent;
 mod fit;
 mod gap;
 mod likelihood;
@@ -29,6 +30,7 @@ use super::lattice;
 use super::location::{Location, Residual, along, without_offset};
 use super::model::{BaseParameter, Free, Model};
 use super::record::{CHANNELS, Record};
+use super::repair::bridged;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
@@ -57,7 +59,7 @@ struct Prepared {
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
     let searched = prepared(&train, &case.nominal);
-    let may = |e: &crate::effects::Effect| e.may_be_named(case.nominal.structure) && !case.nominal.effects.is_on(*e);
+    let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects = case.suspects.iter().copied().filter(may).collect();
     let problem = Problem::new(&searched.record, &searched.band, case.nominal);
     let decision = decide(Search { problem, suspects, gap: [0.0; 2], progress });
@@ -97,7 +99,7 @@ fn residual(series: &[f64], tracked: &Tracked) -> Residual {
 /// The record that the fits see, and the one that they do not.
 fn split(case: &Case<'_>) -> (Record, Record) {
     let n = case.train.len();
-    let own = |r: &Record| without_offset(r, &case.nominal.parameters, case.nominal.structure);
+    let own = |r: &Record| without_offset(&bridged(r).0, &case.nominal.parameters, case.nominal.structure);
     match case.holdout {
         Some(other) => (own(case.train), own(other)),
         None => {
@@ -110,14 +112,8 @@ fn split(case: &Case<'_>) -> (Record, Record) {
 
 /// The record in the band of its motion.
 fn prepared(record: &Record, nominal: &Model) -> Prepared {
-    let mut whole = record.part(0..band::smooth(record.len()));
-    // A logged speed is mostly the position's difference, late: it adds nothing where the position itself is there.
-    for side in [0, 2] {
-        if whole.channels[side].is_some() {
-            whole.channels[side + 1] = None;
-        }
-    }
-    let mask = band::mask(whole.len());
+    let whole = record.part(0..band::smooth(record.len()));
+    let mask = band::mask(&whole);
     let limit = band::limit(&whole, &mask, nominal.structure);
     let record = if whole.len() > band::LONG || nominal.structure == Structure::Rigid {
         band::decimate(&whole, limit)
@@ -125,7 +121,7 @@ fn prepared(record: &Record, nominal: &Model) -> Prepared {
         whole
     };
     let record = if record.len() > SEARCHED { record.part(0..band::smooth(SEARCHED)) } else { record };
-    let mask = band::mask(record.len());
+    let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);
     // The noise is seen through the axis as it is, not as its data sheet has it.
     let reference =

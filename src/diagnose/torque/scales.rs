@@ -26,7 +26,7 @@ pub struct Scales {
 
 impl Scales {
     pub fn new(p: &Problem<'_>, fit: &Fit) -> Option<Self> {
-        let t = track(&fit.model, p.record, fit.bandwidth)?;
+        let t = track(&fit.model, p.record, p.bandwidth(fit.discrepancy))?;
         let n = t.motion.len() as f64;
         let rms = |f: &dyn Fn(&[f64; 4]) -> f64| (t.motion.iter().map(|m| f(m).powi(2)).sum::<f64>() / n).sqrt();
         let side = |i: usize| {

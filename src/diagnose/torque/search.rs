@@ -11,38 +11,45 @@ use rayon::prelude::*;
 
 use super::super::model::Free;
 use super::super::verdict::Verdict;
-use super::fit::{Fit, Problem, Term};
+use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
 use super::scales::Scales;
 use super::starts::{Regression, StartPoint, starts};
+use crate::axis::Structure;
 use crate::effects::Effect;
 
 /// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
 const MATERIAL: f64 = 0.25;
+/// The same of the first: several causes share a gap.
+const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
 const MINOR: f64 = 0.0025;
+/// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better.
+const NEGLIGIBLE: f64 = 2e-3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
 /// Smallest relative change of the parameters that is called one.
 const GAIN_SEEN: f64 = 0.02;
-/// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor, which is an estimate itself.
-const AT_FLOOR: f64 = 1.15;
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
 /// Effects whose richer forms are looked at, too.
 const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
+/// Most ways on from a hypothesis that was passed by.
+const AGAIN: usize = 3;
 /// Steps of a fit that is looked at, and how many of these are then fitted to their end.
 const PROBE: usize = 5;
 const DEEPENED: usize = 4;
-/// Steps of a fit at most.
-const STEPS: usize = 40;
+/// Variance of what a few steps leave, over that of the best, from which no further ones are made.
+const HOPELESS: f64 = 30.0;
 /// Share of the gap's power that the causes must explain together to be called its causes.
 const EXPLAINED: f64 = 0.75;
 /// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
 /// suspect. The share left also counts against each cause's probability.
 const LEFT: f64 = 0.25;
+/// Probability from which an effect may be named: as likely as one of two that the record cannot tell, and a remainder beside them.
+const LIKELY: f64 = 0.35;
 /// The same where no cause is named and the residual is not white: more than a torque sensor's own error.
 const UNCAUSED: f64 = 0.15;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
@@ -109,6 +116,9 @@ impl Decision {
     #[must_use]
     pub fn torque_gain(&self) -> Option<(f64, f64)> {
         let f = &self.parameters;
+        if f.coordinates.is_empty() {
+            return None;
+        }
         let change = |i: usize| (f.coordinates[i].value(&f.model) / f.coordinates[i].unit).ln();
         let first = change(0);
         // A rigid axis has one parameter: its change and a gain are the same thing.
@@ -145,10 +155,10 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = vec![given.clone(), parameters.clone()];
     let mut chosen = search.climb(parameters.clone(), &mut pool);
-    if !search.at_floor(&chosen) {
+    if !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
         // All of the textbook's combinations, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
-        let textbook = search.textbook(&parameters);
+        let textbook = search.textbook(&parameters, &chosen);
         pool.extend(textbook.iter().cloned());
         let share = search.independent(&textbook);
         if let Some(first) = search.best(&textbook, share).filter(|f| f.terms != chosen.terms).cloned() {
@@ -158,6 +168,11 @@ pub fn decide(mut search: Search<'_>) -> Decision {
                 chosen = other;
             }
         }
+    }
+    // What was fitted along the way, and is likelier than where the way led, is gone on from.
+    for _ in 0..AGAIN {
+        let Some(better) = search.overlooked(&chosen, &pool) else { break };
+        chosen = search.climb(better, &mut pool);
     }
     search.conclude(given, parameters, chosen, pool)
 }
@@ -182,48 +197,40 @@ impl Search<'_> {
     }
 
     fn at_floor(&self, fit: &Fit) -> bool {
-        self.band().noise_multiple(&fit.rows).powi(2) < AT_FLOOR
+        self.band().at_floor(&fit.rows)
     }
 
     /// Every combination of the textbook's effects at the motor, each from its own regression.
-    fn textbook(&self, parameters: &Fit) -> Vec<Fit> {
+    fn textbook(&self, parameters: &Fit, chosen: &Fit) -> Vec<Fit> {
         let own: Vec<Term> = self
             .suspects
             .iter()
             .filter(|e| e.info().textbook)
             .flat_map(|e| (0..e.info().variants.len().min(2)).map(|v| (*e, v)))
             .collect();
-        let mut sets: Vec<Vec<Term>> = vec![Vec::new()];
-        for &term in &own {
-            let more: Vec<Vec<Term>> = sets
-                .iter()
-                .filter(|s| s.iter().all(|t| t.0 != term.0))
-                .map(|s| s.iter().copied().chain([term]).collect())
+        // A set begins with a shorter one, which is fitted before it.
+        let mut all: Vec<Fit> = Vec::new();
+        let mut shorter = vec![(parameters.clone(), 0)];
+        while !shorter.is_empty() {
+            let longer: Vec<(Fit, usize)> = shorter
+                .par_iter()
+                .flat_map_iter(|(fit, next)| own[*next..].iter().zip(*next..).map(move |(term, i)| (fit, *term, i)))
+                .filter(|(fit, term, _)| self.may_join(&fit.terms, term.0))
+                .filter_map(|(fit, term, i)| {
+                    let start = self.starts_of(fit, term).into_iter().next()?;
+                    let terms: Vec<Term> = fit.terms.iter().copied().chain([term]).collect();
+                    Some((self.problem.fit(&start.model, &terms, fit.discrepancy, PROBE)?, i + 1))
+                })
                 .collect();
-            sets.extend(more);
+            all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
+            shorter = longer;
         }
-        sets.retain(|s| s.len() > 1);
-        let probed = sets
-            .par_iter()
-            .filter_map(|terms| {
-                let mut fit = parameters.clone();
-                for i in 0..terms.len() {
-                    let start = self.starts_of(&fit, terms[i]).into_iter().next()?;
-                    fit = self.problem.fit(
-                        &start.model,
-                        &terms[..=i],
-                        fit.discrepancy,
-                        if i + 1 == terms.len() { PROBE } else { 2 },
-                    )?;
-                }
-                Some(fit)
-            })
-            .collect();
-        self.deepened(probed)
+        self.deepened(all, Some(chosen))
     }
 
     fn starts_of(&self, fit: &Fit, term: Term) -> Vec<StartPoint> {
         let Some(scales) = &self.problem.scales else { return Vec::new() };
+        let fit = &self.problem.along_the_record(fit);
         starts(&self.problem, fit, &Regression::new(&self.problem, fit), scales, term)
     }
 
@@ -235,36 +242,72 @@ impl Search<'_> {
     /// Adds, drops and exchanges effects as long as the evidence grows.
     fn climb(&self, from: Fit, pool: &mut Vec<Fit>) -> Fit {
         let mut best = from;
-        for _ in 0..MOST {
-            if self.at_floor(&best) || best.terms.len() >= MOST {
+        for _ in 0..2 * MOST {
+            if self.at_floor(&best) || self.leaves_little(&best) || self.is_negligible(&best) {
                 break;
             }
             (self.progress)(&format!("{} hypotheses fitted", pool.len()));
-            let added = self.added(&best, best.terms.len());
-            pool.extend(added.iter().cloned());
-            let material = |f: &&Fit| best.terms.is_empty() || self.is_material(&best, f);
-            let all: Vec<Fit> = added.iter().filter(material).cloned().collect();
-            let share = self.independent(&all);
-            let Some(next) = self.best(&all, share) else { break };
-            if self.evidence(next, share) <= self.evidence(&best, share) {
+            if let Some(next) = self.joined(&best, pool) {
+                best = self.pruned(next, pool);
+                continue;
+            }
+            // What was named first was named without the others.
+            let other = self.exchanged(best.clone(), pool);
+            if other.terms == best.terms {
                 break;
             }
-            best = self.exchanged(next.clone(), pool);
-            best = self.pruned(best, pool);
+            best = self.pruned(other, pool);
         }
         best
+    }
+
+    /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
+    fn overlooked(&self, chosen: &Fit, pool: &[Fit]) -> Option<Fit> {
+        if self.at_floor(chosen) || self.leaves_little(chosen) || self.is_negligible(chosen) {
+            return None;
+        }
+        let share = self.independent(std::slice::from_ref(chosen));
+        let rivals: Vec<Fit> = pool.iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= MOST).cloned().collect();
+        let best = self.best(&rivals, share)?;
+        (self.evidence(best, share) > self.evidence(chosen, share) + ALIKE).then(|| best.clone())
+    }
+
+    /// The fit with the effect that explains the most beside it; `None` where none is a material cause.
+    fn joined(&self, best: &Fit, pool: &mut Vec<Fit>) -> Option<Fit> {
+        if best.terms.len() >= MOST {
+            return None;
+        }
+        let added = self.added(best, best.terms.len());
+        pool.extend(added.iter().cloned());
+        let all: Vec<Fit> = added.into_iter().filter(|f| self.is_material(best, f)).collect();
+        let share = self.independent(&all);
+        let next = self.best(&all, share)?;
+        (self.evidence(next, share) > self.evidence(best, share)).then(|| next.clone())
+    }
+
+    /// Whether what a fit leaves is too little of the gap for any further cause in it.
+    fn leaves_little(&self, fit: &Fit) -> bool {
+        (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
+    }
+
+    /// Whether what a fit leaves is less than a log's torque is true to. (A coupling shows less in its twist.)
+    fn is_negligible(&self, fit: &Fit) -> bool {
+        self.problem.nominal.structure == Structure::Rigid
+            && self.band().torque_share(fit.discrepancy, self.problem.record) < NEGLIGIBLE
     }
 
     /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
     fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
+        let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
         (0..self.band().equations())
-            .any(|i| after[i] <= (1.0 - MATERIAL) * before[i] && before[i] - after[i] >= MINOR * self.gap[i])
+            .any(|i| after[i] <= (1.0 - share) * before[i] && before[i] - after[i] >= MINOR * self.gap[i])
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
         let Some(scales) = &self.problem.scales else { return Vec::new() };
+        let fit = &self.problem.along_the_record(fit);
         let regression = Regression::new(&self.problem, fit);
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
         let of = |terms: Vec<Term>| -> Vec<StartPoint> {
@@ -295,16 +338,18 @@ impl Search<'_> {
                 self.problem.fit(&s.model, &terms, fit.discrepancy, PROBE)
             })
             .collect();
-        self.deepened(probed)
+        self.deepened(probed, None)
     }
 
-    /// Fits of a few steps, the best of them fitted to their end.
-    fn deepened(&self, mut probed: Vec<Fit>) -> Vec<Fit> {
+    /// Fits of a few steps, the best of them fitted to their end; what is hopelessly far behind the best is not.
+    fn deepened(&self, mut probed: Vec<Fit>, rival: Option<&Fit>) -> Vec<Fit> {
         let share = self.independent(&probed);
         probed.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
+        let best = rival.or(probed.first()).map_or([0.0; 2], |f| f.discrepancy);
+        let hopeless = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > HOPELESS * best[i]);
         probed.par_iter_mut().take(DEEPENED).for_each(|f| {
-            if f.iterations >= PROBE
-                && let Some(more) = self.problem.fit(&f.model, &f.terms, f.discrepancy, STEPS)
+            if !hopeless(f)
+                && let Some(more) = self.problem.deepen(f)
             {
                 *f = more;
             }
@@ -318,13 +363,14 @@ impl Search<'_> {
         let (gone, _) = terms.remove(i);
         let mut start = fit.model;
         start.effects.of_mut(gone).copy_from_slice(self.problem.nominal.effects.of(gone));
-        self.problem.fit(&start, &terms, fit.discrepancy, STEPS)
+        let plain = self.problem.fit(&start, &terms, fit.discrepancy, PROBE)?;
+        self.problem.deepen(&plain)
     }
 
     /// Each effect in turn exchanged for another that explains the record better.
     fn exchanged(&self, fit: Fit, pool: &mut Vec<Fit>) -> Fit {
         let mut best = fit;
-        if best.terms.len() < 2 || self.at_floor(&best) {
+        if best.terms.len() < 2 {
             return best;
         }
         for i in 0..best.terms.len() {
@@ -378,17 +424,11 @@ impl Search<'_> {
         let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let settled = self.at_floor(&chosen) || white;
         let left = self.band().torque_share(chosen.discrepancy, self.problem.record);
-        let verdict = match chosen.terms.is_empty() {
-            false if left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
-            false => Verdict::Unexplained,
-            true if !settled && left > UNCAUSED => Verdict::Unexplained,
-            true if chosen.coordinates.is_empty() => Verdict::NoGap,
-            true => Verdict::Parameters,
-        };
         // What the chosen hypothesis lacks no material part of is no rival of it, only itself and something small.
-        pool.retain(|f| {
-            f.terms.len() <= chosen.terms.len() || !chosen.terms.iter().all(|t| f.terms.iter().any(|o| o.0 == t.0))
-        });
+        // Of accounts that leave next to nothing of the gap the shorter is told.
+        let little = self.leaves_little(&chosen);
+        let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
+        pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
         let mut ranking = self.weighed(pool, independent);
         let probabilities: Vec<f64> = chosen
             .terms
@@ -402,6 +442,23 @@ impl Search<'_> {
                 of * (1.0 - 0.5 * (1.0 - explained).clamp(0.0, 1.0)) * (1.0 - left).clamp(0.0, 1.0)
             })
             .collect();
+        let likely = |p: &f64| *p >= LIKELY;
+        if chosen.terms.len() > 1
+            && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
+            && !likely(&probabilities[least])
+            && let Some(plain) = self.without(&chosen, least)
+        {
+            let pool = ranking.into_iter().map(|w| w.fit).collect();
+            return self.conclude(given, parameters, plain, pool);
+        }
+        let likely = probabilities.iter().all(likely);
+        let verdict = match chosen.terms.is_empty() {
+            false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
+            false => Verdict::Unexplained,
+            true if !settled && left > UNCAUSED => Verdict::Unexplained,
+            true if chosen.coordinates.is_empty() => Verdict::NoGap,
+            true => Verdict::Parameters,
+        };
         ranking.truncate(40);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
         let shares = self.shares(&chosen);
@@ -410,7 +467,7 @@ impl Search<'_> {
 
     /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.
     fn explained(&self, parameters: &Fit, chosen: &Fit) -> f64 {
-        let (before, after) = (self.band().excess(&parameters.rows), self.band().excess(&chosen.rows));
+        let (before, after) = (self.band().discrepancy(&parameters.rows), self.band().discrepancy(&chosen.rows));
         let i = (0..self.band().equations())
             .max_by(|a, b| {
                 let seen = |i: usize| before[i] / self.band().noise_power(i).max(f64::MIN_POSITIVE);
@@ -452,7 +509,7 @@ impl Search<'_> {
 
     /// Share of each effect: what comes back without it, everything else as it is.
     fn shares(&self, fit: &Fit) -> Vec<f64> {
-        let own = self.band().excess(&fit.rows);
+        let own = self.band().discrepancy(&fit.rows);
         let lost: Vec<f64> = fit
             .terms
             .iter()
@@ -460,7 +517,7 @@ impl Search<'_> {
                 let mut model = fit.model;
                 model.effects.of_mut(*e).copy_from_slice(self.problem.nominal.effects.of(*e));
                 let Some(rows) = self.problem.rows(&model, fit.bandwidth) else { return 1.0 };
-                let without = self.band().excess(&rows);
+                let without = self.band().discrepancy(&rows);
                 (0..self.band().equations())
                     .map(|i| (without[i] - own[i]).max(0.0) / self.band().noise_power(i).max(f64::MIN_POSITIVE))
                     .sum::<f64>()
@@ -469,6 +526,11 @@ impl Search<'_> {
         let sum: f64 = lost.iter().sum();
         lost.iter().map(|l| if sum > 0.0 { l / sum } else { 1.0 / lost.len() as f64 }).collect()
     }
+}
+
+/// Whether a fit has all effects of another, and more.
+fn is_more(fit: &Fit, than: &Fit) -> bool {
+    fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
 /// Whether the effect that the plainer lacks is below two standard errors of the richer's fit.

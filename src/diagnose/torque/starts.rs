@@ -110,6 +110,9 @@ fn normalise(v: &mut [f64]) -> bool {
     true
 }
 
+/// Share of the rms speed below which an axis that reverses is seen often enough.
+const SLOW: f64 = 0.3;
+
 /// Frequencies (Hz) at which a side's residual stands out.
 fn frequencies(p: &Problem<'_>, reg: &Regression, side: usize) -> Vec<f64> {
     let per = 2 * p.band.equations();
@@ -162,11 +165,11 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
         bins[at.min(BINS - 1)] += C::new(z[k].re * band.taper[k], 0.0);
     }
     FftPlanner::new().plan_fft_forward(4 * BINS).process(&mut bins);
-    // Not faster than the band at the rms speed, at least half a period over the range.
+    // Not faster than the band where the axis is slow, at least half a period over the range.
     let speed =
         (t.motion.iter().map(|m| m[2 * side + 1].powi(2)).sum::<f64>() / t.motion.len() as f64).sqrt().max(1e-12);
     let step = std::f64::consts::TAU / (4.0 * range);
-    let top = ((band.omega.last()? / speed / step) as usize).min(BINS / 2);
+    let top = ((band.omega.last()? / (SLOW * speed) / step) as usize).min(BINS / 2);
     let power: Vec<f64> = (0..=top).map(|m| if m < 3 { 0.0 } else { bins[m].norm_sqr() }).collect();
     Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
 }

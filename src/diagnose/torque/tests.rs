@@ -36,7 +36,15 @@ fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn
         let acts = command + foreign(t);
         state = axis.advance(&state, Ramp { start: acts, end: acts }, t);
     }
-    Record { start: 0.0, dt: DT, hold: Hold::Zoh, torque, channels: [Some(theta), None, None, None], noise: [1e-6; 4] }
+    Record {
+        start: 0.0,
+        dt: DT,
+        hold: Hold::Zoh,
+        torque,
+        channels: [Some(theta), None, None, None],
+        noise: [1e-6; 4],
+        idle: Vec::new(),
+    }
 }
 
 fn diagnosed(record: &Record, nominal: f64) -> Outcome {

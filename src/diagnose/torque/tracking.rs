@@ -12,10 +12,10 @@
 //! output error) or the measured one (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a
 //! Kalman filter does.
 
-use super::super::model::{LOOPS, Model};
+use super::super::model::Model;
 use super::super::record::Record;
 use crate::axis::{Axis, Hold, Scheme, Structure, substeps};
-use crate::effects::{Ramp, Settings, TorqueHistory};
+use crate::effects::{Ramp, TorqueHistory};
 
 /// What the model lacks, and the motion it was lacking it along.
 #[derive(Debug, Clone)]
@@ -42,6 +42,8 @@ pub type Bandwidth = [f64; 2];
 
 /// Largest torque and error that are told.
 const LARGEST: f64 = 1e100;
+/// Bandwidth times time with which the feedback starts: that of the straight line through all samples so far.
+const GROWING: f64 = 2.5;
 /// Damping ratio of the feedback.
 const DAMPING: f64 = 0.7;
 
@@ -68,22 +70,18 @@ fn track_with(
     let p = &model.parameters;
     let inertia = if rigid { [p.i1 + p.i2, 0.0] } else { [p.i1, p.i2] };
     let position = [record.channels[0].as_deref(), record.channels[2].as_deref()];
+    // A logged speed is mostly the position's difference, late: it adds nothing where the position itself is there.
     let speed = [record.channels[1].as_deref(), record.channels[3].as_deref()];
     let sides: Vec<usize> = (0..2).filter(|&i| position[i].is_some() || speed[i].is_some()).collect();
-    let gains = bandwidth.map(|w| {
-        let x = (w * dt).min(0.6);
-        [x * x, 2.0 * DAMPING * x]
-    });
-    // A complementary filter of position and speed crosses over where their noises are alike.
-    let crossover = [0, 1].map(|i| (record.noise[2 * i + 1] / record.noise[2 * i] * dt).min(1.0));
+    // From a state that is little known the gain falls, as a Kalman filter's does, to what the bandwidth asks.
+    let gains_at = |k: usize| {
+        bandwidth.map(|w| {
+            let x = (w * dt).max(GROWING / (k + 1) as f64).min(0.6);
+            [x * x, 2.0 * DAMPING * x]
+        })
+    };
     let first = initial(record);
-    let mut memory = [0.0; crate::effects::MEMORY];
-    for (effect, share) in LOOPS.iter().zip(&model.loops) {
-        if axis.on().forces().contains(effect) {
-            Settings::set_loop(&mut memory, *effect, *share);
-        }
-    }
-    let mut state = axis.resume(first, &memory, record.start);
+    let mut state = axis.resume(first, &model.memory, record.start);
     let mut inputs = TorqueHistory::settled(*record.torque.first()?);
     let sensed = !axis.on().sensors().is_empty();
     let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), dt));
@@ -91,7 +89,6 @@ fn track_with(
     let mut given = [vec![0.0; n], vec![0.0; n]];
     let mut motion = Vec::with_capacity(n);
     let mut before = [f64::NAN; 2];
-    let mut fused = [0.0; 2];
     for k in 0..n {
         let time = record.start + k as f64 * dt;
         let reading = match &history {
@@ -105,26 +102,15 @@ fn track_with(
         }
         motion.push([now.theta1, now.omega1, now.theta2, now.omega2]);
         let mut push = [0.0; 2];
+        let gains = gains_at(k);
         for &i in &sides {
             let [g1, g2] = gains[i];
             let d = match (position[i], speed[i]) {
-                (Some(y), v) => {
+                (Some(y), _) => {
                     let e = y[k] - own[i][0];
-                    let ev = v.map(|v| v[k] - own[i][1]);
                     let rate = if before[i].is_nan() { 0.0 } else { e - before[i] };
                     before[i] = e;
-                    error[i][k] = match ev {
-                        Some(ev) => {
-                            if k == 0 {
-                                fused[i] = e;
-                            }
-                            fused[i] += crossover[i] * (e - fused[i]);
-                            let at = fused[i];
-                            fused[i] += ev * dt;
-                            at
-                        }
-                        None => e,
-                    };
+                    error[i][k] = e;
                     g1 * e + g2 * rate
                 }
                 (None, Some(v)) => {
@@ -191,7 +177,6 @@ fn lacking(model: &Model, dt: f64, inertia: [f64; 2], error: &[Vec<f64>; 2], giv
 /// The state at the first sample: positions as measured, speeds from the first samples; a side that is not measured moves with the other.
 fn initial(record: &Record) -> [f64; 4] {
     let side = |i: usize| -> Option<[f64; 2]> {
-        let speed = record.channels[2 * i + 1].as_ref().map(|v| v[0]);
         match &record.channels[2 * i] {
             Some(y) => {
                 let m = y.len().min(6);
@@ -201,9 +186,9 @@ fn initial(record: &Record) -> [f64; 4] {
                     a += (j as f64 - mean) * (v - y[0]);
                     b += (j as f64 - mean).powi(2);
                 }
-                Some([y[0], speed.unwrap_or(if b > 0.0 { a / b / record.dt } else { 0.0 })])
+                Some([y[0], if b > 0.0 { a / b / record.dt } else { 0.0 }])
             }
-            None => speed.map(|v| [0.0, v]),
+            None => record.channels[2 * i + 1].as_ref().map(|v| [0.0, v[0]]),
         }
     };
     let (motor, table) = (side(0), side(1));

@@ -1,0 +1,297 @@
+//! The way down from a start to the likeliest parameters of a hypothesis.
+//!
+//! Levenberg and Marquardt's method on what the model lacks, every column a simulation of its own; in turn with it the likeliest
+//! discrepancy at these parameters, and the likeliest bandwidth at which the model follows the record. A discrepancy shrinks step by
+//! step, so that a fit from afar comes in along the motion as measured before the noise's own sharpness holds it in some valley. Near
+//! the noise the motion as measured has reversals and blows of the noise in it: there the model is let go along its own motion, as far
+//! as that is likelier.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::super::model::{BaseParameter, Coordinate, Free, Model};
+use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
+use super::likelihood::{C, Discrepancy, Lacking};
+use super::tracking::Bandwidth;
+
+/// Steps tried, each shorter than the one before, until one is better.
+const TRIALS: usize = 7;
+/// Steps in which the shapes of effects are held.
+const SIZES_FIRST: usize = 1;
+/// Largest step of a logarithm.
+const FARTHEST_STEP: f64 = 0.5;
+/// Share of a discrepancy's variance that is left at least from one step to the next.
+const SHRINKS: f64 = 0.01;
+/// Change of a discrepancy, in the logarithm of its variance, below which it is settled.
+const SETTLED: f64 = 0.05;
+/// Gain in log likelihood below which a fit is done.
+const WORTH: f64 = 0.05;
+/// Change of the feedback's bandwidth, in its logarithm, from which the motion is followed anew.
+const ANOTHER: f64 = 0.4;
+/// Share of the feedback's bandwidth at which a fit looks whether it is likelier.
+const LOOSER: f64 = 0.4;
+/// Share of the bandwidth of a fit at its end at which another is tried, and its steps.
+const SHARPER: f64 = 0.25;
+const SHARPENING: usize = 6;
+
+/// A model along the record.
+#[derive(Clone)]
+pub struct Along {
+    pub model: Model,
+    pub rows: Lacking,
+    pub s: Discrepancy,
+    pub bandwidth: Bandwidth,
+}
+
+/// A hypothesis on its way to the likeliest parameters.
+#[derive(Clone)]
+pub struct Descent<'a> {
+    problem: &'a Problem<'a>,
+    terms: &'a [Term],
+    coordinates: Vec<Coordinate>,
+    at: Along,
+    std: Vec<f64>,
+    columns: Vec<[Vec<C>; 2]>,
+    iterations: usize,
+}
+
+impl<'a> Descent<'a> {
+    pub fn new(problem: &'a Problem<'a>, start: &Model, terms: &'a [Term], from: Discrepancy) -> Option<Self> {
+        let free = problem.free(terms);
+        let coordinates = free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
+        let at = problem.along(start, problem.bandwidth(from))?;
+        Some(Self { problem, terms, coordinates, at, std: Vec::new(), columns: Vec::new(), iterations: 0 })
+    }
+
+    /// At most so many steps, each followed at the likeliest bandwidth.
+    pub fn run(&mut self, effort: usize) -> Option<()> {
+        self.steps(effort, true)
+    }
+
+    /// Steps at lower and lower bandwidths, as long as they end likelier: the likeliest parameters along the measured motion are off by
+    /// what its noise does to the effects, and there the model drifts away from the record.
+    pub fn sharpen(&mut self) -> Option<()> {
+        let least = self.problem.bandwidth([0.0; 2]);
+        while !self.problem.band.at_floor(&self.at.rows) {
+            let bandwidth = [0, 1].map(|i| (SHARPER * self.at.bandwidth[i]).max(least[i]));
+            if !differ(bandwidth, self.at.bandwidth) {
+                break;
+            }
+            let mut other = Self { at: self.problem.along(&self.at.model, bandwidth)?, ..self.clone() };
+            other.steps(SHARPENING, false)?;
+            if other.log_likelihood() <= self.log_likelihood() + WORTH {
+                break;
+            }
+            *self = other;
+        }
+        Some(())
+    }
+
+    fn log_likelihood(&self) -> f64 {
+        self.problem.band.log_likelihood(&self.at.rows, self.at.s)
+    }
+
+    fn steps(&mut self, effort: usize, follows: bool) -> Option<()> {
+        let band = self.problem.band;
+        let mut damping = 0.0;
+        for i in 0..effort {
+            self.iterations += 1;
+            let gained = self.step(&mut damping, i < SIZES_FIRST)?;
+            let found = band.discrepancy(&self.at.rows);
+            let likelier = band.log_likelihood(&self.at.rows, found) > self.log_likelihood();
+            let s = if likelier { found } else { self.at.s };
+            let least = self.at.s.map(|v| SHRINKS * v);
+            let settled = (0..band.equations()).all(|i| (s[i].max(1e-300) / self.at.s[i]).ln().abs() < SETTLED);
+            self.at.s = [s[0].max(least[0]), s[1].max(least[1])];
+            let followed = follows && self.follow();
+            if settled && !followed && gained.is_none_or(|g| g < WORTH) {
+                break;
+            }
+            if gained.is_none() {
+                damping = 0.0;
+            }
+        }
+        Some(())
+    }
+
+    /// One of Levenberg's steps at the present discrepancy; the gain in log likelihood, if there was one.
+    fn step(&mut self, damping: &mut f64, sizes_only: bool) -> Option<Option<f64>> {
+        let (problem, band) = (self.problem, self.problem.band);
+        let (coordinates, at) = (&self.coordinates, &self.at);
+        self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
+        let x: Vec<f64> = coordinates.iter().map(|c| c.x(&at.model)).collect();
+        let base: Vec<(BaseParameter, f64, usize)> = coordinates
+            .iter()
+            .enumerate()
+            .filter_map(|(i, c)| match c.free {
+                Free::Base(p) => Some((p, c.slope(x[i]), i)),
+                Free::Effect(..) | Free::Loop(_) => None,
+            })
+            .collect();
+        let grows = band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
+        let cost = |l: &Lacking, x: &[f64]| -band.log_likelihood(l, at.s) - problem.log_prior(coordinates, x);
+        let before = cost(&at.rows, &x);
+        let mut normal = Normal::new(problem, coordinates, &x, &self.columns, at);
+        for ((_, _, i), g) in base.iter().zip(&grows) {
+            normal.g[*i] += g;
+        }
+        let mut held: Vec<bool> = coordinates.iter().map(|c| sizes_only && c.is_shape()).collect();
+        let mut next = None;
+        for _ in 0..TRIALS {
+            let (delta, errors) = normal.solve(coordinates, &x, *damping, &held)?;
+            if self.std.is_empty() || *damping == 0.0 {
+                self.std = errors;
+            }
+            let y: Vec<f64> = (0..x.len())
+                .map(|i| (x[i] + delta[i]).clamp(coordinates[i].bounds[0], coordinates[i].bounds[1]))
+                .collect();
+            let model: Model = at.model.at(coordinates, &y);
+            if !problem.admits(&model, self.terms) {
+                // What leaves physics' bounds stays where it is; the others move without it.
+                let alone = |i: usize| problem.admits(&at.model.at(&coordinates[i..=i], &y[i..=i]), self.terms);
+                let leaving: Vec<usize> = (0..y.len()).filter(|&i| !held[i] && !alone(i)).collect();
+                if leaving.is_empty() {
+                    *damping = (10.0 * *damping).max(1e-3);
+                }
+                for i in leaving {
+                    held[i] = true;
+                }
+                continue;
+            }
+            if let Some(rows) = problem.rows(&model, at.bandwidth) {
+                let after = cost(&rows, &y);
+                if after < before {
+                    *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
+                    next = Some((model, rows, before - after));
+                    break;
+                }
+            }
+            *damping = (10.0 * *damping).max(1e-3);
+        }
+        Some(next.map(|(model, rows, gain)| {
+            (self.at.model, self.at.rows) = (model, rows);
+            gain
+        }))
+    }
+
+    /// Follows the record at another bandwidth where that is likelier.
+    fn follow(&mut self) -> bool {
+        let (problem, at) = (self.problem, &mut self.at);
+        let least = problem.bandwidth([0.0; 2]);
+        let own = problem.band.log_likelihood(&at.rows, at.s);
+        for bandwidth in [[0, 1].map(|i| (LOOSER * at.bandwidth[i]).max(least[i])), problem.bandwidth(at.s)] {
+            if differ(bandwidth, at.bandwidth)
+                && let Some(rows) = problem.rows(&at.model, bandwidth)
+                && problem.band.log_likelihood(&rows, at.s) > own + WORTH
+            {
+                (at.rows, at.bandwidth) = (rows, bandwidth);
+                return true;
+            }
+        }
+        false
+    }
+
+    pub fn done(self) -> Fit {
+        let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
+        let std = self.std.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect();
+        Fit {
+            terms: self.terms.to_vec(),
+            log_likelihood: self.log_likelihood(),
+            log_prior: self.problem.log_prior(&self.coordinates, &x),
+            model: self.at.model,
+            coordinates: self.coordinates,
+            std,
+            columns: self.columns,
+            discrepancy: self.at.s,
+            bandwidth: self.at.bandwidth,
+            rows: self.at.rows,
+            iterations: self.iterations,
+        }
+    }
+}
+
+/// Whether two bandwidths are so unlike that the motion is followed anew.
+pub fn differ(a: Bandwidth, b: Bandwidth) -> bool {
+    (0..2).any(|i| (a[i] / b[i]).ln().abs() > ANOTHER)
+}
+
+/// Normal equations `a*delta = g`.
+struct Normal {
+    a: DMatrix<f64>,
+    g: DVector<f64>,
+}
+
+impl Normal {
+    /// Of whitened columns, the prior in them.
+    fn new(problem: &Problem<'_>, coordinates: &[Coordinate], x: &[f64], columns: &[[Vec<C>; 2]], at: &Along) -> Self {
+        let k = coordinates.len();
+        let whiten = |rows: &[Vec<C>; 2]| problem.band.whiten(rows, &at.rows.weights, at.s);
+        let z = whiten(&at.rows.rows);
+        let j: Vec<Vec<f64>> = columns.iter().map(whiten).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut a = DMatrix::from_fn(k, k, |p, q| if p <= q { dot(&j[p], &j[q]) } else { 0.0 });
+        a.fill_lower_triangle_with_upper_triangle();
+        let mut g = DVector::from_fn(k, |p, _| -dot(&j[p], &z));
+        for i in 0..k {
+            if let Free::Base(_) = coordinates[i].free {
+                a[(i, i)] += 1.0 / (PRIOR * PRIOR);
+                g[i] -= (x[i] - coordinates[i].x(&problem.nominal)) / (PRIOR * PRIOR);
+            }
+        }
+        Self { a, g }
+    }
+
+    /// The step and the standard errors of its coordinates; what would leave its bounds stays, others move without it.
+    fn solve(
+        &self,
+        coordinates: &[Coordinate],
+        x: &[f64],
+        damping: f64,
+        held: &[bool],
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let k = coordinates.len();
+        let mut fixed = held.to_vec();
+        loop {
+            let free: Vec<usize> = (0..k).filter(|i| !fixed[*i]).collect();
+            let mut delta = vec![0.0; k];
+            let mut std = vec![f64::INFINITY; k];
+            if free.is_empty() {
+                return Some((delta, std));
+            }
+            let scale: Vec<f64> = free.iter().map(|&i| self.a[(i, i)].max(1e-300).sqrt()).collect();
+            let m = DMatrix::from_fn(free.len(), free.len(), |p, q| {
+                self.a[(free[p], free[q])] / (scale[p] * scale[q]) + if p == q { 1e-10 + damping } else { 0.0 }
+            });
+            let r = DVector::from_fn(free.len(), |p, _| self.g[free[p]] / scale[p]);
+            let inverse = m.cholesky()?.inverse();
+            let step = &inverse * r;
+            let mut again = false;
+            for (p, &i) in free.iter().enumerate() {
+                delta[i] = step[p] / scale[p];
+                std[i] = inverse[(p, p)].max(0.0).sqrt() / scale[p];
+                if coordinates[i].log {
+                    delta[i] = delta[i].clamp(-FARTHEST_STEP, FARTHEST_STEP);
+                }
+                let to = x[i] + delta[i];
+                let b = coordinates[i].bounds;
+                if (x[i] <= b[0] + 1e-12 && to < b[0]) || (x[i] >= b[1] - 1e-12 && to > b[1]) {
+                    fixed[i] = true;
+                    again = true;
+                }
+            }
+            if !again {
+                return Some((delta, std));
+            }
+        }
+    }
+}
+
+/// The coordinate of a nominal parameter, kept within a factor of its nominal value.
+fn bounded(c: Coordinate, nominal: &Model) -> Coordinate {
+    match c.free {
+        Free::Base(_) => {
+            let at = c.x(nominal);
+            Coordinate { bounds: [at - FARTHEST, at + FARTHEST], ..c }
+        }
+        Free::Effect(..) | Free::Loop(_) => c,
+    }
+}
