@@ -477,7 +477,7 @@ impl Search<'_> {
         if before[i] > 0.0 { (1.0 - after[i] / before[i]).clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// Each hypothesis once, best first, with its probability.
+    /// Each set of effects once, in its best forms, best first, with its probability.
     fn weighed(&self, pool: Vec<Fit>, independent: f64) -> Vec<Weighed> {
         let mut all: Vec<Weighed> = pool
             .into_iter()
@@ -486,7 +486,7 @@ impl Search<'_> {
             .collect();
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let key = |f: &Fit| {
-            let mut ids: Vec<(Effect, usize)> = f.terms.clone();
+            let mut ids: Vec<Effect> = f.terms.iter().map(|t| t.0).collect();
             ids.sort_unstable();
             (ids, f.coordinates.is_empty())
         };
