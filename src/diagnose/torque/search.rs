@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::super::model::Free;
+use super::super::model::{Coordinate, Free};
 use super::super::verdict::Verdict;
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
@@ -38,6 +38,8 @@ const PROMISING: usize = 4;
 const MOST: usize = 5;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
+/// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
+const MOVED: f64 = 0.2;
 /// Steps of a fit that is looked at, and how many of these are then fitted to their end.
 const PROBE: usize = 5;
 const DEEPENED: usize = 4;
@@ -277,7 +279,12 @@ impl Search<'_> {
         if best.terms.len() >= MOST {
             return None;
         }
-        let added = self.added(best, best.terms.len());
+        let mut added = self.added(best, best.terms.len());
+        if best.terms.is_empty()
+            && let Some(nominal) = self.unmoved(best)
+        {
+            added.extend(self.added(&nominal, 0));
+        }
         pool.extend(added.iter().cloned());
         let all: Vec<Fit> = added.into_iter().filter(|f| self.is_material(best, f)).collect();
         let share = self.independent(&all);
@@ -294,6 +301,12 @@ impl Search<'_> {
     fn is_negligible(&self, fit: &Fit) -> bool {
         self.problem.nominal.structure == Structure::Rigid
             && self.band().torque_share(fit.discrepancy, self.problem.record) < NEGLIGIBLE
+    }
+
+    /// The nominal parameters, where fitted ones are far from them: they may have taken what an effect does.
+    fn unmoved(&self, parameters: &Fit) -> Option<Fit> {
+        let moved = |c: &Coordinate| (c.value(&parameters.model) / c.value(&self.problem.nominal)).ln().abs() > MOVED;
+        parameters.coordinates.iter().any(moved).then(|| self.problem.unmoved())?
     }
 
     /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
@@ -455,7 +468,7 @@ impl Search<'_> {
         let verdict = match chosen.terms.is_empty() {
             false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
-            true if !settled && left > UNCAUSED => Verdict::Unexplained,
+            true if left > LEFT || !settled && left > UNCAUSED => Verdict::Unexplained,
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
         };
