@@ -28,6 +28,10 @@ impl Effect {
     #[must_use]
     pub fn excludes(self, other: Self) -> bool {
         let (a, b) = (self.info(), other.info());
-        a.family == Family::DryFriction && b.family == Family::DryFriction && a.place == b.place
+        let is = |f: Family, g: Family| (a.family, b.family) == (f, g) || (b.family, a.family) == (f, g);
+        // A log that reads early undoes a late drive.
+        is(Family::Latch, Family::Delay)
+            || is(Family::Latch, Family::ActuatorLag)
+            || is(Family::DryFriction, Family::DryFriction) && a.place == b.place
     }
 }

@@ -148,7 +148,12 @@ fn coherent(spectra: &Spectra) -> Vec<usize> {
     };
     let floor = floor(spectra);
     let stands = |f: usize| position(spectra, f) > STANDS * floor;
-    let lines: Vec<usize> = (0..spectra.lines).filter(|f| of(*f) > least && stands(*f)).collect();
+    let coherent = || (0..spectra.lines).filter(|f| of(*f) > least);
+    let mut lines: Vec<usize> = coherent().filter(|f| stands(*f)).collect();
+    if lines.is_empty() {
+        // An encoder of a few steps, whose motion hardly stands above them.
+        lines = coherent().collect();
+    }
     // By chance one line of three hundred (two channels: of a hundred and fifty) passes; neighbours under one window pass
     // together.
     let chance = 3.0 + 0.02 * spectra.lines as f64;
@@ -164,7 +169,7 @@ fn coherent(spectra: &Spectra) -> Vec<usize> {
         low *= 2;
     }
     // Lines beside the motion are those of its noise: a controller answers it.
-    let moved = |of: &mut dyn Iterator<Item = usize>| of.map(|f| spectra.power(MAIN, f)).sum::<f64>();
+    let moved = |of: &mut dyn Iterator<Item = usize>| of.map(|f| position(spectra, f)).sum::<f64>();
     let main = moved(&mut lines.iter().copied()) > MOVED * moved(&mut (0..spectra.lines));
     if main && ((lines.len() as f64) > chance || best >= 0.5) { lines } else { Vec::new() }
 }
@@ -174,7 +179,7 @@ fn position(spectra: &Spectra, f: usize) -> f64 {
     spectra.power(MAIN, f) / spectra.omega(f).powi(2)
 }
 
-/// Share of the speed's power that coherent lines must hold to be those of the axis' motion.
+/// Share of the position's power that coherent lines must hold to be those of the axis' motion.
 const MOVED: f64 = 0.05;
 
 /// Power of the position from which a line is one of motion, over the encoder's floor.

@@ -174,6 +174,7 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     // What was fitted along the way, and is likelier than where the way led, is gone on from.
     for _ in 0..AGAIN {
         let Some(better) = search.overlooked(&chosen, &pool) else { break };
+        let better = search.pruned(better, &mut pool);
         chosen = search.climb(better, &mut pool);
     }
     search.conclude(given, parameters, chosen, pool)
