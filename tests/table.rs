@@ -91,7 +91,7 @@ fn a_diagnosis_an_improved_fmu_and_an_axis_file_turn_the_same_circle() {
         printed[0]
     );
     let page = std::fs::read_to_string(&report).unwrap();
-    assert!(page.contains("Nominal model with coulomb_motor") && page.contains("magnified"));
+    assert!(page.contains("Diagnosed model without coulomb_motor") && page.contains("magnified"));
     for (text, says) in [
         ("{}", "it is no diagnosis"),
         (&diagnosis.replace("0.004", "-1"), "coulomb_motor.level is -1"),

@@ -180,7 +180,7 @@ fn position(spectra: &Spectra, f: usize) -> f64 {
 }
 
 /// Share of the position's power that coherent lines must hold to be those of the axis' motion.
-const MOVED: f64 = 0.05;
+const MOVED: f64 = 1e-3;
 
 /// Power of the position from which a line is one of motion, over the encoder's floor.
 const STANDS: f64 = 4.0;

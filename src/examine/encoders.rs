@@ -55,7 +55,8 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
         let spring = Complex::new(p.k, w * p.b);
         (spring / (spring - p.i2 * w * w)).re
     });
-    let ratio = gain.re / expected;
+    // Near the table's resonance against the motor, and above it, the size and the sign of its motion are the coupling's.
+    let ratio = if (0.5..2.0).contains(&expected) { gain.re / expected } else { 1.0 };
     // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
     if gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0 {
         findings.push(Finding::new(
