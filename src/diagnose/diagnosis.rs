@@ -1,11 +1,12 @@
 //! The diagnosis as plain data: the contract of `diagnosis.json` (schema `eixo.diagnosis/1`).
 
 use serde::Serialize;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::closed_loop::ClosedLoop;
 use super::gap::Figures;
 use super::verdict::Verdict;
+use crate::effects::Effect;
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "eixo.diagnosis/1";
@@ -63,6 +64,26 @@ pub struct Cause {
     pub share_of_gap: f64,
     /// Its parameters by name.
     pub parameters: Map<String, Value>,
+}
+
+impl Cause {
+    /// The one cause of a gap, told by one parameter with its standard error.
+    #[must_use]
+    pub fn alone(effect: Effect, name: &str, value: f64, std: f64, unit: &str) -> Self {
+        let info = effect.info();
+        let std = if std.is_finite() { json!(std) } else { Value::Null };
+        let mut parameters = Map::new();
+        parameters.insert(name.to_owned(), json!({ "value": value, "std": std, "unit": unit }));
+        Self {
+            id: info.id.to_owned(),
+            family: info.family.as_str().to_owned(),
+            place: info.place.as_str().to_owned(),
+            variant: String::new(),
+            probability: 1.0,
+            share_of_gap: 1.0,
+            parameters,
+        }
+    }
 }
 
 /// How a closure was measured.

@@ -4,7 +4,7 @@
 //! is named as the cause when the readings lie on a lattice whose error makes the better part of the noise floor, and
 //! nothing else explains the record better.
 
-use serde_json::{Map, json};
+use serde_json::json;
 
 use super::assess::Case;
 use super::diagnosis::{Cause, Diagnosis};
@@ -46,17 +46,6 @@ pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
         diagnosis.verdict = Verdict::Unexplained;
         return;
     }
-    let info = Effect::EncoderQuantisation.info();
-    let mut parameters = Map::new();
-    parameters.insert("step".to_owned(), json!({ "value": quantum, "std": 0.0, "unit": case.motion.unit("rad") }));
     diagnosis.verdict = Verdict::Effect;
-    diagnosis.causes = vec![Cause {
-        id: info.id.to_owned(),
-        family: info.family.as_str().to_owned(),
-        place: info.place.as_str().to_owned(),
-        variant: String::new(),
-        probability: 1.0,
-        share_of_gap: 1.0,
-        parameters,
-    }];
+    diagnosis.causes = vec![Cause::alone(Effect::EncoderQuantisation, "step", quantum, 0.0, case.motion.unit("rad"))];
 }

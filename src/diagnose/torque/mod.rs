@@ -185,7 +185,9 @@ fn build(
         })
         .collect();
     let causes = match decision.torque_gain() {
-        Some(gain) if decision.verdict == Verdict::Parameters => vec![gain_of(gain)],
+        Some((gain, std)) if decision.verdict == Verdict::Parameters => {
+            vec![Cause::alone(Effect::TorqueGain, "gain", gain, std, "1")]
+        }
         _ => causes(decision, case.motion),
     };
     let verdict = decision.verdict;
@@ -260,22 +262,6 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
         .collect();
     causes.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap));
     causes
-}
-
-/// All parameters changed by one factor, as a cause.
-fn gain_of((gain, std): (f64, f64)) -> Cause {
-    let info = Effect::TorqueGain.info();
-    let mut parameters = Map::new();
-    parameters.insert("gain".to_owned(), json!({ "value": gain, "std": number(std), "unit": "1" }));
-    Cause {
-        id: info.id.to_owned(),
-        family: info.family.as_str().to_owned(),
-        place: info.place.as_str().to_owned(),
-        variant: String::new(),
-        probability: 1.0,
-        share_of_gap: 1.0,
-        parameters,
-    }
 }
 
 fn number(v: f64) -> Value {

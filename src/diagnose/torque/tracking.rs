@@ -133,9 +133,7 @@ fn track_with(
         }
         let sample: Ramp<f64> = record.hold.ramp(&record.torque, k);
         for j in 0..per {
-            let part = |i: usize| sample.start + (sample.end - sample.start) * (i as f64 / per as f64);
-            let mut ramp =
-                if per == 1 || record.hold == Hold::Zoh { sample } else { Ramp { start: part(j), end: part(j + 1) } };
+            let mut ramp = substep(sample, record.hold, j, per);
             if !axis.on().inputs().is_empty() {
                 ramp = model.effects.transform_input(axis.on(), ramp, h, &mut inputs);
             }
@@ -152,6 +150,12 @@ fn track_with(
     // Squares of what is larger than this are no numbers.
     let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
     bounded.then_some((Tracked { torque, error, motion }, memories))
+}
+
+/// One of the equal parts of a sample's torque.
+fn substep(sample: Ramp<f64>, hold: Hold, j: usize, per: usize) -> Ramp<f64> {
+    let part = |i: usize| sample.start + (sample.end - sample.start) * (i as f64 / per as f64);
+    if per == 1 || hold == Hold::Zoh { sample } else { Ramp { start: part(j), end: part(j + 1) } }
 }
 
 /// Adds `D e` to what was given.
@@ -240,10 +244,7 @@ impl Run {
         let warm = range.start.saturating_sub(WARM);
         let mut inputs = TorqueHistory::settled(record.torque[warm]);
         let torque = |k: usize, inputs: &mut TorqueHistory<f64>, j: usize| {
-            let sample: Ramp<f64> = record.hold.ramp(&record.torque, k);
-            let part = |i: usize| sample.start + (sample.end - sample.start) * (i as f64 / per as f64);
-            let ramp =
-                if per == 1 || record.hold == Hold::Zoh { sample } else { Ramp { start: part(j), end: part(j + 1) } };
+            let ramp = substep(record.hold.ramp(&record.torque, k), record.hold, j, per);
             if axis.on().inputs().is_empty() { ramp } else { model.effects.transform_input(axis.on(), ramp, h, inputs) }
         };
         for k in warm..range.start {
