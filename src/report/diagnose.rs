@@ -374,7 +374,7 @@ fn how_far(f: &Findings) -> Vec<Block> {
         )));
     }
     for o in f.evidence.iter().flat_map(|e| &e.held) {
-        blocks.extend(residual::overlay(o, improved(d), f.motion));
+        blocks.extend(residual::overlay(o, d.gap.closure_of, improved(d), f.motion));
     }
     if !d.parameters.is_empty() {
         blocks.push(Block::Table(parameters(&d.parameters)));

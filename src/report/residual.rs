@@ -6,14 +6,14 @@ use std::sync::Arc;
 use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
 use super::{Block, Cell, Figure, Table};
 use crate::diagnose::location::{FrequencyPart, StateCurve};
-use crate::diagnose::{Diagnosis, Location, Overlay};
+use crate::diagnose::{ClosureOf, Diagnosis, Location, Overlay};
 use crate::trace::{Motion, Signal};
 
 /// Most plots of a residual against a state.
 const CURVES: usize = 4;
 
 /// A held-out signal, the models' runs over it, and what they leave.
-pub(super) fn overlay(o: &Overlay, after_name: &str, motion: Motion) -> Vec<Block> {
+pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: Motion) -> Vec<Block> {
     let unit = Signal::from_name(o.channel).map_or("", |s| s.unit(motion));
     let time: Arc<[f64]> = o.time.as_slice().into();
     let chart =
@@ -54,7 +54,14 @@ pub(super) fn overlay(o: &Overlay, after_name: &str, motion: Motion) -> Vec<Bloc
         .with(left)
         .mark(Mark::Y(2.0 * o.noise, "2 standard deviations of the noise".into()))
         .mark(Mark::Y(-2.0 * o.noise, String::new()));
-    let caption = "Each window starts from its own fitted state, so that an error does not run on into the next.";
+    let caption = match of {
+        ClosureOf::FreeRun => {
+            "Each model runs freely from one fitted state at the beginning, under the logged torque alone."
+        }
+        ClosureOf::Windows => {
+            "Each window starts from its own fitted state, so that an error does not run on into the next."
+        }
+    };
     vec![
         Block::Figure(Figure::new(chart, caption)),
         Block::Figures(vec![Figure::new(both, ""), Figure::new(remainder, "")]),
