@@ -160,7 +160,9 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = vec![given.clone(), parameters.clone()];
     let mut chosen = search.climb(parameters.clone(), &mut pool);
-    if !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
+    // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
+    let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
+    if !decided && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
         // All of the textbook's combinations, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
         let textbook = search.textbook(&parameters, &chosen);
