@@ -148,12 +148,7 @@ fn coherent(spectra: &Spectra) -> Vec<usize> {
     };
     let floor = floor(spectra);
     let stands = |f: usize| position(spectra, f) > STANDS * floor;
-    let coherent = || (0..spectra.lines).filter(|f| of(*f) > least);
-    let mut lines: Vec<usize> = coherent().filter(|f| stands(*f)).collect();
-    if lines.is_empty() {
-        // An encoder of a few steps, whose motion hardly stands above them.
-        lines = coherent().collect();
-    }
+    let lines: Vec<usize> = (0..spectra.lines).filter(|f| of(*f) > least && stands(*f)).collect();
     // By chance one line of three hundred (two channels: of a hundred and fifty) passes; neighbours under one window pass
     // together.
     let chance = 3.0 + 0.02 * spectra.lines as f64;
