@@ -63,9 +63,8 @@ fn on_the_bench_the_commanded_current_is_late_by_what_the_measured_one_shows() {
     let late: f64 = told
         .causes
         .iter()
-        .filter(|c| ["delay", "actuator_lag"].contains(&c.id.as_str()))
-        .flat_map(|c| c.parameters.values())
-        .map(|p| p["value"].as_f64().expect("a time"))
+        .filter(|c| ["delay", "actuator_lag"].contains(&c.effect.info().id))
+        .flat_map(|c| c.parameters.iter().map(|(_, p)| p.value))
         .sum();
     assert!((0.37e-3..0.55e-3).contains(&late), "{late}: {:?}", told.causes);
 }
@@ -74,7 +73,7 @@ fn on_the_bench_the_commanded_current_is_late_by_what_the_measured_one_shows() {
 fn on_the_bench_the_measured_current_is_not_late_and_nothing_is_hit() {
     let Some(told) = bench("iq_meas_A") else { return };
     let never = ["delay", "actuator_lag", "end_stop"];
-    let named = told.causes.iter().any(|c| never.contains(&c.id.as_str()) && c.probability >= 0.5);
+    let named = told.causes.iter().any(|c| never.contains(&c.effect.info().id) && c.probability >= 0.5);
     assert!(!named, "{:?}", told.causes);
 }
 
@@ -106,8 +105,8 @@ fn on_emps_and_on_its_parts_friction_and_viscosity_are_named_with_their_publishe
         let found = diagnose(&case, &|_| ());
         let causes = &found.diagnosis.causes;
         let value = |family: &str, name: &str| {
-            let cause = causes.iter().find(|c| c.family == family)?;
-            cause.parameters.get(name)?.get("value")?.as_f64()
+            let cause = causes.iter().find(|c| c.effect.info().family.as_str() == family)?;
+            cause.named().find(|(n, _)| *n == name).map(|(_, p)| p.value)
         };
         let told = || format!("{part:?}: {causes:?}");
         let level = value("dry_friction", "level").unwrap_or_else(|| panic!("{}", told()));
@@ -115,12 +114,13 @@ fn on_emps_and_on_its_parts_friction_and_viscosity_are_named_with_their_publishe
         assert!(value("dry_friction", "reach").is_none_or(|r| r < 2e-5), "{}", told());
         let viscous = value("viscous_friction", "coefficient").unwrap_or_else(|| panic!("{}", told()));
         assert!((viscous / 203.0 - 1.0).abs() < 0.08, "{}", told());
-        assert!(causes.iter().all(|c| c.place == "axis" || c.place == "input"), "{}", told());
+        assert!(causes.iter().all(|c| ["axis", "input"].contains(&c.site.as_str())), "{}", told());
         let inertia = found.improved.parameters.i1;
         assert!((inertia / 95.1 - 1.0).abs() < 0.02, "{inertia}");
         // Friction is the half of it; what is named beside must be small.
-        let others =
-            causes.iter().filter(|c| !["dry_friction", "viscous_friction", "load_torque"].contains(&c.family.as_str()));
+        let others = causes.iter().filter(|c| {
+            !["dry_friction", "viscous_friction", "load_torque"].contains(&c.effect.info().family.as_str())
+        });
         assert!(others.map(|c| c.share_of_gap).sum::<f64>() < 0.02, "{}", told());
     }
 }

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 
-use crate::diagnose::{LoopErrors, Model, Record as Logged, UnderControl};
+use crate::diagnose::{Model, Record as Logged, UnderControl};
 use crate::fmu::simulate::{Column, Record, Setting};
-use crate::report::{Block, Cell, Table};
+use crate::report::Block;
+use crate::report::diagnose::errors_in_the_loop;
 use crate::trace::{Machine, Signal, Trace, load};
 use crate::variables::{Causality, Model as Kind, Named, Starts, Values, find};
 
@@ -104,10 +105,8 @@ pub(super) fn identified(trace: &Path, given: &Machine, found: &Machine) -> anyh
     let record = logged(&trace);
     let command = trace.get(Signal::Command).unwrap_or(torque);
     let seen = UnderControl { record: &record, reference, command, controller };
-    let mut table = Table::new(LoopErrors::TITLE, ["model", "command", "position"]);
-    for (name, machine) in [("as given", given), ("as identified", found)] {
-        let e = seen.errors(&model(machine));
-        table.row(vec![Cell::text(name), Cell::Percent(e.command), Cell::Percent(e.position)]);
-    }
-    Ok(vec![Block::Table(table)])
+    let models = [("as given", given), ("as identified", found)];
+    Ok(vec![Block::Table(errors_in_the_loop(
+        models.map(|(name, machine)| (name, seen.errors(&model(machine)), false)),
+    ))])
 }

@@ -170,7 +170,7 @@ fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Step
     let outcome = diagnose(&case, &|part| bar.set_message(format!("diagnosing: {part}")));
     let findings = diagnosis::Findings {
         diagnosis: &outcome.diagnosis,
-        evidence: Some(&outcome.evidence),
+        overlays: &outcome.overlays,
         trace: "machine.csv",
         motion: Motion::Rotary,
     };

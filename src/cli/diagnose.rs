@@ -13,11 +13,10 @@ use super::examined::{Believed, Examined, examined};
 use super::many::Many;
 use super::outputs;
 use crate::axis::Structure;
-use crate::diagnose::{CHANNELS, Case, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise};
+use crate::diagnose::{CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise};
 use crate::effects::{EFFECTS, Effect};
 use crate::fleet::{Found, Tracked};
-use crate::identify::parameters::{NAMES, units as base_units};
-use crate::report::diagnose::{Findings, report, short};
+use crate::report::diagnose::{Findings, json as contract, report, short, warnings};
 use crate::report::format::{Medium, number, printable};
 use crate::report::{html, terminal};
 use crate::fmu::contained::{Host, simulate};
@@ -87,7 +86,7 @@ impl Diagnosed {
     fn findings(&self) -> Findings<'_> {
         Findings {
             diagnosis: &self.outcome.diagnosis,
-            evidence: Some(&self.outcome.evidence),
+            overlays: &self.outcome.overlays,
             trace: &self.described,
             motion: self.machine.signals.motion,
         }
@@ -178,7 +177,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let colour = std::io::stdout().is_terminal();
     say!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
     if let Some(path) = &args.json {
-        let mut text = serde_json::to_string_pretty(&outcome.diagnosis)?;
+        let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis))?;
         text.push('\n');
         write_text(path, text.as_bytes())?;
     }
@@ -201,12 +200,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn found(diagnosed: &Diagnosed) -> Found {
     let d = &diagnosed.outcome.diagnosis;
     let held = &d.gap.holdout.combined;
-    let causes: Vec<&str> = d.causes.iter().map(|c| c.id.as_str()).collect();
+    let causes: Vec<&str> = d.causes.iter().map(|c| c.effect.info().id).collect();
     let facts = vec![
-        json!(d.verdict),
-        json!(d.location.place),
+        json!(d.verdict.as_str()),
+        json!(contract::site(d.location.site)),
         if causes.is_empty() { Value::Null } else { json!(causes.join("+")) },
-        d.causes.first().map_or(Value::Null, |c| json!(c.probability)),
+        json!(d.causes.first().map(|c| c.probability)),
         json!(d.gap.closure),
         json!(d.gap.interval[0]),
         json!(d.gap.interval[1]),
@@ -215,25 +214,15 @@ fn found(diagnosed: &Diagnosed) -> Found {
         json!(held.after),
         json!(held.noise_floor),
     ];
-    let units = base_units(diagnosed.machine.signals.motion);
-    let tracked = |name: String, unit: &str, value: &Value, of: &str| {
-        let value_of = |key: &str| value.get(key).and_then(Value::as_f64);
-        Some(Tracked { name, unit: unit.to_owned(), value: value_of(of)?, std: value_of("std") })
-    };
-    let base = d.parameters.iter().filter_map(|(name, value)| {
-        let unit = NAMES.iter().position(|n| n == name).map_or("", |k| units[k]);
-        tracked(name.clone(), unit, value, "fitted")
-    });
-    let of_causes = d.causes.iter().flat_map(|c| c.parameters.iter().map(move |(name, value)| (c, name, value)));
-    let of_causes = of_causes.filter_map(|(c, name, value)| {
-        let unit = value.get("unit").and_then(Value::as_str).unwrap_or_default();
-        tracked(format!("{}.{name}", c.id), unit, value, "value")
-    });
+    let tracked = |name: String, e: &Estimate| Tracked { name, unit: e.unit.to_owned(), value: e.value, std: e.std };
+    let base = d.parameters.iter().map(|p| tracked(p.parameter.name().to_owned(), &p.fitted));
+    let of_causes = d.causes.iter().flat_map(|c| c.named().map(move |(name, e)| (c.effect.info().id, name, e)));
+    let of_causes = of_causes.map(|(id, name, e)| tracked(format!("{id}.{name}"), e));
     Found {
         facts,
-        parameters: base.chain(of_causes).collect(),
-        warnings: diagnosed.warnings.iter().chain(&d.warnings).cloned().collect(),
-        result: json!(d),
+        parameters: base.chain(of_causes).filter(|t| t.value.is_finite()).collect(),
+        warnings: diagnosed.warnings.iter().cloned().chain(warnings(d)).collect(),
+        result: contract::value(d),
         report: report(&diagnosed.findings()),
     }
 }

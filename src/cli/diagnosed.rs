@@ -5,10 +5,10 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::diagnose::SCHEMA;
 use crate::effects::Effect;
 use crate::fmu::archive::Archive;
 use crate::fmu::description::{Description, Value as Start};
+use crate::report::diagnose::json::SCHEMA;
 use crate::trace::Machine;
 use crate::variables::{Causality, Starts, Type, Values, all, at};
 

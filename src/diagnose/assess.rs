@@ -1,9 +1,9 @@
 //! What is diagnosed, and what comes of it.
 
 use super::diagnosis::Diagnosis;
-use super::evidence::Evidence;
 use super::model::Model;
 use super::noise::NoiseEstimate;
+use super::overlay::Overlay;
 use super::record::Record;
 use super::torque::Decision;
 use crate::axis::Motion;
@@ -40,8 +40,8 @@ pub struct Outcome {
     pub models: [Model; 3],
     /// The decision with its fits.
     pub decision: Decision,
-    /// What the report draws.
-    pub evidence: Evidence,
+    /// Held-out signals with the models' runs.
+    pub overlays: Vec<Overlay>,
     /// A stretch of held-out data for the improved model to be run on.
     pub replay: Replay,
 }

@@ -4,8 +4,7 @@
 //! command that the drive needs for it says what the model leaves out. This looks at a record from the other side than
 //! the free-running windows do: nothing but the reference is given to the model, and no initial state is fitted.
 
-use serde::Serialize;
-
+use super::diagnosis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
 use super::torque::{Decision, Fit};
@@ -32,17 +31,12 @@ pub struct UnderControl<'a> {
 }
 
 /// Errors of one model in the loop, rms over rms of the signal; the signal's mean is taken out of both.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopErrors {
     /// Of the drive's command.
     pub command: f64,
     /// Of the position that the drive controls.
     pub position: f64,
-}
-
-impl LoopErrors {
-    /// Heading of a table of these.
-    pub const TITLE: &str = "In the drive's loop, driven by the reference alone: error, rms over rms of the signal";
 }
 
 /// One sample of a model in the loop.
@@ -70,19 +64,18 @@ pub struct Commands {
 }
 
 /// A hypothesis as the loop sees it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LoopRanked {
-    /// Ids of its effects, joined by `+`; `parameters` or `no_gap` without any.
-    pub id: String,
+    /// The hypothesis.
+    pub hypothesis: Hypothesis,
     /// Its errors.
-    #[serde(flatten)]
     pub errors: LoopErrors,
     /// Share of the command's squared error, as given, that it closes.
     pub closure: f64,
 }
 
 /// What the loop says of a diagnosis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ClosedLoop {
     /// The model as given.
     pub before: LoopErrors,
@@ -95,7 +88,6 @@ pub struct ClosedLoop {
     /// Every hypothesis tried, the one that closes most first.
     pub ranking: Vec<LoopRanked>,
     /// The commands over time: for plots.
-    #[serde(skip)]
     pub commands: Commands,
     /// Whether no other hypothesis closes more than the diagnosed one by more than 0.5 %.
     pub agrees: bool,
@@ -188,7 +180,7 @@ impl UnderControl<'_> {
         let after = of(&decision.chosen.model);
         let ranked = |t: &Fit| {
             let errors = of(&t.model);
-            LoopRanked { id: t.id(), errors, closure: closure(&errors) }
+            LoopRanked { hypothesis: t.hypothesis(), errors, closure: closure(&errors) }
         };
         let mut ranking: Vec<LoopRanked> = decision.ranking.iter().map(|w| ranked(&w.fit)).collect();
         ranking.sort_by(|a, b| b.closure.total_cmp(&a.closure));

@@ -1,94 +1,192 @@
-//! The diagnosis as plain data: the contract of `diagnosis.json` (schema `eixo.diagnosis/1`).
+//! The diagnosis as typed data. Its sentences, pages and files are made of it in [`crate::report::diagnose`].
 
-use serde::Serialize;
-use serde_json::{Map, Value, json};
+use std::fmt;
 
 use super::closed_loop::ClosedLoop;
 use super::gap::Figures;
+use super::location::{Appearance, Location};
+use super::model::BaseParameter;
+use super::torque::Confusable;
 use super::verdict::Verdict;
-use crate::effects::Effect;
+use crate::axis::{Motion, Structure};
+use crate::effects::{Effect, Place};
 
-/// Name and version of the format.
-pub const SCHEMA: &str = "eixo.diagnosis/1";
+/// Where something acts, as far as an axis' structure tells it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Site {
+    /// A place of the chain.
+    At(Place),
+    /// The one inertia of a rigid axis: motor, coupling and table together.
+    Axis,
+}
 
-/// Everything that `eixo diagnose` found.
-#[derive(Debug, Clone, Serialize)]
+impl Site {
+    /// Where an effect of a place shows.
+    #[must_use]
+    pub const fn of(place: Place, structure: Structure) -> Self {
+        match (place, structure) {
+            (Place::Motor | Place::Coupling | Place::Table, Structure::Rigid) => Self::Axis,
+            _ => Self::At(place),
+        }
+    }
+
+    /// All that a structure has, in the order of the chain.
+    #[must_use]
+    pub const fn all(structure: Structure) -> &'static [Self] {
+        match structure {
+            Structure::Rigid => &[Self::At(Place::Input), Self::Axis, Self::At(Place::Sensor)],
+            Structure::TwoInertia => &[
+                Self::At(Place::Input),
+                Self::At(Place::Motor),
+                Self::At(Place::Coupling),
+                Self::At(Place::Table),
+                Self::At(Place::Sensor),
+            ],
+        }
+    }
+
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::At(place) => place.as_str(),
+            Self::Axis => "axis",
+        }
+    }
+}
+
+/// What a record is explained by.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Hypothesis {
+    /// The model as given.
+    NoGap,
+    /// Its parameters, fitted.
+    Parameters,
+    /// Effects beside them, in the order they were found.
+    Effects(Vec<Effect>),
+}
+
+impl Hypothesis {
+    /// Its effects.
+    #[must_use]
+    pub fn effects(&self) -> &[Effect] {
+        match self {
+            Self::Effects(effects) => effects,
+            Self::NoGap | Self::Parameters => &[],
+        }
+    }
+}
+
+/// The name in files: ids joined by `+`, `parameters` or `no_gap`.
+impl fmt::Display for Hypothesis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoGap => f.write_str("no_gap"),
+            Self::Parameters => f.write_str("parameters"),
+            Self::Effects(effects) => {
+                let ids: Vec<&str> = effects.iter().map(|e| e.info().id).collect();
+                f.write_str(&ids.join("+"))
+            }
+        }
+    }
+}
+
+/// A value with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Its standard error, where the record gives one.
+    pub std: Option<f64>,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+/// Everything that a diagnosis found.
+#[derive(Debug, Clone)]
 pub struct Diagnosis {
-    /// [`SCHEMA`].
-    pub schema: &'static str,
     /// The machine's name.
     pub machine: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// The verdict in a sentence.
-    pub sentence: String,
+    /// The hypothesis of largest evidence.
+    pub chosen: Hypothesis,
     /// Causes, strongest first.
     pub causes: Vec<Cause>,
     /// Every hypothesis tried, best first.
     pub ranking: Vec<Ranked>,
-    /// Pairs that the record cannot tell apart, and why.
-    pub confusable: Vec<[String; 3]>,
-    /// What to measure next.
-    pub next_experiment: String,
+    /// Effects that the record cannot tell from named ones.
+    pub confusable: Vec<Confusable>,
     /// Where the gap lies.
-    #[serde(rename = "where")]
     pub location: Where,
-    /// What stays unexplained beside the causes; absent where the record cannot be compared in torque.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub remainder: Option<Remainder>,
+    /// What stays unexplained beside the causes.
+    pub remainder: Remainder,
     /// How large it is, and how far it shrinks.
     pub gap: GapReport,
     /// The nominal parameters as given and as fitted.
-    pub parameters: Map<String, Value>,
-    /// What the user should know of the data.
-    pub warnings: Vec<String>,
+    pub parameters: Vec<AxisParameter>,
+    /// The steps in which the readings come; `None` where they are fine, or the model knows of them.
+    pub rounding: Option<Rounding>,
     /// What the drive's loop says, for a record under control whose drive is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub closed_loop: Option<ClosedLoop>,
 }
 
 /// A cause.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Cause {
-    /// Id of the effect.
-    pub id: String,
-    /// Its family.
-    pub family: String,
-    /// Its place.
-    pub place: String,
+    /// The effect.
+    pub effect: Effect,
+    /// Where it acts.
+    pub site: Site,
     /// Form of the effect; empty for the plain one.
-    pub variant: String,
+    pub variant: &'static str,
     /// Posterior probability.
     pub probability: f64,
     /// Share of the gap that comes back without it.
     pub share_of_gap: f64,
-    /// Its parameters by name.
-    pub parameters: Map<String, Value>,
+    /// Its free parameters: which of the effect's, and its value.
+    pub parameters: Vec<(usize, Estimate)>,
 }
 
 impl Cause {
     /// The one cause of a gap, told by one parameter with its standard error.
     #[must_use]
-    pub fn alone(effect: Effect, name: &str, value: f64, std: f64, unit: &str) -> Self {
+    pub fn alone(effect: Effect, parameter: usize, value: f64, std: f64, motion: Motion) -> Self {
         let info = effect.info();
-        let std = if std.is_finite() { json!(std) } else { Value::Null };
-        let mut parameters = Map::new();
-        parameters.insert(name.to_owned(), json!({ "value": value, "std": std, "unit": unit }));
+        let unit = motion.unit(info.parameters[parameter].unit);
+        let estimate = Estimate { value, std: Some(std).filter(|s| s.is_finite()), unit };
         Self {
-            id: info.id.to_owned(),
-            family: info.family.as_str().to_owned(),
-            place: info.place.as_str().to_owned(),
-            variant: String::new(),
+            effect,
+            site: Site::At(info.place),
+            variant: "",
             probability: 1.0,
             share_of_gap: 1.0,
-            parameters,
+            parameters: vec![(parameter, estimate)],
         }
+    }
+
+    /// Its parameters by name.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, &Estimate)> {
+        let all = self.effect.info().parameters;
+        self.parameters.iter().map(|(p, estimate)| (all[*p].name, estimate))
     }
 }
 
+/// A parameter of the axis.
+#[derive(Debug, Clone, Copy)]
+pub struct AxisParameter {
+    /// Which.
+    pub parameter: BaseParameter,
+    /// As given.
+    pub nominal: f64,
+    /// Fitted without any effect.
+    pub reidentified: f64,
+    /// Fitted beside the effects of the chosen hypothesis.
+    pub fitted: Estimate,
+}
+
 /// How a closure was measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClosureOf {
     /// The model's own run through the whole record from one initial state.
     FreeRun,
@@ -96,8 +194,17 @@ pub enum ClosureOf {
     Windows,
 }
 
+/// What the fits do not see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeldOut {
+    /// A record of its own.
+    SecondRecord,
+    /// The end of the one given.
+    LastThird,
+}
+
 /// What no cause explains.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Remainder {
     /// Its torque, rms in the band of the motion, N.m.
     pub torque_rms: f64,
@@ -106,20 +213,18 @@ pub struct Remainder {
     /// As a multiple of what the encoders' noise makes.
     pub noise_multiple: f64,
     /// Where it shows.
-    pub place: String,
+    pub site: Site,
     /// What it looks like.
-    pub summary: String,
+    pub looks: Appearance,
 }
 
 /// A hypothesis in the ranking.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Ranked {
-    /// Id of the effect, ids joined by `+`, `parameters` or `no_gap`.
-    pub id: String,
-    /// Family of its first effect.
-    pub family: String,
-    /// Place of its first effect.
-    pub place: String,
+    /// The hypothesis.
+    pub hypothesis: Hypothesis,
+    /// Where its first effect acts.
+    pub site: Option<Site>,
     /// Posterior probability.
     pub probability: f64,
     /// BIC above the best's.
@@ -131,24 +236,18 @@ pub struct Ranked {
 }
 
 /// Where the gap lies.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Where {
-    /// The place.
-    pub place: String,
-    /// Share of each place.
-    pub by_place: Map<String, Value>,
-    /// The residual along time.
-    pub by_time: Value,
-    /// And along frequency.
-    pub by_frequency: Value,
-    /// And against the state.
-    pub by_state: Value,
-    /// In words.
-    pub summary: String,
+    /// The site; `None` where nothing but the parameters is needed.
+    pub site: Option<Site>,
+    /// Share of each site.
+    pub shares: Vec<(Site, f64)>,
+    /// The torque that the model lacks with its parameters fitted alone.
+    pub shown: Location,
 }
 
 /// The gap on both records.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct GapReport {
     /// On the data the fits saw.
     pub train: Figures,
@@ -163,5 +262,27 @@ pub struct GapReport {
     /// What `closure` and the levels are measured on.
     pub closure_of: ClosureOf,
     /// What the held-out data are.
-    pub holdout_is: String,
+    pub holdout_is: HeldOut,
+}
+
+/// Readings that come in steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rounding {
+    /// The largest step, in the unit of its channel.
+    pub step: f64,
+    /// The channels that have one, see [`CHANNELS`](super::CHANNELS).
+    pub channels: Vec<&'static str>,
+    /// What it has to do with the verdict.
+    pub role: RoundingRole,
+}
+
+/// What rounding has to do with a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RoundingRole {
+    /// A part of the noise.
+    Noise,
+    /// The cause: it makes the better part of the noise, and nothing else is left.
+    Cause,
+    /// It would be the cause, and may not be named.
+    Withheld,
 }

@@ -1,9 +1,7 @@
 //! The gap in figures: rms error over rms signal, before, re-identified and after, on training and held-out windows.
 
-use serde::Serialize;
-
 /// rms errors over the rms of the signal; `noise_floor` likewise.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Levels {
     /// The model as given.
     pub before: f64,
@@ -16,13 +14,12 @@ pub struct Levels {
 }
 
 /// Levels combined over the signals and of each.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Figures {
     /// All signals, each in units of its rms.
-    #[serde(flatten)]
     pub combined: Levels,
-    /// Each signal.
-    pub signals: serde_json::Map<String, serde_json::Value>,
+    /// Each signal, see [`CHANNELS`](super::CHANNELS).
+    pub signals: Vec<(&'static str, Levels)>,
     /// The same errors as multiples of the noise floor: before, re-identified, after.
     pub multiples: [f64; 3],
 }

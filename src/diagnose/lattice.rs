@@ -4,12 +4,10 @@
 //! is named as the cause when the readings lie on a lattice whose error makes the better part of the noise floor, and
 //! nothing else explains the record better.
 
-use serde_json::json;
-
 use super::assess::Case;
-use super::diagnosis::{Cause, Diagnosis};
+use super::diagnosis::{Cause, Diagnosis, Rounding, RoundingRole, Site};
 use super::noise::NoiseEstimate;
-use super::torque::Decision;
+use super::record::CHANNELS;
 use super::verdict::Verdict;
 use crate::effects::{Effect, Place};
 
@@ -23,29 +21,33 @@ fn dominates(noise: &NoiseEstimate) -> bool {
 
 /// Names quantisation where the record is at the floor and the lattice is what the floor is made of; where it may not be
 /// named, rounding is no noise that would explain the record.
-pub fn judge(case: &Case<'_>, decision: &Decision, diagnosis: &mut Diagnosis) {
-    let quantum = case.noise.quantum.iter().flatten().copied().fold(0.0, f64::max);
+pub fn judge(case: &Case<'_>, diagnosis: &mut Diagnosis) {
+    let step = case.noise.quantum.iter().flatten().copied().fold(0.0, f64::max);
     // A model that rounds as the record does has no gap there.
     let known = case.nominal.effects.of(Effect::EncoderQuantisation)[0];
-    if quantum <= 0.0 || (known - quantum).abs() < SAME * quantum {
+    if step <= 0.0 || (known - step).abs() < SAME * step {
         return;
     }
-    let seen: Vec<usize> = (0..4).filter(|c| case.noise.quantum[*c].is_some()).collect();
-    diagnosis.warnings.push(format!(
-        "{} read in steps of {quantum:.3e}; the noise floor holds their rounding.",
-        seen.iter().map(|c| super::record::CHANNELS[*c]).collect::<Vec<_>>().join(" and "),
-    ));
-    if !matches!(decision.verdict, Verdict::NoGap | Verdict::Parameters) || !dominates(case.noise) {
-        return;
+    let seen = CHANNELS.iter().zip(case.noise.quantum).filter(|(_, q)| q.is_some());
+    let channels = seen.map(|(name, _)| *name).collect();
+    let at_floor = matches!(diagnosis.verdict, Verdict::NoGap | Verdict::Parameters) && dominates(case.noise);
+    let role = match case.suspects.contains(&Effect::EncoderQuantisation) {
+        _ if !at_floor => RoundingRole::Noise,
+        true => RoundingRole::Cause,
+        false => RoundingRole::Withheld,
+    };
+    diagnosis.rounding = Some(Rounding { step, channels, role });
+    match role {
+        RoundingRole::Noise => return,
+        RoundingRole::Cause => {
+            diagnosis.verdict = Verdict::Effect;
+            diagnosis.causes = vec![Cause::alone(Effect::EncoderQuantisation, 0, step, 0.0, case.motion)];
+        }
+        RoundingRole::Withheld => diagnosis.verdict = Verdict::Unexplained,
     }
-    diagnosis.location.place = Place::Sensor.as_str().to_owned();
-    for (place, share) in &mut diagnosis.location.by_place {
-        *share = json!(f64::from(u8::from(place == Place::Sensor.as_str())));
+    let at = Site::At(Place::Sensor);
+    diagnosis.location.site = Some(at);
+    for (site, share) in &mut diagnosis.location.shares {
+        *share = f64::from(u8::from(*site == at));
     }
-    if !case.suspects.contains(&Effect::EncoderQuantisation) {
-        diagnosis.verdict = Verdict::Unexplained;
-        return;
-    }
-    diagnosis.verdict = Verdict::Effect;
-    diagnosis.causes = vec![Cause::alone(Effect::EncoderQuantisation, "step", quantum, 0.0, case.motion.unit("rad"))];
 }

@@ -3,26 +3,28 @@
 mod assess;
 mod closed_loop;
 mod diagnosis;
-mod evidence;
 mod gap;
 mod lattice;
 pub mod location;
 mod model;
 mod noise;
+mod overlay;
 mod record;
 mod repair;
 mod torque;
 mod verdict;
-mod words;
 
 pub use assess::{Case, Outcome, Replay, diagnose};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
-pub use diagnosis::{Cause, ClosureOf, Diagnosis, GapReport, Ranked, Remainder, SCHEMA, Where};
-pub use evidence::{Evidence, Overlay};
+pub use diagnosis::{
+    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Hypothesis, Ranked, Remainder, Rounding,
+    RoundingRole, Site, Where,
+};
 pub use gap::{Figures, Levels};
 pub use location::Location;
 pub use model::{BaseParameter, Model};
 pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
+pub use overlay::Overlay;
 pub use record::{CHANNELS, Record};
 pub use torque::{Confusable, Decision, Fit, Weighed};
 pub use verdict::Verdict;

@@ -1,10 +1,7 @@
 //! The verdict.
 
-use serde::Serialize;
-
 /// What the diagnosis comes to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// One or more effects of the library.
     Effect,
@@ -14,4 +11,17 @@ pub enum Verdict {
     NoGap,
     /// Nothing in the library brings the residual to the floor.
     Unexplained,
+}
+
+impl Verdict {
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Effect => "effect",
+            Self::Parameters => "parameters",
+            Self::NoGap => "no_gap",
+            Self::Unexplained => "unexplained",
+        }
+    }
 }

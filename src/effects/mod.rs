@@ -36,6 +36,7 @@ mod transmitted;
 mod viscous;
 
 pub use extent::Extent;
+pub use hypotheses::Contrast;
 pub use info::{EffectInfo, Family, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 use law::{Absent, Forced, Sliding};

@@ -18,10 +18,8 @@ pub mod polar;
 pub mod terminal;
 pub mod validation;
 
-mod controlled;
 mod decimate;
 mod plot;
-mod residual;
 mod scale;
 
 pub use chain::{ChainDiagram, Place, Symbol};

@@ -7,15 +7,16 @@
 use std::f64::consts::TAU;
 
 use rustfft::{FftPlanner, num_complex::Complex};
-use serde::Serialize;
+
+use super::Side;
 
 /// Part of a residual in a class of lines, or in a band.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyPart {
-    /// The residual: `r1` or `r2`.
-    pub residual: &'static str,
-    /// What the part is: `mean`, `excited_lines`, `even_lines`, `odd_lines`, `foreign`, `turn_order_<n>`, or `band`.
-    pub kind: String,
+    /// The residual.
+    pub residual: Side,
+    /// What the part is.
+    pub of: PartOf,
     /// Lowest frequency, Hz.
     pub from: f64,
     /// Highest frequency, Hz.
@@ -30,6 +31,25 @@ pub struct FrequencyPart {
     pub peak_rms: f64,
 }
 
+/// What a part of a spectrum is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PartOf {
+    /// The constant.
+    Mean,
+    /// Lines of the excitation.
+    Excited,
+    /// Even lines beside them.
+    Even,
+    /// Odd lines beside them.
+    Odd,
+    /// What does not repeat with the excitation.
+    Foreign,
+    /// So many periods in a turn of the motor.
+    Turn(usize),
+    /// A band of a spectrum without lines.
+    Band,
+}
+
 /// Bands of a spectrum without lines.
 const BANDS: usize = 20;
 /// Orders of the turn that are tracked.
@@ -40,7 +60,7 @@ const EXCITED: f64 = 1e-2;
 /// Parts of the residual by frequency: classes of lines under a periodic torque, else bands; and orders of the turn.
 #[must_use]
 pub fn by_frequency(
-    name: &'static str,
+    side: Side,
     residual: &[f64],
     torque: &[f64],
     theta1: &[f64],
@@ -48,10 +68,10 @@ pub fn by_frequency(
     period: Option<usize>,
 ) -> Vec<FrequencyPart> {
     let mut parts = match period.filter(|p| residual.len() >= *p) {
-        Some(p) => by_lines(name, residual, torque, dt, p),
-        None => by_bands(name, residual, dt),
+        Some(p) => by_lines(side, residual, torque, dt, p),
+        None => by_bands(side, residual, dt),
     };
-    parts.extend(by_orders(name, residual, theta1, dt));
+    parts.extend(by_orders(side, residual, theta1, dt));
     parts
 }
 
@@ -67,8 +87,8 @@ fn spectrum(y: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 fn part(
-    name: &'static str,
-    kind: &str,
+    side: Side,
+    of: PartOf,
     lines: impl Iterator<Item = usize>,
     energy: &[f64],
     resolution: f64,
@@ -84,8 +104,8 @@ fn part(
         high = high.max(k);
     }
     (low != usize::MAX && total > 0.0).then(|| FrequencyPart {
-        residual: name,
-        kind: kind.to_string(),
+        residual: side,
+        of,
         from: low as f64 * resolution,
         to: high as f64 * resolution,
         rms: sum.sqrt(),
@@ -96,7 +116,7 @@ fn part(
 }
 
 /// Classes of lines over the last whole periods (the first holds the transient, where there is another).
-fn by_lines(name: &'static str, residual: &[f64], torque: &[f64], dt: f64, period: usize) -> Vec<FrequencyPart> {
+fn by_lines(side: Side, residual: &[f64], torque: &[f64], dt: f64, period: usize) -> Vec<FrequencyPart> {
     let whole = residual.len() / period;
     let used = if whole > 2 { whole - 1 } else { whole } * period;
     let from = residual.len() - used;
@@ -110,27 +130,27 @@ fn by_lines(name: &'static str, residual: &[f64], torque: &[f64], dt: f64, perio
     let top = (1..energy.len()).filter(|k| excited(*k)).max().unwrap_or(0);
     let class = |k: usize| {
         if k == 0 {
-            "mean"
+            PartOf::Mean
         } else if !k.is_multiple_of(periods) {
-            "foreign"
+            PartOf::Foreign
         } else if excited(k) {
-            "excited_lines"
+            PartOf::Excited
         } else if (k / periods).is_multiple_of(2) {
-            "even_lines"
+            PartOf::Even
         } else {
-            "odd_lines"
+            PartOf::Odd
         }
     };
     // Beyond twice the excited band a smoothed residual holds nothing but the smoother's own roll-off.
     let last = (2 * top).clamp(1, energy.len() - 1);
-    ["mean", "excited_lines", "even_lines", "odd_lines", "foreign"]
+    [PartOf::Mean, PartOf::Excited, PartOf::Even, PartOf::Odd, PartOf::Foreign]
         .into_iter()
-        .filter_map(|kind| part(name, kind, (0..=last).filter(|k| class(*k) == kind), &energy, resolution, total))
+        .filter_map(|of| part(side, of, (0..=last).filter(|k| class(*k) == of), &energy, resolution, total))
         .collect()
 }
 
 /// Bands of equal width in the logarithm of the frequency.
-fn by_bands(name: &'static str, residual: &[f64], dt: f64) -> Vec<FrequencyPart> {
+fn by_bands(side: Side, residual: &[f64], dt: f64) -> Vec<FrequencyPart> {
     let n = residual.len();
     let mean = residual.iter().sum::<f64>() / n.max(1) as f64;
     // Hann's window, its gain in energy 3/8.
@@ -144,15 +164,22 @@ fn by_bands(name: &'static str, residual: &[f64], dt: f64) -> Vec<FrequencyPart>
     let resolution = 1.0 / (n as f64 * dt);
     let edge = |i: usize| (energy.len() as f64).powf(i as f64 / BANDS as f64).floor() as usize;
     let mut parts = Vec::with_capacity(BANDS + 1);
-    parts.extend(part(name, "mean", std::iter::once(0), &[mean * mean], resolution, total));
+    parts.extend(part(side, PartOf::Mean, std::iter::once(0), &[mean * mean], resolution, total));
     for i in 0..BANDS {
-        parts.extend(part(name, "band", edge(i).max(1)..edge(i + 1).min(energy.len()), &energy, resolution, total));
+        parts.extend(part(
+            side,
+            PartOf::Band,
+            edge(i).max(1)..edge(i + 1).min(energy.len()),
+            &energy,
+            resolution,
+            total,
+        ));
     }
     parts
 }
 
 /// Orders of the motor's turn: least squares on sine and cosine of `n*theta1`, `n` whole, each alone.
-fn by_orders(name: &'static str, residual: &[f64], theta1: &[f64], dt: f64) -> Vec<FrequencyPart> {
+fn by_orders(side: Side, residual: &[f64], theta1: &[f64], dt: f64) -> Vec<FrequencyPart> {
     let n = residual.len().min(theta1.len());
     let (low, high) = theta1.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     // An order means something only when the axis went through two of its periods.
@@ -178,8 +205,8 @@ fn by_orders(name: &'static str, residual: &[f64], theta1: &[f64], dt: f64) -> V
             let x = m.cholesky()?.solve(&b);
             let energy = (x.dot(&b) / n as f64 - mean * mean).max(0.0);
             Some(FrequencyPart {
-                residual: name,
-                kind: format!("turn_order_{h}"),
+                residual: side,
+                of: PartOf::Turn(h),
                 from: h as f64 * rate,
                 to: h as f64 * rate,
                 rms: energy.sqrt(),
@@ -195,8 +222,8 @@ fn by_orders(name: &'static str, residual: &[f64], theta1: &[f64], dt: f64) -> V
 mod tests {
     use super::*;
 
-    fn share(parts: &[FrequencyPart], kind: &str) -> f64 {
-        parts.iter().filter(|p| p.kind == kind).map(|p| p.share).sum()
+    fn share(parts: &[FrequencyPart], of: PartOf) -> f64 {
+        parts.iter().filter(|p| p.of == of).map(|p| p.share).sum()
     }
 
     /// Odd lines 1, 3, ..., 15 of a period of 512 samples, four periods.
@@ -212,15 +239,15 @@ mod tests {
         let theta = vec![0.0; t.len()];
         let of = |f: &dyn Fn(f64) -> f64| {
             let r: Vec<f64> = t.iter().map(|t| f(*t)).collect();
-            by_frequency("r1", &r, &t, &theta, 1e-3, Some(512))
+            by_frequency(Side::Motor, &r, &t, &theta, 1e-3, Some(512))
         };
         let linear = of(&|t| 0.3 * t);
-        assert!(share(&linear, "excited_lines") > 1.0 - 1e-12);
+        assert!(share(&linear, PartOf::Excited) > 1.0 - 1e-12);
         let square = of(&|t| t * t);
-        assert!(share(&square, "even_lines") + share(&square, "mean") > 1.0 - 1e-12);
+        assert!(share(&square, PartOf::Even) + share(&square, PartOf::Mean) > 1.0 - 1e-12);
         let cube = of(&|t| t.powi(3));
         // Intermodulation falls on odd lines: excited ones, and those between 16 and 30; beyond is not counted.
-        assert!(share(&cube, "even_lines") < 1e-12 && share(&cube, "odd_lines") > 0.05);
+        assert!(share(&cube, PartOf::Even) < 1e-12 && share(&cube, PartOf::Odd) > 0.05);
     }
 
     #[test]
@@ -228,8 +255,8 @@ mod tests {
         let t = torque();
         // 10.25 periods in 512 samples of 1 ms: 20.02 Hz, a bin of the four periods together.
         let r: Vec<f64> = (0..2048).map(|k| (TAU * 10.25 * f64::from(k) / 512.0).sin()).collect();
-        let parts = by_frequency("r2", &r, &t, &r, 1e-3, Some(512));
-        let foreign = parts.iter().find(|p| p.kind == "foreign").unwrap();
+        let parts = by_frequency(Side::Table, &r, &t, &r, 1e-3, Some(512));
+        let foreign = parts.iter().find(|p| p.of == PartOf::Foreign).unwrap();
         // Three periods hold 30.75 of its periods: 1 - sinc(0.75)^2 - sinc(2.25)^2 - ... of it falls beside their lines.
         assert!(foreign.share > 0.85, "{foreign:?}");
         assert!((foreign.peak - 10.25 / 0.512).abs() < 1.0 / 1.5, "{foreign:?}");
@@ -239,8 +266,8 @@ mod tests {
     fn a_ripple_is_tracked_to_its_order() {
         let theta: Vec<f64> = (0..4096).map(|k| 1e-6 * f64::from(k) * f64::from(k)).collect();
         let r: Vec<f64> = theta.iter().map(|a| (3.0 * a + 1.0).sin()).collect();
-        let parts = by_frequency("r1", &r, &vec![0.0; 4096], &theta, 1e-3, None);
-        assert!(share(&parts, "turn_order_3") > 0.95, "{parts:?}");
-        assert!(share(&parts, "turn_order_2") < 0.1);
+        let parts = by_frequency(Side::Motor, &r, &vec![0.0; 4096], &theta, 1e-3, None);
+        assert!(share(&parts, PartOf::Turn(3)) > 0.95, "{parts:?}");
+        assert!(share(&parts, PartOf::Turn(2)) < 0.1);
     }
 }

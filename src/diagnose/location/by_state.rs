@@ -3,13 +3,13 @@
 
 use std::f64::consts::TAU;
 
-use serde::Serialize;
+use super::Side;
 
 /// Bins of a curve.
 const BINS: usize = 24;
 
 /// One bin.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Bin {
     /// Mean of the variable in the bin.
     pub x: f64,
@@ -22,24 +22,68 @@ pub struct Bin {
 }
 
 /// A residual against one variable.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StateCurve {
-    /// The residual: `r1` or `r2`.
-    pub residual: &'static str,
-    /// Its unit on a rotary axis.
-    pub unit: &'static str,
+    /// The residual.
+    pub residual: Side,
     /// The variable it stands against.
-    pub against: &'static str,
-    /// Its unit on a rotary axis.
-    pub against_unit: &'static str,
+    pub against: StateVariable,
     /// Bins with equally many samples, in the order of the variable.
     pub bins: Vec<Bin>,
     /// Share of the residual's variance about its mean that the curve explains, 0 to 1.
     pub explained: f64,
 }
 
-/// A variable: name, unit, values.
-pub type Variable<'a> = (&'static str, &'static str, Vec<f64>);
+/// A variable of the motion, or the torque.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StateVariable {
+    /// Speed of the motor.
+    Omega1,
+    /// Angle of the motor within its turn.
+    Turn1,
+    /// Angle of the motor.
+    Theta1,
+    /// Torque.
+    Torque,
+    /// Speed of the table.
+    Omega2,
+    /// Angle of the table within its turn.
+    Turn2,
+    /// Angle of the table.
+    Theta2,
+    /// Twist of the coupling.
+    Twist,
+    /// Rate of the twist.
+    TwistRate,
+}
+
+impl StateVariable {
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Omega1 => "omega1",
+            Self::Turn1 => "theta1 within the turn",
+            Self::Theta1 => "theta1",
+            Self::Torque => "T",
+            Self::Omega2 => "omega2",
+            Self::Turn2 => "theta2 within the turn",
+            Self::Theta2 => "theta2",
+            Self::Twist => "twist",
+            Self::TwistRate => "twist rate",
+        }
+    }
+
+    /// Its unit on a rotary axis.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Omega1 | Self::Omega2 | Self::TwistRate => "rad/s",
+            Self::Torque => "N.m",
+            Self::Turn1 | Self::Theta1 | Self::Turn2 | Self::Theta2 | Self::Twist => "rad",
+        }
+    }
+}
 
 /// The angle within its turn, rad.
 #[must_use]
@@ -49,8 +93,7 @@ pub fn within_turn(angles: &[f64]) -> Vec<f64> {
 
 /// The curve of a residual against a variable; `None` with too few samples or a variable that does not change.
 #[must_use]
-pub fn curve(residual: (&'static str, &'static str), r: &[f64], variable: &Variable<'_>) -> Option<StateCurve> {
-    let (against, against_unit, x) = variable;
+pub fn curve(residual: Side, r: &[f64], against: StateVariable, x: &[f64]) -> Option<StateCurve> {
     let n = r.len();
     if n < 4 * BINS {
         return None;
@@ -78,7 +121,7 @@ pub fn curve(residual: (&'static str, &'static str), r: &[f64], variable: &Varia
         });
     }
     let explained = if total > 0.0 { between / total } else { 0.0 };
-    Some(StateCurve { residual: residual.0, unit: residual.1, against, against_unit, bins, explained })
+    Some(StateCurve { residual, against, bins, explained })
 }
 
 /// What a curve looks like.
@@ -138,7 +181,7 @@ mod tests {
     fn of(f: impl Fn(f64) -> f64) -> StateCurve {
         let x: Vec<f64> = (0..4096).map(|k| 3.0 * (f64::from(k) * 0.7).sin()).collect();
         let r: Vec<f64> = x.iter().map(|x| f(*x)).collect();
-        curve(("r1", "N.m"), &r, &("omega1", "rad/s", x)).unwrap()
+        curve(Side::Motor, &r, StateVariable::Omega1, &x).unwrap()
     }
 
     #[test]
@@ -147,7 +190,7 @@ mod tests {
         let x: Vec<f64> = (0..4096).map(|k| (f64::from(k) * 0.7).sin()).collect();
         let r: Vec<f64> = (0..4096).map(|k| (f64::from(k) * 1.9).cos()).collect();
         // 24 bins of a residual that does not depend on x: 23/4095 by chance.
-        assert!(curve(("r1", "N.m"), &r, &("omega1", "rad/s", x)).unwrap().explained < 0.02);
+        assert!(curve(Side::Motor, &r, StateVariable::Omega1, &x).unwrap().explained < 0.02);
     }
 
     #[test]

@@ -1,12 +1,10 @@
 //! The residual in time: a drift, an event, or throughout.
 
-use serde::Serialize;
-
 /// Slots of a record.
 const SLOTS: usize = 20;
 
 /// One slot.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TimeSlot {
     /// Start of the slot, s.
     pub start: f64,
@@ -21,8 +19,7 @@ pub struct TimeSlot {
 }
 
 /// How a residual spreads over the record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spread {
     /// Alike in every slot.
     Throughout,
@@ -92,7 +89,7 @@ fn rank_correlation(values: &[f64]) -> f64 {
 }
 
 /// Root mean square.
-fn rms(v: &[f64]) -> f64 {
+pub fn rms(v: &[f64]) -> f64 {
     (v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64).sqrt()
 }
 

@@ -3,41 +3,60 @@
 //! The residual torques `r1`, `r2` are what the model lacks to follow the record ([`super::torque`]), in the sign of
 //! `I1*a1 + B*(w1 - w2) + K*(th1 - th2) - T` and `I2*a2 - B*(w1 - w2) - K*(th1 - th2)`: positive where a torque drives the axis that the model does not know.
 
+mod appearance;
 mod by_frequency;
 mod by_state;
 mod by_time;
-pub(super) mod words;
 
-use serde::Serialize;
-
-pub use by_frequency::FrequencyPart;
-pub use by_state::{Bin, StateCurve};
+pub use appearance::{Appearance, Dependence, OwnFrequency};
+pub use by_frequency::{FrequencyPart, PartOf};
+pub use by_state::{Bin, Shape, StateCurve, StateVariable};
 pub use by_time::{Spread, TimeSlot};
 
+use super::diagnosis::Site;
 use super::noise::find_period;
 use super::record::Record;
 use crate::axis::{Parameters, Structure};
 use crate::effects::Place;
 
-/// Where the gap lies.
-#[derive(Debug, Clone, Serialize)]
+/// Which of the residual torques.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// `r1`; a rigid axis has no other.
+    Motor,
+    /// `r2`.
+    Table,
+}
+
+impl Side {
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Motor => "r1",
+            Self::Table => "r2",
+        }
+    }
+
+    /// Its unit on a rotary axis.
+    pub const UNIT: &str = "N.m";
+}
+
+/// Where a residual torque shows.
+#[derive(Debug, Clone)]
 pub struct Location {
-    /// The place; `None` where nothing but parameters and initial state is needed.
-    #[serde(skip)]
-    pub place: Option<Place>,
-    /// How the gap spreads over the record.
-    pub spread: Spread,
+    /// The place in the chain.
+    pub site: Site,
+    /// Rms of `r1`, N.m.
+    pub rms: f64,
+    /// What `r1` looks like.
+    pub looks: Appearance,
     /// Rms in slots of time.
     pub by_time: Vec<TimeSlot>,
     /// Parts by frequency.
     pub by_frequency: Vec<FrequencyPart>,
     /// Residuals against the state.
     pub by_state: Vec<StateCurve>,
-    /// In a sentence.
-    pub summary: String,
-    /// The residual torques and the states by sample.
-    #[serde(skip)]
-    pub residual: Residual,
 }
 
 /// Residual torques and smoothed states, by sample.
@@ -47,34 +66,32 @@ pub struct Residual {
     pub r1: Vec<f64>,
     /// The same on the table; empty for a rigid axis.
     pub r2: Vec<f64>,
-    /// That of the two at the place found, N.m.
-    pub at_place: Vec<f64>,
     /// Smoothed `[theta1, omega1, theta2, omega2]`.
     pub states: Vec<[f64; 4]>,
 }
 
-/// Where a residual torque on the one inertia of a rigid axis shows: in time, frequency and state.
-#[must_use]
-pub fn along(record: &Record, residual: Residual) -> Location {
-    let flexible = !residual.r2.is_empty();
-    let by_state = state_curves(record, &residual, flexible);
-    let by_frequency = frequency_parts(record, &residual);
-    let slots = by_time::by_time(
-        record.start,
-        record.dt,
-        &residual.r1,
-        flexible.then_some(&residual.r2[..]),
-        &residual.at_place,
-    );
-    Location {
-        place: None,
-        spread: by_time::spread(&slots),
-        by_time: slots,
-        by_frequency,
-        by_state,
-        summary: String::new(),
-        residual,
+impl Residual {
+    /// The torques that there are.
+    fn series(&self) -> impl Iterator<Item = (Side, &[f64])> {
+        [(Side::Motor, &self.r1[..]), (Side::Table, &self.r2[..])].into_iter().filter(|(_, r)| !r.is_empty())
     }
+}
+
+/// How a residual torque that acts at a site shows: in time, frequency and state.
+#[must_use]
+pub fn along(record: &Record, residual: &Residual, site: Site) -> Location {
+    let Residual { r1, r2, .. } = residual;
+    let flexible = !r2.is_empty();
+    let by_state = state_curves(record, residual, flexible);
+    let by_frequency = frequency_parts(record, residual);
+    let at_site = if flexible && site == Site::At(Place::Table) { r2 } else { r1 };
+    let by_time = by_time::by_time(record.start, record.dt, r1, flexible.then_some(&r2[..]), at_site);
+    let looks = Appearance {
+        dependence: appearance::dependence(&by_state, Side::Motor),
+        frequency: appearance::frequency(&by_frequency, Side::Motor),
+        spread: by_time::spread(&by_time),
+    };
+    Location { site, rms: by_time::rms(r1), looks, by_time, by_frequency, by_state }
 }
 
 /// The record with the table's angle moved to the motor's, where the two start farther apart than the coupling could
@@ -97,43 +114,34 @@ pub fn without_offset(record: &Record, p: &Parameters, structure: Structure) -> 
     record
 }
 
-/// The series to look at: both residual torques.
-fn series(residual: &Residual) -> Vec<((&'static str, &'static str), &[f64])> {
-    let mut all: Vec<((&'static str, &'static str), &[f64])> = vec![(("r1", "N.m"), &residual.r1)];
-    if !residual.r2.is_empty() {
-        all.push((("r2", "N.m"), &residual.r2));
-    }
-    all
-}
-
 fn frequency_parts(record: &Record, residual: &Residual) -> Vec<FrequencyPart> {
     let period = find_period(&record.torque);
     let theta1: Vec<f64> = residual.states.iter().map(|s| s[0]).collect();
-    series(residual)
-        .into_iter()
-        .flat_map(|((name, _), r)| by_frequency::by_frequency(name, r, &record.torque, &theta1, record.dt, period))
+    residual
+        .series()
+        .flat_map(|(side, r)| by_frequency::by_frequency(side, r, &record.torque, &theta1, record.dt, period))
         .collect()
 }
 
 fn state_curves(record: &Record, residual: &Residual, flexible: bool) -> Vec<StateCurve> {
     let column = |f: &dyn Fn(&[f64; 4]) -> f64| residual.states.iter().map(f).collect::<Vec<_>>();
-    let mut variables: Vec<by_state::Variable<'_>> = vec![
-        ("omega1", "rad/s", column(&|s| s[1])),
-        ("theta1 within the turn", "rad", by_state::within_turn(&column(&|s| s[0]))),
-        ("theta1", "rad", column(&|s| s[0])),
-        ("T", "N.m", record.torque.clone()),
+    let mut variables = vec![
+        (StateVariable::Omega1, column(&|s| s[1])),
+        (StateVariable::Turn1, by_state::within_turn(&column(&|s| s[0]))),
+        (StateVariable::Theta1, column(&|s| s[0])),
+        (StateVariable::Torque, record.torque.clone()),
     ];
     if flexible {
         variables.extend([
-            ("omega2", "rad/s", column(&|s| s[3])),
-            ("theta2 within the turn", "rad", by_state::within_turn(&column(&|s| s[2]))),
-            ("theta2", "rad", column(&|s| s[2])),
-            ("twist", "rad", column(&|s| s[0] - s[2])),
-            ("twist rate", "rad/s", column(&|s| s[1] - s[3])),
+            (StateVariable::Omega2, column(&|s| s[3])),
+            (StateVariable::Turn2, by_state::within_turn(&column(&|s| s[2]))),
+            (StateVariable::Theta2, column(&|s| s[2])),
+            (StateVariable::Twist, column(&|s| s[0] - s[2])),
+            (StateVariable::TwistRate, column(&|s| s[1] - s[3])),
         ]);
     }
-    series(residual)
-        .into_iter()
-        .flat_map(|(name, r)| variables.iter().filter_map(move |v| by_state::curve(name, r, v)).collect::<Vec<_>>())
+    residual
+        .series()
+        .flat_map(|(side, r)| variables.iter().filter_map(move |(v, x)| by_state::curve(side, r, *v, x)))
         .collect()
 }

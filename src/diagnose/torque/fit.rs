@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
+use super::super::diagnosis::Hypothesis;
 use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::super::record::Record;
 use super::descent::{Along, Descent, differ};
@@ -58,13 +59,13 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Ids of its effects, joined by `+`; `parameters` or `no_gap` without any.
+    /// What it is a fit of.
     #[must_use]
-    pub fn id(&self) -> String {
+    pub fn hypothesis(&self) -> Hypothesis {
         match (self.terms.is_empty(), self.coordinates.is_empty()) {
-            (true, true) => "no_gap".to_owned(),
-            (true, false) => "parameters".to_owned(),
-            _ => self.terms.iter().map(|(e, _)| e.info().id).collect::<Vec<_>>().join("+"),
+            (true, true) => Hypothesis::NoGap,
+            (true, false) => Hypothesis::Parameters,
+            _ => Hypothesis::Effects(self.terms.iter().map(|(e, _)| *e).collect()),
         }
     }
 }

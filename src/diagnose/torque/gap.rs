@@ -210,7 +210,7 @@ fn gap(record: &Record, pieces: &[Pieces], of: ClosureOf) -> Gap {
                 after: relative(total[2][c], c),
                 noise_floor,
             };
-            (CHANNELS[c].to_owned(), serde_json::json!(levels))
+            (CHANNELS[c], levels)
         })
         .collect();
     let weigh = |e: &Errors| present.iter().map(|&c| e[c] / scale[c].max(f64::MIN_POSITIVE).powi(2)).sum::<f64>();

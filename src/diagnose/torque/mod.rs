@@ -18,17 +18,15 @@ mod starts;
 #[cfg(test)]
 mod tests;
 mod tracking;
-mod words;
 
 use rayon::prelude::*;
-use serde_json::{Map, Value, json};
 
 use super::assess::{Case, HELD_OUT, Outcome, Replay};
-use super::diagnosis::{Cause, Diagnosis, GapReport, Ranked, Remainder, SCHEMA, Where};
-use super::evidence::{Evidence, Overlay};
+use super::diagnosis::{AxisParameter, Cause, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Remainder, Site, Where};
 use super::lattice;
 use super::location::{Location, Residual, along, without_offset};
 use super::model::{BaseParameter, Free, Model};
+use super::overlay::Overlay;
 use super::record::{CHANNELS, Record};
 use super::repair::bridged;
 use super::verdict::Verdict;
@@ -69,31 +67,30 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let on_held = gap::measure(&held, &models);
     progress("where");
     let located = located(&searched, &models[1], decision.parameters.bandwidth);
-    let mut diagnosis = build(case, &decision, &searched, &held, on_train, &on_held, &located);
-    lattice::judge(case, &decision, &mut diagnosis);
-    super::words::fill(&mut diagnosis, &decision);
-    let evidence = Evidence { held: overlays(&held, &on_held), located };
+    let mut diagnosis = build(case, &decision, &searched, &held, on_train, &on_held, located);
+    lattice::judge(case, &mut diagnosis);
+    let overlays = overlays(&held, &on_held);
     let replay = Replay { initial: on_held.initial, record: held };
-    Outcome { diagnosis, improved: models[2], models, decision, evidence, replay }
+    Outcome { diagnosis, improved: models[2], models, decision, overlays, replay }
 }
 
 fn remains(p: &Prepared, fit: &Fit) -> Remainder {
     let rigid = fit.model.structure == Structure::Rigid;
     let tracked = track(&fit.model, &p.record, fit.bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
-    let place = where_by_torque(&series, rigid);
-    let shown = along(&p.record, residual(&series[usize::from(place == "table")], &tracked));
+    let site = where_by_torque(&series, rigid);
+    let shown = along(&p.record, &residual(&series[usize::from(site == Site::At(Place::Table))], &tracked), site);
     Remainder {
         torque_rms: p.band.torque_rms(fit.discrepancy),
         share: p.band.torque_share(fit.discrepancy, &p.record),
         noise_multiple: p.band.noise_multiple(&fit.rows),
-        place: place.to_owned(),
-        summary: words::shows(&shown),
+        site,
+        looks: shown.looks,
     }
 }
 
 fn residual(series: &[f64], tracked: &Tracked) -> Residual {
-    Residual { r1: series.to_vec(), at_place: series.to_vec(), states: tracked.motion.clone(), ..Residual::default() }
+    Residual { r1: series.to_vec(), states: tracked.motion.clone(), ..Residual::default() }
 }
 
 /// The record that the fits see, and the one that they do not.
@@ -135,24 +132,13 @@ fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
     let tracked = track(model, &p.record, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
     let rigid = model.structure == Structure::Rigid;
+    let site = where_by_torque(&series, rigid);
     let mut residual = residual(&series[0], &tracked);
-    let place = match where_by_torque(&series, rigid) {
-        "coupling" => Some(Place::Coupling),
-        "table" => Some(Place::Table),
-        "motor" => Some(Place::Motor),
-        _ => None,
-    };
     if !rigid {
         let [_, r2] = series;
-        if place == Some(Place::Table) {
-            residual.at_place.clone_from(&r2);
-        }
         residual.r2 = r2;
     }
-    let mut located = along(&p.record, residual);
-    located.place = place;
-    located.summary = words::gap_shows(&located);
-    located
+    along(&p.record, &residual, site)
 }
 
 fn build(
@@ -162,7 +148,7 @@ fn build(
     held: &Record,
     train: Gap,
     holdout: &Gap,
-    located: &Location,
+    located: Location,
 ) -> Diagnosis {
     let structure = case.nominal.structure;
     let best = decision.ranking.first().map_or(0.0, |w| w.evidence);
@@ -170,38 +156,32 @@ fn build(
         .ranking
         .par_iter()
         .take(TOLD)
-        .map(|w| {
-            let first = w.fit.terms.first().map(|t| t.0.info());
-            Ranked {
-                id: w.fit.id(),
-                family: first.map_or("none", |i| i.family.as_str()).to_owned(),
-                place: first.map_or("none", |i| place_of(i.place, structure)).to_owned(),
-                probability: w.probability,
-                delta_bic: 2.0 * (best - w.evidence),
-                chi2: searched.band.noise_multiple(&w.fit.rows).powi(2),
-                closure_holdout: gap::measure(held, &[decision.given.model, decision.parameters.model, w.fit.model])
-                    .closure,
-            }
+        .map(|w| Ranked {
+            hypothesis: w.fit.hypothesis(),
+            site: w.fit.terms.first().map(|t| Site::of(t.0.info().place, structure)),
+            probability: w.probability,
+            delta_bic: 2.0 * (best - w.evidence),
+            chi2: searched.band.noise_multiple(&w.fit.rows).powi(2),
+            closure_holdout: gap::measure(held, &[decision.given.model, decision.parameters.model, w.fit.model])
+                .closure,
         })
         .collect();
     let causes = match decision.torque_gain() {
         Some((gain, std)) if decision.verdict == Verdict::Parameters => {
-            vec![Cause::alone(Effect::TorqueGain, "gain", gain, std, "1")]
+            vec![Cause::alone(Effect::TorqueGain, 0, gain, std, case.motion)]
         }
         _ => causes(decision, case.motion),
     };
     let verdict = decision.verdict;
     Diagnosis {
-        schema: SCHEMA,
         machine: case.machine.clone(),
         verdict,
-        sentence: String::new(),
+        chosen: decision.chosen.hypothesis(),
         location: location(&causes, verdict, located, structure),
         causes,
         ranking,
-        confusable: Vec::new(),
-        next_experiment: String::new(),
-        remainder: Some(remains(searched, &decision.chosen)),
+        confusable: decision.confusable.clone(),
+        remainder: remains(searched, &decision.chosen),
         gap: GapReport {
             closure: holdout.closure,
             closure_of_effect: holdout.closure_of_effect,
@@ -209,20 +189,11 @@ fn build(
             closure_of: holdout.of,
             train: train.figures,
             holdout: holdout.figures.clone(),
-            holdout_is: if case.holdout.is_some() { "a second record" } else { "the last third of the record" }
-                .to_owned(),
+            holdout_is: if case.holdout.is_some() { HeldOut::SecondRecord } else { HeldOut::LastThird },
         },
         parameters: parameters(case, decision),
-        warnings: Vec::new(),
+        rounding: None,
         closed_loop: None,
-    }
-}
-
-/// The name of a place: a rigid axis has one for all that acts on its motion.
-fn place_of(place: Place, structure: Structure) -> &'static str {
-    match place {
-        Place::Motor | Place::Coupling | Place::Table if structure == Structure::Rigid => "axis",
-        place => place.as_str(),
     }
 }
 
@@ -234,29 +205,17 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
         .enumerate()
         .map(|(i, (effect, form))| {
             let info = effect.info();
-            let parameters = info.variants[*form]
-                .free
-                .iter()
-                .map(|&p| {
-                    let at = fit.coordinates.iter().position(|c| c.free == Free::Effect(*effect, p));
-                    let std = at
-                        .and_then(|a| fit.std.get(a))
-                        .map_or(Value::Null, |s| number(s / decision.independent.sqrt()));
-                    let q = &info.parameters[p];
-                    (
-                        q.name.to_owned(),
-                        json!({ "value": fit.model.effects.of(*effect)[p], "std": std, "unit": motion.unit(q.unit) }),
-                    )
-                })
-                .collect();
+            let parameters = info.variants[*form].free.iter().map(|&p| {
+                let value = fit.model.effects.of(*effect)[p];
+                (p, estimate(decision, Free::Effect(*effect, p), value, motion.unit(info.parameters[p].unit)))
+            });
             Cause {
-                id: info.id.to_owned(),
-                family: info.family.as_str().to_owned(),
-                place: place_of(info.place, fit.model.structure).to_owned(),
-                variant: info.variants[*form].name.to_owned(),
+                effect: *effect,
+                site: Site::of(info.place, fit.model.structure),
+                variant: info.variants[*form].name,
                 probability: decision.probabilities[i],
                 share_of_gap: decision.shares[i],
-                parameters,
+                parameters: parameters.collect(),
             }
         })
         .collect();
@@ -264,77 +223,60 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
     causes
 }
 
-fn number(v: f64) -> Value {
-    if v.is_finite() { json!(v) } else { Value::Null }
+/// A value of the chosen fit with its standard error, which counts the independent samples alone.
+fn estimate(decision: &Decision, free: Free, value: f64, unit: &'static str) -> Estimate {
+    let fit = &decision.chosen;
+    let at = fit.coordinates.iter().position(|c| c.free == free);
+    let std = at.and_then(|i| fit.std.get(i)).map(|s| s / decision.independent.sqrt());
+    Estimate { value, std: std.filter(|s| s.is_finite()), unit }
 }
 
 /// Correlation of the two residual torques below which they are one, equal and opposite: in the coupling.
 const OPPOSITE: f64 = -0.8;
 
 /// Where residual torques show, without knowing any cause.
-fn where_by_torque(series: &[Vec<f64>; 2], rigid: bool) -> &'static str {
+fn where_by_torque(series: &[Vec<f64>; 2], rigid: bool) -> Site {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let [motor, table] = [0, 1].map(|i: usize| dot(&series[i], &series[i]).sqrt());
     if rigid {
-        "axis"
+        Site::Axis
     } else if dot(&series[0], &series[1]) < OPPOSITE * motor * table {
-        "coupling"
+        Site::At(Place::Coupling)
     } else if table > motor {
-        "table"
+        Site::At(Place::Table)
     } else {
-        "motor"
+        Site::At(Place::Motor)
     }
 }
 
-fn location(causes: &[Cause], verdict: Verdict, located: &Location, structure: Structure) -> Where {
-    let places: &[&str] = match structure {
-        Structure::Rigid => &["input", "axis", "sensor"],
-        Structure::TwoInertia => &["input", "motor", "coupling", "table", "sensor"],
+fn location(causes: &[Cause], verdict: Verdict, shown: Location, structure: Structure) -> Where {
+    let share = |site: &Site| -> f64 {
+        if causes.is_empty() {
+            f64::from(u8::from(*site == shown.site && verdict == Verdict::Unexplained))
+        } else {
+            causes.iter().filter(|c| c.site == *site).map(|c| c.share_of_gap).sum()
+        }
     };
-    let unexplained = located.place.map_or("axis", Place::as_str);
-    let by_place: Map<String, Value> = places
-        .iter()
-        .map(|p| {
-            let named: f64 = causes.iter().filter(|c| c.place == *p).map(|c| c.share_of_gap).sum();
-            let share = if causes.is_empty() {
-                f64::from(u8::from(*p == unexplained && verdict == Verdict::Unexplained))
-            } else {
-                named
-            };
-            ((*p).to_owned(), json!(share))
-        })
-        .collect();
-    let place = match (causes.first(), verdict) {
-        (Some(c), Verdict::Effect) => c.place.clone(),
-        (_, Verdict::Unexplained) => unexplained.to_owned(),
-        _ => "none".to_owned(),
+    let shares = Site::all(structure).iter().map(|site| (*site, share(site))).collect();
+    let site = match verdict {
+        Verdict::Effect => causes.first().map(|c| c.site),
+        Verdict::Unexplained => Some(shown.site),
+        Verdict::Parameters | Verdict::NoGap => None,
     };
-    Where {
-        summary: located.summary.clone(),
-        place,
-        by_place,
-        by_time: json!(located.by_time),
-        by_frequency: json!(located.by_frequency),
-        by_state: json!(located.by_state),
-    }
+    Where { site, shares, shown }
 }
 
-fn parameters(case: &Case<'_>, decision: &Decision) -> Map<String, Value> {
-    let fit = &decision.chosen;
-    BaseParameter::of(case.nominal.structure)
-        .iter()
-        .map(|p| {
-            let at = fit.coordinates.iter().position(|c| c.free == Free::Base(*p));
-            let value = json!({
-                "nominal": p.value(&case.nominal.parameters),
-                "reidentified": p.value(&decision.parameters.model.parameters),
-                "fitted": p.value(&fit.model.parameters),
-                "std": at.and_then(|i| fit.std.get(i)).map_or(Value::Null, |s| number(s / decision.independent.sqrt())),
-                "unit": case.motion.unit(p.unit()),
-            });
-            (p.name().to_owned(), value)
-        })
-        .collect()
+fn parameters(case: &Case<'_>, decision: &Decision) -> Vec<AxisParameter> {
+    let of = |p: &BaseParameter| {
+        let value = p.value(&decision.chosen.model.parameters);
+        AxisParameter {
+            parameter: *p,
+            nominal: p.value(&case.nominal.parameters),
+            reidentified: p.value(&decision.parameters.model.parameters),
+            fitted: estimate(decision, Free::Base(*p), value, case.motion.unit(p.unit())),
+        }
+    };
+    BaseParameter::of(case.nominal.structure).iter().map(of).collect()
 }
 
 fn overlays(record: &Record, gap: &Gap) -> Vec<Overlay> {

@@ -1,6 +1,7 @@
 //! Rigid axes under control, made by the axis' own step: what a drive's log looks like.
 
 use super::super::assess::{Case, Outcome};
+use super::super::diagnosis::Site;
 use super::super::model::Model;
 use super::super::noise::estimate_noise;
 use super::super::record::Record;
@@ -71,7 +72,7 @@ fn named(o: &Outcome) -> Vec<&'static str> {
 fn told(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
     let line = |w: &super::Weighed| {
         let values = w.fit.terms.iter().map(|(e, _)| w.fit.model.effects.of(*e).to_vec()).collect();
-        (w.fit.id(), w.evidence, values)
+        (w.fit.hypothesis().to_string(), w.evidence, values)
     };
     o.decision.ranking.iter().take(12).map(line).collect()
 }
@@ -102,9 +103,9 @@ fn friction_and_a_bias_are_named_with_their_sizes_at_the_axis() {
         let got = o.improved.effects.of(effect)[i];
         assert!((got / value - 1.0).abs() < 0.03, "{effect:?} {got}");
     }
-    assert!(o.diagnosis.causes.iter().all(|c| c.place == "axis"), "{:?}", o.diagnosis.causes);
-    let remainder = o.diagnosis.remainder.expect("compared");
-    assert!(remainder.share < 0.05 && remainder.place == "axis", "{remainder:?}");
+    assert!(o.diagnosis.causes.iter().all(|c| c.site == Site::Axis), "{:?}", o.diagnosis.causes);
+    let remainder = o.diagnosis.remainder;
+    assert!(remainder.share < 0.05 && remainder.site == Site::Axis, "{remainder:?}");
 }
 
 #[test]

@@ -1,15 +1,4 @@
-//! What the report draws: the location with its residual torques, and the held-out signals with the models' runs.
-
-use super::location::Location;
-
-/// What the report draws.
-#[derive(Debug, Clone)]
-pub struct Evidence {
-    /// Where the gap lies, with the residual torques.
-    pub located: Location,
-    /// Held-out signals with the models' runs.
-    pub held: Vec<Overlay>,
-}
+//! Held-out signals with the models' runs: what the report draws.
 
 /// A measured channel and the models' runs, window by window; a missing value stands between two windows.
 #[derive(Debug, Clone, PartialEq)]

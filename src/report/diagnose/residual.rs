@@ -3,10 +3,12 @@
 
 use std::sync::Arc;
 
-use super::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
-use super::{Block, Cell, Figure, Table};
-use crate::diagnose::location::{FrequencyPart, StateCurve};
-use crate::diagnose::{ClosureOf, Diagnosis, Location, Overlay};
+use super::naming;
+use crate::diagnose::location::{FrequencyPart, PartOf, Side, StateCurve};
+use crate::diagnose::{ClosureOf, Location, Overlay, Site, Where};
+use crate::effects::Place;
+use crate::report::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
+use crate::report::{Block, Cell, Figure, Table};
 use crate::trace::{Motion, Signal};
 
 /// Most plots of a residual against a state.
@@ -68,38 +70,12 @@ pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: Moti
     ]
 }
 
-/// A residual's name in words.
-fn words(residual: &str) -> &str {
-    match residual {
-        "r1" => "residual torque on the motor",
-        "r2" => "residual torque on the table",
-        "coupling" => "residual torque in the coupling",
-        "sensor" => "error of the table's encoder",
-        other => other,
-    }
-}
-
-/// The residual that belongs to a place.
-fn at(place: &str) -> &'static str {
-    match place {
-        "coupling" => "coupling",
-        "table" => "r2",
-        "sensor" => "sensor",
-        _ => "r1",
-    }
-}
-
 /// Pictures of where the gap shows.
-pub(super) fn blocks(located: &Location, d: &Diagnosis, motion: Motion) -> Vec<Block> {
-    let wanted = at(&d.location.place);
-    let has = |name: &str| located.by_frequency.iter().any(|p| p.residual == name);
-    let name = if has(wanted) { wanted } else { "r1" };
-    let unit = match (name, motion) {
-        ("sensor", Motion::Rotary) => "rad",
-        ("sensor", Motion::Linear) => "m",
-        (_, Motion::Rotary) => "N.m",
-        (_, Motion::Linear) => "N",
-    };
+pub(super) fn blocks(w: &Where, motion: Motion) -> Vec<Block> {
+    let located = &w.shown;
+    let has = |side: Side| located.by_frequency.iter().any(|p| p.residual == side);
+    let name = if w.site == Some(Site::At(Place::Table)) && has(Side::Table) { Side::Table } else { Side::Motor };
+    let unit = motion.unit(Side::UNIT);
     let mut figures = vec![along_time(located, name, unit)];
     figures.extend(over_frequency(&located.by_frequency, name, unit));
     let mut curves: Vec<&StateCurve> = located.by_state.iter().filter(|c| c.residual == name).collect();
@@ -113,21 +89,20 @@ pub(super) fn blocks(located: &Location, d: &Diagnosis, motion: Motion) -> Vec<B
     blocks
 }
 
-fn along_time(located: &Location, name: &str, unit: &str) -> Figure {
+fn along_time(located: &Location, name: Side, unit: &str) -> Figure {
     let middle: Vec<f64> = located.by_time.iter().map(|s| 0.5 * (s.start + s.end)).collect();
     let rms: Vec<f64> = located
         .by_time
         .iter()
         .map(|s| match name {
-            "r1" => s.r1,
-            "r2" => s.r2.unwrap_or(f64::NAN),
-            _ => s.at_place,
+            Side::Motor => s.r1,
+            Side::Table => s.r2.unwrap_or(f64::NAN),
         })
         .collect();
     let chart = Chart::new(
         "Along the record",
         Axis::linear("time", "s"),
-        Axis::linear(format!("{}, rms", words(name)), unit).over(Range::WithZero),
+        Axis::linear(format!("{}, rms", naming::residual(name)), unit).over(Range::WithZero),
     )
     .with(Series::line("", middle.clone(), rms.clone()).in_colour(Colour::Vermillion))
     .with(Series::points("", middle, rms).in_colour(Colour::Vermillion));
@@ -135,8 +110,8 @@ fn along_time(located: &Location, name: &str, unit: &str) -> Figure {
 }
 
 /// The bands of a spectrum without lines; with lines the table of parts says more.
-fn over_frequency(parts: &[FrequencyPart], name: &str, unit: &str) -> Option<Figure> {
-    let bands: Vec<&FrequencyPart> = parts.iter().filter(|p| p.residual == name && p.kind == "band").collect();
+fn over_frequency(parts: &[FrequencyPart], name: Side, unit: &str) -> Option<Figure> {
+    let bands: Vec<&FrequencyPart> = parts.iter().filter(|p| p.residual == name && p.of == PartOf::Band).collect();
     if bands.len() < 3 {
         return None;
     }
@@ -145,7 +120,7 @@ fn over_frequency(parts: &[FrequencyPart], name: &str, unit: &str) -> Option<Fig
     let chart = Chart::new(
         "Over frequency",
         Axis::log("frequency", "Hz"),
-        Axis::linear(format!("{}, rms", words(name)), unit).over(Range::WithZero),
+        Axis::linear(format!("{}, rms", naming::residual(name)), unit).over(Range::WithZero),
     )
     .with(Series::line("", x.clone(), y.clone()).in_colour(Colour::Vermillion))
     .with(Series::points("", x, y).in_colour(Colour::Vermillion));
@@ -158,9 +133,9 @@ fn against_state(c: &StateCurve, unit: &str) -> Figure {
     let low: Vec<f64> = c.bins.iter().map(|b| b.mean - b.std).collect();
     let high: Vec<f64> = c.bins.iter().map(|b| b.mean + b.std).collect();
     let chart = Chart::new(
-        format!("Against {}", c.against),
-        Axis::linear(c.against, c.against_unit),
-        Axis::linear(words(c.residual), unit),
+        format!("Against {}", c.against.as_str()),
+        Axis::linear(c.against.as_str(), c.against.unit()),
+        Axis::linear(naming::residual(c.residual), unit),
     )
     .with(Series::band("± 1 standard deviation", x.clone(), low, high).in_colour(Colour::Orange))
     .with(Series::line("mean", x.clone(), mean.clone()).in_colour(Colour::Vermillion))
@@ -169,21 +144,21 @@ fn against_state(c: &StateCurve, unit: &str) -> Figure {
 }
 
 /// The parts of the residual by lines of the excitation and of the turn.
-fn parts(all: &[FrequencyPart], name: &str, unit: &str) -> Table {
-    let mut table = Table::new(format!("The {} by frequency", words(name)), ["part", "share", "rms", "largest line"]);
+fn parts(all: &[FrequencyPart], name: Side, unit: &str) -> Table {
+    let mut table =
+        Table::new(format!("The {} by frequency", naming::residual(name)), ["part", "share", "rms", "largest line"]);
     let mut chosen: Vec<&FrequencyPart> =
-        all.iter().filter(|p| p.residual == name && p.kind != "band" && p.share >= 5e-3).collect();
+        all.iter().filter(|p| p.residual == name && p.of != PartOf::Band && p.share >= 5e-3).collect();
     chosen.sort_by(|a, b| b.share.total_cmp(&a.share));
     for p in chosen {
-        let kind = match p.kind.as_str() {
-            "mean" => "mean: a constant torque".to_owned(),
-            "excited_lines" => "lines of the excitation".to_owned(),
-            "even_lines" => "even lines that were not excited: asymmetry, offsets".to_owned(),
-            "odd_lines" => "odd lines that were not excited: friction, play".to_owned(),
-            "foreign" => "foreign frequencies: disturbance, noise".to_owned(),
-            other => {
-                other.strip_prefix("turn_order_").map_or_else(|| other.to_owned(), |n| format!("order {n} of the turn"))
-            }
+        let kind = match p.of {
+            PartOf::Mean => "mean: a constant torque".to_owned(),
+            PartOf::Excited => "lines of the excitation".to_owned(),
+            PartOf::Even => "even lines that were not excited: asymmetry, offsets".to_owned(),
+            PartOf::Odd => "odd lines that were not excited: friction, play".to_owned(),
+            PartOf::Foreign => "foreign frequencies: disturbance, noise".to_owned(),
+            PartOf::Turn(order) => format!("order {order} of the turn"),
+            PartOf::Band => "band".to_owned(),
         };
         table.row(vec![
             Cell::Text(kind),

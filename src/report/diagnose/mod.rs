@@ -1,0 +1,159 @@
+//! The report of a diagnosis: verdict, place, shrinkage, evidence, what to do; read in a minute from the top.
+//!
+//! Everything here is a pure function of the typed result: [`words`] its sentences, [`json`] the file for programs.
+
+mod controlled;
+pub mod json;
+mod naming;
+mod residual;
+mod tables;
+mod verdict;
+mod words;
+
+use super::chain::{ChainDiagram, Symbol};
+use super::chart::{Axis, Chart, Mark, Series, Shape};
+use super::format::{self, Medium};
+use super::{Block, Figure, Report, Section, chain};
+use crate::diagnose::{Diagnosis, Overlay, Site};
+use crate::effects::Place;
+use crate::trace::Motion;
+pub use controlled::errors as errors_in_the_loop;
+use naming::{improved, meaning};
+use verdict::verdict;
+pub use words::warnings;
+
+/// A diagnosis with what is drawn of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Findings<'a> {
+    /// The diagnosis.
+    pub diagnosis: &'a Diagnosis,
+    /// Held-out signals with the models' runs.
+    pub overlays: &'a [Overlay],
+    /// What was diagnosed: file, samples, rate.
+    pub trace: &'a str,
+    /// Rotary or linear.
+    pub motion: Motion,
+}
+
+/// The report.
+#[must_use]
+pub fn report(f: &Findings) -> Report {
+    let d = f.diagnosis;
+    let mut top = vec![Block::Verdict(verdict(d))];
+    top.extend(words::warnings(d).into_iter().map(Block::Warning));
+    top.push(Block::Figure(Figure::new(chain(d), words::gap_shows(&d.location.shown))));
+    let mut sections = vec![Section::new("", top)];
+    if !d.causes.is_empty() {
+        sections.push(Section::new("What it is", what(d)));
+    }
+    sections.push(Section::new("How far the gap shrinks", how_far(f)));
+    let in_the_loop = controlled::blocks(d, f.motion);
+    if !in_the_loop.is_empty() {
+        sections.push(Section::new("In the drive's loop", in_the_loop));
+    }
+    sections.push(Section::new("Where the gap shows", residual::blocks(&d.location, f.motion)));
+    sections.push(Section::new("Every cause that was tried", which(d)));
+    sections.push(Section::new("What to do next", vec![Block::Steps(words::steps(d))]));
+    Report {
+        title: format!("Diagnosis of {}", d.machine),
+        subject: f.trace.to_owned(),
+        sections,
+        footer: format!("eixo {}", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// The short form for the terminal: verdict, causes, levels, the head of the ranking, what to do next.
+#[must_use]
+pub fn short(f: &Findings) -> Vec<Block> {
+    let d = f.diagnosis;
+    let mut blocks = vec![Block::Verdict(verdict(d))];
+    blocks.extend(words::warnings(d).into_iter().map(Block::Warning));
+    blocks.push(Block::Paragraph(words::gap_shows(&d.location.shown)));
+    if !d.causes.is_empty() {
+        blocks.push(Block::Table(tables::causes(d)));
+    }
+    blocks.push(Block::Table(tables::levels(d)));
+    blocks.extend(words::remainder(d, f.motion).map(Block::Paragraph));
+    blocks.extend(controlled::short(d));
+    blocks.push(Block::Table(tables::ranking(d, 5)));
+    blocks.push(Block::Steps(words::steps(d)));
+    blocks
+}
+
+/// A share in per cent.
+fn percent(share: f64) -> String {
+    format::percent(share, Medium::Page)
+}
+
+fn chain(d: &Diagnosis) -> ChainDiagram {
+    let places = Place::ALL
+        .into_iter()
+        .map(|p| {
+            let (symbol, parts) = match p {
+                Place::Input => (Symbol::Input, "drive, command"),
+                Place::Motor => (Symbol::Motor, "motor and screw"),
+                Place::Coupling => (Symbol::Coupling, "K, B"),
+                Place::Table => (Symbol::Table, "table, guideways"),
+                Place::Sensor => (Symbol::Sensor, "encoders"),
+            };
+            let found: Vec<&str> =
+                d.causes.iter().map(|c| c.effect.info()).filter(|i| i.place == p).map(|i| i.id).collect();
+            let site = Site::At(p);
+            chain::Place {
+                name: p.as_str().to_owned(),
+                symbol,
+                note: if found.is_empty() { parts.to_owned() } else { found.join(", ") },
+                share: d.location.shares.iter().find(|(s, _)| *s == site).map(|(_, share)| *share),
+                marked: !found.is_empty() || (d.causes.is_empty() && d.location.site == Some(site)),
+            }
+        })
+        .collect();
+    ChainDiagram { title: String::new(), places }
+}
+
+fn what(d: &Diagnosis) -> Vec<Block> {
+    let mut blocks = vec![Block::Table(tables::causes(d))];
+    blocks.extend(
+        d.causes
+            .iter()
+            .map(|c| c.effect.info())
+            .map(|i| Block::Paragraph(format!("{}. In the model: {}. {}", i.title, i.equation, meaning(i.family)))),
+    );
+    blocks.extend(d.confusable.iter().map(|c| Block::Warning(words::not_told(c))));
+    blocks
+}
+
+fn how_far(f: &Findings) -> Vec<Block> {
+    let d = f.diagnosis;
+    let mut blocks = vec![Block::Table(tables::levels(d))];
+    blocks.extend(words::remainder(d, f.motion).map(Block::Paragraph));
+    blocks.extend(words::beyond_parameters(d).map(Block::Paragraph));
+    for o in f.overlays {
+        blocks.extend(residual::overlay(o, d.gap.closure_of, improved(d), f.motion));
+    }
+    if !d.parameters.is_empty() {
+        blocks.push(Block::Table(tables::parameters(&d.parameters)));
+    }
+    blocks
+}
+
+fn which(d: &Diagnosis) -> Vec<Block> {
+    let mut chart = Chart::new(
+        "Noise-scaled error of each cause",
+        Axis::linear("place in the ranking", ""),
+        Axis::log("chi2 a sample", ""),
+    );
+    let chi2: Vec<f64> = d.ranking.iter().map(|h| h.chi2).collect();
+    let order: Vec<f64> = (1..=chi2.len()).map(|k| k as f64).collect();
+    chart.series.push(Series::new("", Shape::Stem, order, chi2));
+    chart.marks.push(Mark::Y(1.0, "noise".into()));
+    vec![
+        Block::Paragraph(
+            "Each cause was fitted together with the parameters of the axis. BIC weighs the error against the number of parameters: a \
+             distance of 10 is strong evidence. A chi2 of 1 a sample is the noise itself: nothing is left to explain."
+                .to_owned(),
+        ),
+        Block::Table(tables::ranking(d, usize::MAX)),
+        Block::Figure(Figure::new(chart, "The nearer to the noise, the more of the gap the cause explains.")),
+    ]
+}

@@ -1,0 +1,86 @@
+//! The tables of a diagnosis.
+
+use super::naming::{improved, title};
+use crate::diagnose::{AxisParameter, Diagnosis, Estimate, Hypothesis, Levels, Verdict};
+use crate::report::{Cell, Table};
+
+fn estimate(e: &Estimate, unit: &str) -> Cell {
+    Cell::Estimate(e.value, e.std.unwrap_or(f64::NAN), unit.to_owned())
+}
+
+/// The causes with their parameters.
+pub fn causes(d: &Diagnosis) -> Table {
+    let mut table =
+        Table::new("What the model leaves out", ["cause", "place", "share of the gap", "parameter", "value"]);
+    for c in &d.causes {
+        let name = title(&Hypothesis::Effects(vec![c.effect]));
+        let mut head = vec![Cell::text(name), Cell::text(c.site.as_str()), Cell::Bar(c.share_of_gap)];
+        for (name, e) in c.named() {
+            head.push(Cell::text(format!("{}.{name}", c.effect.info().id)));
+            head.push(estimate(e, e.unit));
+            table.row(std::mem::replace(&mut head, vec![Cell::Empty; 3]));
+        }
+        if c.parameters.is_empty() {
+            head.extend([Cell::Empty, Cell::Empty]);
+            table.row(head);
+        }
+    }
+    table
+}
+
+/// The errors of the models on both records.
+pub fn levels(d: &Diagnosis) -> Table {
+    let mut table =
+        Table::new("Error of the model, rms over rms of the signal", ["model", "fitted trace", "held-out trace"]);
+    let mut row = |name: &str, of: fn(&Levels) -> f64, strong: bool| {
+        let cells = vec![
+            Cell::text(name),
+            Cell::Percent(of(&d.gap.train.combined)),
+            Cell::Percent(of(&d.gap.holdout.combined)),
+        ];
+        if strong { table.strong_row(cells) } else { table.row(cells) }
+    };
+    row("as given", |l| l.before, false);
+    row("parameters re-identified", |l| l.reidentified, false);
+    match d.verdict {
+        Verdict::Effect | Verdict::Unexplained => row(improved(d), |l| l.after, d.verdict == Verdict::Effect),
+        Verdict::Parameters | Verdict::NoGap => {}
+    }
+    row("noise floor", |l| l.noise_floor, false);
+    table
+}
+
+/// The axis' own parameters.
+pub fn parameters(all: &[AxisParameter]) -> Table {
+    let mut table = Table::new("Parameters of the axis", ["parameter", "as given", "re-identified", "now", "change"]);
+    for p in all {
+        table.row(vec![
+            Cell::text(p.parameter.name()),
+            Cell::number(p.nominal),
+            Cell::number(p.reidentified),
+            estimate(&p.fitted, ""),
+            Cell::Percent(p.fitted.value / p.nominal - 1.0),
+        ]);
+    }
+    table
+}
+
+/// The hypotheses tried, so many at most.
+pub fn ranking(d: &Diagnosis, most: usize) -> Table {
+    let mut table = Table::new(
+        "Causes tried, the best first",
+        ["cause", "place", "probability", "delta BIC", "chi2 a sample", "gap closed, held out"],
+    );
+    for (i, h) in d.ranking.iter().take(most).enumerate() {
+        let cells = vec![
+            Cell::text(title(&h.hypothesis)),
+            Cell::text(super::json::site(h.site)),
+            Cell::Bar(h.probability),
+            Cell::Number(h.delta_bic, 3, String::new()),
+            Cell::Number(h.chi2, 3, String::new()),
+            Cell::Percent(h.closure_holdout),
+        ];
+        if i == 0 && d.verdict != Verdict::Unexplained { table.strong_row(cells) } else { table.row(cells) }
+    }
+    table
+}

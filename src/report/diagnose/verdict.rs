@@ -1,0 +1,91 @@
+//! The head of the page: the answer, what it rests on, its figures.
+
+use super::naming::{held_out, lower, short_title, title};
+use super::percent;
+use super::words::REMAINS;
+use crate::diagnose::{Cause, Diagnosis, Hypothesis, Verdict as Answer};
+use crate::report::{Cell, Tone, Verdict};
+
+/// Error over noise below which a model explains a trace.
+const TO_THE_NOISE: f64 = 1.2;
+
+/// The verdict as the page and the terminal open with it.
+pub fn verdict(d: &Diagnosis) -> Verdict {
+    let held = &d.gap.holdout.combined;
+    let [low, high] = d.gap.interval;
+    let mut figures = vec![
+        ("gap closed, held out".to_owned(), Cell::Percent(d.gap.closure)),
+        ("95 % interval".to_owned(), Cell::Text(format!("{} to {}", percent(low), percent(high)))),
+    ];
+    let (tone, sentence, detail) = match d.verdict {
+        Answer::NoGap => {
+            figures.clear();
+            let levels = format!(
+                "Its error on held-out data is {} of the signal, the noise {}.",
+                percent(held.before),
+                percent(held.noise_floor)
+            );
+            let sentence = if d.remainder.noise_multiple > REMAINS {
+                let left = percent(d.remainder.share);
+                format!("No gap: no cause stands out in the {left} of the torque that the model leaves.")
+            } else {
+                "No gap: the model explains this trace to within its noise.".to_owned()
+            };
+            (Tone::Good, sentence, levels)
+        }
+        Answer::Parameters => {
+            let sentence = if d.causes.is_empty() {
+                "The structure of the model is right, its parameters are not."
+            } else {
+                "Every parameter of the model is off by the same factor, as from a wrong torque constant."
+            };
+            (Tone::Finding, sentence.to_owned(), fall(d))
+        }
+        Answer::Effect => {
+            if let Some(c) = d.causes.first() {
+                figures.insert(0, ("probability".to_owned(), Cell::Percent(c.probability)));
+            }
+            (Tone::Finding, left_out(&d.causes), fall(d))
+        }
+        Answer::Unexplained => {
+            let at = d.location.site.map_or("at no single place".to_owned(), |s| format!("at the {}", s.as_str()));
+            let sentence = format!("There is a gap {at}, and none of the known effects explains it.");
+            (Tone::Unsure, sentence, format!("{}{}", nearest(d), fall(d)))
+        }
+    };
+    Verdict { tone, sentence, detail, figures }
+}
+
+/// How the error changes on held-out data.
+fn fall(d: &Diagnosis) -> String {
+    let held = &d.gap.holdout.combined;
+    format!(
+        "On held-out data ({}) the model's error {} from {} of the signal to {}; the noise alone is {}.",
+        held_out(d.gap.holdout_is),
+        if held.after > held.before { "rises" } else { "falls" },
+        percent(held.before),
+        percent(held.after),
+        percent(held.noise_floor)
+    )
+}
+
+fn left_out(causes: &[Cause]) -> String {
+    let name = |c: &Cause| format!("{} (at the {})", lower(short_title(c.effect.info())), c.site.as_str());
+    let named: Vec<String> = causes.iter().map(name).collect();
+    match named.as_slice() {
+        [one] => format!("The model leaves out one thing: {one}."),
+        _ => format!("The model leaves out {} things: {}.", named.len(), named.join("; ")),
+    }
+}
+
+/// What comes nearest to a gap that is not explained.
+fn nearest(d: &Diagnosis) -> String {
+    let Some(best) = d.ranking.first().filter(|r| r.hypothesis != Hypothesis::NoGap) else { return String::new() };
+    let title = lower(&title(&best.hypothesis));
+    let fitted = &d.gap.train.combined;
+    if !d.causes.is_empty() && fitted.after < TO_THE_NOISE * fitted.noise_floor {
+        format!("The nearest, {title}, explains the fitted trace alone: has the machine changed between the two? ")
+    } else {
+        format!("The nearest, {title}, closes {} of it. ", percent(best.closure_holdout))
+    }
+}

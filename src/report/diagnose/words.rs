@@ -1,0 +1,228 @@
+//! The sentences of a diagnosis: pure functions of the typed result.
+
+use super::naming::{lower, short_title, title};
+use super::percent;
+use crate::diagnose::location::{Appearance, Location, OwnFrequency, Shape, Spread};
+use crate::diagnose::{Cause, ClosedLoop, Confusable, Diagnosis, LoopRanked, RoundingRole, Verdict};
+use crate::effects::{Contrast, Effect};
+use crate::report::format::{self, Medium};
+use crate::trace::Motion;
+
+/// The verdict in a sentence.
+pub fn sentence(d: &Diagnosis) -> String {
+    let percent = |v: f64| format!("{:.1} %", 100.0 * v.clamp(-9.99, 1.0));
+    match d.verdict {
+        Verdict::NoGap => "No gap: the model as given explains the record down to the noise.".to_owned(),
+        Verdict::Parameters if !d.causes.is_empty() => {
+            "Parameters: every nominal parameter is off by the same factor, as from a wrong torque constant.".to_owned()
+        }
+        Verdict::Parameters => format!(
+            "Parameters: the structure is right, its parameters are off; with them fitted {} of the gap closes.",
+            percent(d.gap.closure)
+        ),
+        Verdict::Effect => {
+            let describe = |c: &Cause| {
+                let info = c.effect.info();
+                format!("{} ({}, at the {})", info.title, info.id, c.site.as_str())
+            };
+            let names = d.causes.iter().map(describe).collect::<Vec<_>>().join(", and ");
+            if d.gap.closure < 0.0 {
+                format!("{names}, by the fitted record; the held-out record contradicts it: the error grows there.")
+            } else {
+                format!("{names}: {} of the gap on held-out data closes with it.", percent(d.gap.closure))
+            }
+        }
+        Verdict::Unexplained if is_rounding(d) => {
+            "Unexplained: what is left is the rounding of the readings, which is not among the effects that may be named."
+                .to_owned()
+        }
+        Verdict::Unexplained => {
+            let nearest = d.ranking.iter().find(|r| !r.hypothesis.effects().is_empty());
+            let nearest = nearest.map_or_else(String::new, |r| {
+                format!(" The nearest, {}, closes {}.", r.hypothesis, percent(r.closure_holdout))
+            });
+            format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}")
+        }
+    }
+}
+
+/// Whether all that is left is rounding, and that may not be named.
+fn is_rounding(d: &Diagnosis) -> bool {
+    d.rounding.as_ref().is_some_and(|r| r.role == RoundingRole::Withheld)
+}
+
+/// What to measure next.
+pub fn next_experiment(d: &Diagnosis) -> &'static str {
+    let named = d.chosen.effects().iter().take(1).copied();
+    let all = named.chain(d.confusable.iter().flat_map(|c| [c.named, c.other]));
+    let contrasts: Vec<Contrast> = all.filter_map(|e| e.info().family.contrast()).collect();
+    let has = |c: Contrast| contrasts.contains(&c);
+    match d.verdict {
+        Verdict::NoGap => "None needed: drive the axis harder or over more of its travel to look for smaller effects.",
+        Verdict::Parameters => "Put the fitted parameters into axis.toml and diagnose a second record.",
+        Verdict::Unexplained if is_rounding(d) => "Log the positions with a finer step.",
+        Verdict::Unexplained => {
+            "Repeat the record at half and at twice the amplitude with an odd multisine (eixo excite --kind odd): even \
+             lines that light up tell asymmetry and offsets, odd ones friction and play; a fixed frequency that stays \
+             is an outside disturbance."
+        }
+        Verdict::Effect if d.confusable.is_empty() => {
+            "None needed to name the cause. Confirm it with a record at another amplitude, and re-run with it in axis.toml."
+        }
+        Verdict::Effect if d.confusable.iter().any(Confusable::is_of_place) => {
+            "Log the encoders on both sides of the coupling: which side a force acts on shows in what the two \
+             readings do to each other."
+        }
+        Verdict::Effect if has(Contrast::Twist) => {
+            "Drive the coupling harder near its resonance, at two amplitudes: play shrinks in relative terms, a cubic \
+             spring grows, a loop stays open at any speed."
+        }
+        Verdict::Effect if has(Contrast::Phase) => {
+            "Excite a higher band: a delay's phase grows with frequency, a lag's bends and its gain falls."
+        }
+        Verdict::Effect if has(Contrast::Reversals) => {
+            "Use an odd multisine with slow reversals in both directions: an offset lights up even lines, friction odd ones."
+        }
+        Verdict::Effect => {
+            "Repeat with an odd multisine at two amplitudes (eixo excite --kind odd); the two causes scale differently."
+        }
+    }
+}
+
+/// Why two effects cannot be told apart.
+pub fn alike(c: &Confusable) -> String {
+    format!("their fits differ by {:.1} in BIC on this record", 2.0 * c.difference)
+}
+
+/// What the user should know of the data.
+pub fn warnings(d: &Diagnosis) -> Vec<String> {
+    let rounding = d.rounding.iter().map(|r| {
+        format!("{} read in steps of {:.3e}; the noise floor holds their rounding.", r.channels.join(" and "), r.step)
+    });
+    rounding.collect()
+}
+
+/// Where the gap shows.
+pub fn gap_shows(l: &Location) -> String {
+    format!(
+        "With its parameters fitted alone, the model lacks {} rms in torque, {}.",
+        significant(l.rms),
+        looks(&l.looks)
+    )
+}
+
+/// What a residual looks like.
+pub fn looks(a: &Appearance) -> String {
+    let dependence = a.dependence.map(|d| {
+        let of = d.against.as_str();
+        let form = match d.shape {
+            Shape::Step => format!("flat against the sign of {of}"),
+            Shape::Line => format!("linear in {of}"),
+            Shape::Odd => format!("an odd function of {of}"),
+            Shape::Even => format!("an even function of {of}"),
+            Shape::Other => format!("a function of {of}"),
+        };
+        format!("{form} ({:.0} % of its variance)", 100.0 * d.explained)
+    });
+    let frequency = a.frequency.map(|f| match f {
+        OwnFrequency::OfTheTurn { order, share } => {
+            format!("{order} times per turn of the motor ({:.0} % of its energy)", 100.0 * share)
+        }
+        OwnFrequency::Foreign(hertz) => {
+            format!("mostly at {} Hz, which the excitation does not hold", significant(hertz))
+        }
+    });
+    let spread = match a.spread {
+        Spread::Throughout => "throughout the record",
+        Spread::Grows => "growing over the record",
+        Spread::Falls => "falling over the record",
+        Spread::Events => "in a few events rather than throughout",
+    };
+    dependence.into_iter().chain(frequency).chain([spread.to_owned()]).collect::<Vec<_>>().join(", ")
+}
+
+/// Three significant digits.
+fn significant(v: f64) -> String {
+    if v == 0.0 || !v.is_finite() {
+        return format!("{v}");
+    }
+    let digits = 2 - v.abs().log10().floor() as i32;
+    if (0..6).contains(&digits) { format!("{v:.*}", digits as usize) } else { format!("{v:.2e}") }
+}
+
+/// Multiple of the noise from which a remainder is worth a sentence.
+pub const REMAINS: f64 = 1.5;
+
+/// What no cause explains, in a sentence; none where it is little.
+pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
+    let r = Some(&d.remainder).filter(|r| r.noise_multiple > REMAINS)?;
+    let beside = if d.causes.is_empty() { "No cause explains" } else { "Beside that no cause explains" };
+    Some(format!(
+        "{beside} {} {} rms of torque at the {} ({} of the torque, {} times what the encoders' noise makes): {}.",
+        format::number(r.torque_rms, 3, Medium::Page),
+        motion.unit("N.m"),
+        r.site.as_str(),
+        percent(r.share),
+        format::number(r.noise_multiple, 2, Medium::Page),
+        looks(&r.looks)
+    ))
+}
+
+/// What the effects close beyond new parameters; none where no effect is named.
+pub fn beyond_parameters(d: &Diagnosis) -> Option<String> {
+    let told = d.verdict == Verdict::Effect && d.gap.closure_of_effect.is_finite();
+    told.then(|| {
+        format!(
+            "Counted from the model whose parameters alone were fitted again, {} {} of what was left.",
+            if d.causes.len() > 1 { "the effects close" } else { "the effect closes" },
+            percent(d.gap.closure_of_effect)
+        )
+    })
+}
+
+/// What two effects that are not told apart come to.
+pub fn not_told(c: &Confusable) -> String {
+    let name = |e: Effect| lower(short_title(e.info()));
+    format!("These data do not tell {} from {}: {}", name(c.named), name(c.other), alike(c))
+}
+
+/// Whether the drive's loop agrees with the diagnosis.
+pub fn in_the_loop(l: &ClosedLoop) -> String {
+    let next: Option<&LoopRanked> = l.ranking.iter().find(|r| r.closure < l.closure && r.errors != l.after);
+    match (l.agrees, l.ranking.first()) {
+        (false, Some(best)) => format!(
+            "The loop does not agree: {} closes {} of the command's gap, this {}.",
+            title(&best.hypothesis),
+            percent(best.closure),
+            percent(l.closure)
+        ),
+        _ => format!(
+            "The loop agrees: this closes {} of the command's gap, and nothing that was tried closes more{}.",
+            percent(l.closure),
+            next.map_or_else(String::new, |o| {
+                format!("; next comes {} with {}", title(&o.hypothesis), percent(o.closure))
+            })
+        ),
+    }
+}
+
+/// What to do next, in order.
+pub fn steps(d: &Diagnosis) -> Vec<String> {
+    let mut steps = vec![match d.verdict {
+        Verdict::NoGap => {
+            "Use the model as it is. A gap that this excitation does not show may still be there: repeat with the amplitudes and speeds of the real work."
+        }
+        Verdict::Parameters => "Put the re-identified parameters into the model.",
+        Verdict::Effect => {
+            "Put the effect into the model: the table above has its parameters for [effects] of axis.toml."
+        }
+        Verdict::Unexplained => {
+            "Look at the machine at the place marked; compare the pictures of the residual with what moves there."
+        }
+    }];
+    if d.verdict == Verdict::Effect && !d.confusable.is_empty() {
+        steps.push("Before you change the machine, tell the confusable causes apart.");
+    }
+    steps.push(next_experiment(d));
+    steps.into_iter().map(str::to_owned).collect()
+}
