@@ -12,7 +12,7 @@ use super::drives::{Drives, ideal, machine};
 use crate::circle::roundness::{Roundness, bidirectional};
 use crate::circle::trace::{analyse, turns};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
-use crate::effects::{EFFECTS, Effect};
+use crate::effects::{EFFECTS, Effect, Length};
 pub(super) use crate::report::circle::Findings;
 use crate::report::circle::{Run, report, short};
 use crate::report::{Block, Report, ballbar, html, terminal};
@@ -208,13 +208,11 @@ const MATERIAL: f64 = 1e-3;
 
 /// What an effect's angle is on the table.
 fn in_millimetres(effect: Effect, values: &[f64], rho: f64) -> Option<String> {
-    let of = |name: &str| effect.parameter(name).ok().and_then(|k| values.get(k).copied());
     let every = |order: f64| (order > 0.0).then(|| format!("every {:.4} mm", 1e3 * TAU * rho / order));
-    match effect {
-        Effect::Backlash => Some(format!("{:.3} µm", 2e6 * rho * of("half_gap")?)),
-        Effect::TorqueRipple => every(of("order")?),
-        Effect::Unbalance => every(1.0),
-        _ => None,
+    match effect.length()? {
+        Length::HalfPlay(p) => Some(format!("{:.3} µm", 2e6 * rho * values.get(p)?)),
+        Length::Periods(p) => every(*values.get(p)?),
+        Length::Turn => every(1.0),
     }
 }
 

@@ -22,16 +22,17 @@ fn dominates(noise: &NoiseEstimate) -> bool {
 /// Names quantisation where the record is at the floor and the lattice is what the floor is made of; where it may not be
 /// named, rounding is no noise that would explain the record.
 pub fn judge(case: &Case<'_>, diagnosis: &mut Diagnosis) {
+    let Some((effect, parameter)) = Effect::of_rounding() else { return };
     let step = case.noise.quantum.iter().flatten().copied().fold(0.0, f64::max);
     // A model that rounds as the record does has no gap there.
-    let known = case.nominal.effects.of(Effect::EncoderQuantisation)[0];
+    let known = case.nominal.effects.of(effect)[parameter];
     if step <= 0.0 || (known - step).abs() < SAME * step {
         return;
     }
     let seen = CHANNELS.iter().zip(case.noise.quantum).filter(|(_, q)| q.is_some());
     let channels = seen.map(|(name, _)| *name).collect();
     let at_floor = matches!(diagnosis.verdict, Verdict::NoGap | Verdict::Parameters) && dominates(case.noise);
-    let role = match case.suspects.contains(&Effect::EncoderQuantisation) {
+    let role = match case.suspects.contains(&effect) {
         _ if !at_floor => RoundingRole::Noise,
         true => RoundingRole::Cause,
         false => RoundingRole::Withheld,
@@ -41,7 +42,7 @@ pub fn judge(case: &Case<'_>, diagnosis: &mut Diagnosis) {
         RoundingRole::Noise => return,
         RoundingRole::Cause => {
             diagnosis.verdict = Verdict::Effect;
-            diagnosis.causes = vec![Cause::alone(Effect::EncoderQuantisation, 0, step, 0.0, case.motion)];
+            diagnosis.causes = vec![Cause::alone(effect, parameter, step, 0.0, case.motion)];
         }
         RoundingRole::Withheld => diagnosis.verdict = Verdict::Unexplained,
     }

@@ -6,7 +6,7 @@
 //! Nordin, Gutman, Automatica 38(10), 2002 (the physical model of backlash).
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Length, Moment, Reaction};
 use crate::scalar::Scalar;
 
 /// Backlash of the coupling.
@@ -31,6 +31,7 @@ impl Force for Backlash {
         bounds: |p, x| p[0] <= 4.0 * x.twist,
         variants: &[Variant { name: "", free: &[0] }],
     };
+    const LENGTH: Option<Length> = Some(Length::HalfPlay(0));
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {

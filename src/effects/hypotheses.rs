@@ -24,6 +24,18 @@ impl Effect {
         }
     }
 
+    /// The effect that a common factor of every parameter of the axis comes to, and its parameter.
+    #[must_use]
+    pub fn of_gain() -> Option<(Self, usize)> {
+        super::EFFECTS.iter().find_map(|e| Some((*e, e.gain_parameter()?)))
+    }
+
+    /// The effect that rounds the readings, and the parameter that is its step.
+    #[must_use]
+    pub fn of_rounding() -> Option<(Self, usize)> {
+        super::EFFECTS.iter().find_map(|e| Some((*e, e.step_parameter()?)))
+    }
+
     /// Whether two effects are laws of one thing, so that a record has one or the other.
     #[must_use]
     pub fn excludes(self, other: Self) -> bool {

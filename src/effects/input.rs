@@ -203,6 +203,7 @@ impl Input for TorqueGain {
         bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };
+    const GAIN: Option<usize> = Some(0);
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
         Ramp { start: ramp.start * p[0], end: ramp.end * p[0] }

@@ -45,7 +45,7 @@ pub use sensor::{Reading, Seen, SensorHistory};
 pub use settings::MEMORY;
 pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
 pub(crate) use settings::{Forces, Internals, MEMORY_OF_ONE, PARAMETERS, StepMotion, effect_scope, memory_of};
-pub use shapes::{Base, DryFriction, Force, Input, Internal, Level, Moment, Motion, Reaction, Sensor, Slip};
+pub use shapes::{Base, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip};
 pub(crate) use shapes::{Coordinate, Modes};
 
 use crate::scalar::Scalar;
@@ -135,6 +135,30 @@ macro_rules! effects {
             pub const fn reads_motor(self) -> bool {
                 match self {
                     $(Self::$name => when!(sensor, $shape, <$law as Sensor>::MOTOR, false),)*
+                }
+            }
+
+            /// Which of a force's angles the table shows as a length: see [`Force::LENGTH`].
+            #[must_use]
+            pub const fn length(self) -> Option<Length> {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law as Force>::LENGTH, None),)*
+                }
+            }
+
+            /// The parameter that is nothing but a factor of the torque: see [`Input::GAIN`].
+            #[must_use]
+            pub const fn gain_parameter(self) -> Option<usize> {
+                match self {
+                    $(Self::$name => when!(input, $shape, <$law as Input>::GAIN, None),)*
+                }
+            }
+
+            /// The parameter that is the step of a rounding: see [`Sensor::STEP`].
+            #[must_use]
+            pub const fn step_parameter(self) -> Option<usize> {
+                match self {
+                    $(Self::$name => when!(sensor, $shape, <$law as Sensor>::STEP, None),)*
                 }
             }
 

@@ -3,7 +3,7 @@
 //! `f = -amplitude*sin(order*theta + phase)`: the sign makes the amplitude a torque that drives.
 
 use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Length, Moment, Reaction};
 use crate::scalar::Scalar;
 
 fn torque<S: Scalar>(amplitude: S, order: S, phase: S, x: S) -> Reaction<S> {
@@ -45,6 +45,7 @@ impl Force for TorqueRipple {
         bounds: |p, x| p[0].abs() <= x.torque && x.turns(p[1]),
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
+    const LENGTH: Option<Length> = Some(Length::Periods(1));
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
@@ -76,6 +77,7 @@ impl Force for Unbalance {
         bounds: |p, x| p[0].abs() <= x.torque && x.turns(1.0),
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
+    const LENGTH: Option<Length> = Some(Length::Turn);
 
     const CARRIED: bool = true;
 

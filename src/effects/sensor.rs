@@ -325,6 +325,7 @@ impl Sensor for EncoderQuantisation {
         variants: &[Variant { name: "", free: &[0] }],
     };
 
+    const STEP: Option<usize> = Some(0);
     const MOTOR: bool = true;
 
     fn transform<S: Scalar>(p: &[S], r: Reading<S>, _seen: &Seen<'_, S>) -> Reading<S> {

@@ -212,6 +212,8 @@ pub trait Force {
     const INFO: EffectInfo;
     /// Whether the torque is constant or given by the position alone, as a weight's is: on a rigid axis the guides carry it.
     const CARRIED: bool = false;
+    /// Which of its angles the table shows as a length.
+    const LENGTH: Option<Length> = None;
 
     /// Fastest vibration that the effect adds to an inertia of `inertia` kg.m2 at its place, rad/s.
     fn rate(_p: &[f64], _inertia: f64) -> f64 {
@@ -222,10 +224,23 @@ pub trait Force {
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
 }
 
+/// An angle of a force that is seen on the table as a length, by the parameter that holds it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Length {
+    /// Half of a play, rad.
+    HalfPlay(usize),
+    /// Periods per radian of a force that repeats with the angle.
+    Periods(usize),
+    /// One period in a turn.
+    Turn,
+}
+
 /// A change of the torque on its way from the command to the motor.
 pub trait Input {
     /// What the effect is.
     const INFO: EffectInfo;
+    /// The parameter that is a factor of the torque, if it is nothing but that: every parameter of the axis seems off by it.
+    const GAIN: Option<usize> = None;
 
     /// The torque over a step of length `h`, from the torque commanded over it.
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S>;
@@ -241,6 +256,8 @@ pub trait Sensor {
 
     /// Whether it changes what the motor's encoder reads, too.
     const MOTOR: bool = false;
+    /// The parameter that is the step to which it rounds the readings, if it does: no derivative, but a lattice in the log.
+    const STEP: Option<usize> = None;
 
     /// What is read at an instant: `reading` as changed by the effects before, `seen` the motion up to then.
     fn transform<S: Scalar>(p: &[S], reading: Reading<S>, seen: &Seen<'_, S>) -> Reading<S>;

@@ -166,9 +166,9 @@ fn build(
                 .closure,
         })
         .collect();
-    let causes = match decision.torque_gain() {
-        Some((gain, std)) if decision.verdict == Verdict::Parameters => {
-            vec![Cause::alone(Effect::TorqueGain, 0, gain, std, case.motion)]
+    let causes = match decision.torque_gain().zip(Effect::of_gain()) {
+        Some(((gain, std), (effect, parameter))) if decision.verdict == Verdict::Parameters => {
+            vec![Cause::alone(effect, parameter, gain, std, case.motion)]
         }
         _ => causes(decision, case.motion),
     };
