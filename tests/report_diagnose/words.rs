@@ -1,0 +1,163 @@
+//! What is said of a typed result: a table of results, and what their sentences must and must not hold.
+
+use eixo::diagnose::location::{Appearance, Dependence, OwnFrequency, Shape, Spread, StateVariable};
+use eixo::diagnose::{Cause, Confusable, Diagnosis, Hypothesis, RoundingRole, Site, Verdict};
+use eixo::effects::{EFFECTS, Effect};
+use eixo::report::diagnose::json::value;
+use eixo::report::diagnose::{Findings, report, short};
+use eixo::report::html;
+use eixo::report::terminal::{self, Layout};
+use eixo::trace::Motion;
+
+use crate::fixture::friction;
+
+/// A field of the file that is a sentence.
+fn said(d: &Diagnosis, field: &str) -> String {
+    value(d).pointer(field).and_then(|v| v.as_str()).expect(field).to_owned()
+}
+
+/// A diagnosis, changed.
+fn with(change: impl FnOnce(&mut Diagnosis)) -> Diagnosis {
+    let mut d = friction("x-axis");
+    change(&mut d);
+    d
+}
+
+/// The same with another verdict and no cause.
+fn without_cause(verdict: Verdict) -> Diagnosis {
+    with(|d| {
+        d.verdict = verdict;
+        d.causes.clear();
+    })
+}
+
+#[test]
+fn each_verdict_has_its_sentence() {
+    let rounding = |role| {
+        let mut d = without_cause(Verdict::Unexplained);
+        d.rounding.as_mut().expect("the fixture rounds").role = role;
+        d
+    };
+    let nothing_near = with(|d| {
+        d.verdict = Verdict::Unexplained;
+        d.ranking.retain(|r| r.hypothesis.effects().is_empty());
+    });
+    let two = with(|d| {
+        let first = d.causes[0].clone();
+        d.causes.push(Cause { effect: Effect::ViscousTable, site: Site::Axis, ..first });
+    });
+    for (d, holds, lacks) in [
+        (friction(""), &["Coulomb", "(coulomb_motor, at the motor)", "99.1 % of the gap"][..], "contradicts"),
+        (two, &["at the motor), and ", "(viscous_table, at the axis)", "closes with it"], "contradicts"),
+        (with(|d| d.gap.closure = -0.3), &["by the fitted record", "contradicts it"], "%"),
+        (with(|d| d.gap.closure = 7.0), &["100.0 %"], "700"),
+        (without_cause(Verdict::NoGap), &["No gap", "down to the noise"], "%"),
+        (without_cause(Verdict::Parameters), &["Parameters:", "99.1 % of the gap"], "torque constant"),
+        (with(|d| d.verdict = Verdict::Parameters), &["Parameters:", "same factor", "torque constant"], "%"),
+        (
+            without_cause(Verdict::Unexplained),
+            &["Unexplained", "The nearest, coulomb_motor, closes 99.1 %"],
+            "rounding",
+        ),
+        (nothing_near, &["Unexplained", "nothing in the library"], "nearest"),
+        (rounding(RoundingRole::Noise), &["Unexplained", "The nearest"], "rounding"),
+        (rounding(RoundingRole::Withheld), &["Unexplained", "rounding of the readings"], "nearest"),
+    ] {
+        let sentence = said(&d, "/sentence");
+        assert!(holds.iter().all(|part| sentence.contains(part)) && !sentence.contains(lacks), "{sentence}");
+        assert!(sentence.ends_with('.') && !sentence.contains("NaN"), "{sentence}");
+    }
+    assert_eq!(said(&rounding(RoundingRole::Withheld), "/next_experiment"), "Log the positions with a finer step.");
+}
+
+#[test]
+fn every_effect_is_told_with_its_name_its_place_and_what_it_means_on_a_machine() {
+    for &effect in EFFECTS {
+        let info = effect.info();
+        let d = with(|d| {
+            let site = Site::At(info.place);
+            d.causes = vec![Cause { effect, site, parameters: Vec::new(), ..d.causes[0].clone() }];
+        });
+        let sentence = said(&d, "/sentence");
+        for part in [info.title, info.id, info.place.as_str()] {
+            assert!(sentence.contains(part), "{part}: {sentence}");
+        }
+        let page = html::page(&report(&Findings { diagnosis: &d, overlays: &[], trace: "", motion: Motion::Rotary }));
+        assert!(page.contains("On a machine: "), "{}", info.id);
+    }
+}
+
+#[test]
+fn the_next_experiment_is_the_one_that_tells_the_rivals_apart() {
+    for (chosen, named, other, says) in [
+        (Effect::ViscousMotor, Effect::ViscousMotor, Effect::ViscousTable, "both sides of the coupling"),
+        (Effect::Backlash, Effect::Backlash, Effect::CubicStiffness, "near its resonance"),
+        (Effect::Delay, Effect::Delay, Effect::ActuatorLag, "a higher band"),
+        (Effect::LoadMotor, Effect::LoadMotor, Effect::CoulombMotor, "slow reversals"),
+        (Effect::Gravity, Effect::Gravity, Effect::ExternalSpring, "scale differently"),
+        // What was found first decides, too.
+        (Effect::Delay, Effect::Gravity, Effect::ExternalSpring, "a higher band"),
+    ] {
+        let d = with(|d| {
+            d.chosen = Hypothesis::Effects(vec![chosen]);
+            d.confusable = vec![Confusable { named, other, difference: 1.04 }];
+        });
+        assert!(said(&d, "/next_experiment").contains(says), "{named:?} {other:?}");
+        assert_eq!(said(&d, "/confusable/0/2"), "their fits differ by 2.1 in BIC on this record");
+    }
+    let sure = with(|d| d.confusable.clear());
+    assert!(said(&sure, "/next_experiment").starts_with("None needed"));
+    assert!(said(&without_cause(Verdict::Parameters), "/next_experiment").contains("axis.toml"));
+    assert!(said(&without_cause(Verdict::Unexplained), "/next_experiment").contains("half and at twice"));
+}
+
+#[test]
+fn a_residual_is_told_by_what_it_depends_on_its_frequency_and_its_spread() {
+    let looks = |dependence, frequency, spread| {
+        said(&with(|d| d.remainder.looks = Appearance { dependence, frequency, spread }), "/remainder/summary")
+    };
+    let depends = |shape, against| Some(Dependence { shape, against, explained: 0.876 });
+    for (shape, says) in [
+        (Shape::Step, "flat against the sign of twist (88 % of its variance)"),
+        (Shape::Line, "linear in twist"),
+        (Shape::Odd, "an odd function of twist"),
+        (Shape::Even, "an even function of twist"),
+        (Shape::Other, "a function of twist"),
+    ] {
+        assert!(looks(depends(shape, StateVariable::Twist), None, Spread::Throughout).starts_with(says), "{says}");
+    }
+    for (frequency, says) in [
+        (OwnFrequency::OfTheTurn { order: 4, share: 0.61 }, "4 times per turn of the motor (61 % of its energy)"),
+        (OwnFrequency::Foreign(31.415), "mostly at 31.4 Hz, which the excitation does not hold"),
+    ] {
+        assert_eq!(looks(None, Some(frequency), Spread::Grows), format!("{says}, growing over the record"));
+    }
+    let in_order = looks(depends(Shape::Line, StateVariable::Torque), Some(OwnFrequency::Foreign(2.0)), Spread::Events);
+    assert_eq!(
+        in_order,
+        "linear in T (88 % of its variance), mostly at 2.00 Hz, which the excitation does not hold, in a few events \
+         rather than throughout"
+    );
+    for (rms, says) in [(0.0, " 0 rms"), (4.0004e-3, " 0.00400 rms"), (123.4, " 123 rms"), (1.2e-9, " 1.20e-9 rms")] {
+        let summary = said(&with(|d| d.location.shown.rms = rms), "/where/summary");
+        assert!(summary.contains(says), "{summary}");
+    }
+}
+
+#[test]
+fn a_remainder_is_told_where_it_is_more_than_noise_in_the_units_of_the_axis() {
+    let text = |d: &Diagnosis, motion| {
+        let blocks = short(&Findings { diagnosis: d, overlays: &[], trace: "", motion });
+        terminal::blocks(&blocks, Layout::default()).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let large = |d: &mut Diagnosis| d.remainder.noise_multiple = 20.0;
+    let quiet = text(&friction(""), Motion::Rotary);
+    assert!(!quiet.contains("o cause explains"), "{quiet}");
+    let beside = text(&with(large), Motion::Linear);
+    assert!(beside.contains("Beside that no cause explains") && beside.contains(" N rms of torque"), "{beside}");
+    let mut none = without_cause(Verdict::NoGap);
+    large(&mut none);
+    let none = text(&none, Motion::Rotary);
+    assert!(none.contains("No cause explains") && none.contains(" N.m rms"), "{none}");
+    assert!(none.contains("no cause stands out in the 0.1"), "{none}");
+}
