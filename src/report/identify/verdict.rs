@@ -1,0 +1,84 @@
+//! The head of the page: whether the axis is identified, and by what.
+
+use super::estimates::{is_shown, value};
+use super::recommended;
+use crate::identify::earned::FOLLOWS;
+use crate::identify::result::Identification;
+use crate::report::format::{self, Medium};
+use crate::report::{Tone, Verdict};
+
+pub fn verdict(found: &Identification) -> Verdict {
+    let Some(best) = recommended(found).filter(|m| !m.parameters.is_empty()) else {
+        return Verdict {
+            tone: Tone::Unsure,
+            sentence: "No method could identify the axis from this trace.".to_owned(),
+            detail: found
+                .methods
+                .iter()
+                .filter_map(|m| m.failure.as_ref().map(|f| format!("{}: {f}.", m.title)))
+                .collect::<Vec<_>>()
+                .join(" "),
+            figures: Vec::new(),
+        };
+    };
+    let worst = best.outputs.iter().min_by(|a, b| a.fit_percent.total_cmp(&b.fit_percent));
+    let sentence = match worst {
+        Some(o) if best.outputs.len() == 1 => {
+            format!(
+                "{} identifies the axis: its simulation follows {} to {}.",
+                best.title,
+                o.signal.name(),
+                fit_percent(o.fit_percent)
+            )
+        }
+        Some(o) => format!(
+            "{} identifies the axis: its simulation follows every output to {} or better ({} the least).",
+            best.title,
+            fit_percent(o.fit_percent),
+            o.signal.name()
+        ),
+        None => format!("{} identifies the axis.", best.title),
+    };
+    let earned = &found.earned;
+    let tone = if earned.identified { Tone::Neutral } else { Tone::Unsure };
+    let poor = worst.filter(|o| o.fit_percent < FOLLOWS);
+    let sentence = match poor {
+        _ if earned.identified => sentence,
+        Some(o) if o.fit_percent > 0.0 => format!(
+            "The model does not follow the machine: with the estimates of {} its simulation follows {} to {} only.",
+            best.title,
+            o.signal.name(),
+            fit_percent(o.fit_percent)
+        ),
+        Some(o) => format!(
+            "The model does not follow the machine: with the estimates of {} its simulation is further from {} than its mean.",
+            best.title,
+            o.signal.name()
+        ),
+        None => format!("{} does not identify the axis from this record.", best.title),
+    };
+    let known = best.modal.iter().chain(best.parameters.iter()).filter(|e| is_shown(e));
+    let figures =
+        if earned.identified { known.take(4).map(|e| (e.name.to_owned(), value(e))).collect() } else { Vec::new() };
+    let detail = if earned.identified {
+        found.recommended.as_ref().map_or_else(String::new, |r| sentence_of(&r.why))
+    } else {
+        let mut words = earned.doubts.clone();
+        words.push(earned.advice.clone());
+        words.retain(|w| !w.is_empty());
+        words.join(" ")
+    };
+    Verdict { tone, sentence, detail, figures }
+}
+
+/// A remark as a sentence: capital letter, full stop.
+fn sentence_of(text: &str) -> String {
+    let mut chars = text.chars();
+    let head: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    let stop = if text.ends_with(['.', '!', '?']) { "" } else { "." };
+    format!("{head}{}{stop}", chars.as_str())
+}
+
+fn fit_percent(fit: f64) -> String {
+    format::percent(fit / 100.0, Medium::Page)
+}
