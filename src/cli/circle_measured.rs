@@ -7,6 +7,7 @@ use super::circle::{Findings as Simulated, Test};
 use crate::circle::measured::{Given, Measured, read};
 use crate::circle::roundness::{Roundness, bidirectional};
 use crate::circle::trace::{Analysis, Axis, Kind, analyse, hysteresis};
+use crate::effects::{EFFECTS, Length};
 use crate::report::ballbar::{Findings, Norm};
 use crate::trace::Machine;
 
@@ -66,23 +67,35 @@ fn norm(m: &Measured) -> Option<Norm> {
     })
 }
 
+/// The effect and its parameter that the table shows as such a length.
+fn setting(of: fn(Length) -> Option<usize>) -> Option<(&'static str, &'static str)> {
+    EFFECTS.iter().map(|e| (e.info(), e.length())).find_map(|(info, length)| {
+        let parameter = of(length?)?;
+        Some((info.id, info.parameters[parameter].name))
+    })
+}
+
 /// What the sizes are as parameters of the effects of a model whose screw is known.
 fn as_parameters(a: &Analysis, [x, y]: &[Machine; 2]) -> Vec<String> {
     let of = |axis: Axis| if axis == Axis::X { x.parameters.rho } else { y.parameters.rho };
     let told = a.effects.iter().filter(|e| e.contribution > 0.0 && e.size.abs() > 3.0 * e.error.unwrap_or(0.0));
     told.filter_map(|e| match e.kind {
-        Kind::Backlash(axis) if e.size > 0.0 => Some(format!(
-            "The {} of {:.2} um is [effects.backlash] half_gap = {:.4e} (half of it over the {:.4e} m/rad of {}).",
-            e.kind.name(),
-            1e6 * e.size,
-            0.5 * e.size / of(axis),
-            of(axis),
-            axis.name()
-        )),
+        Kind::Backlash(axis) if e.size > 0.0 => {
+            let (effect, parameter) = setting(|l| if let Length::HalfPlay(p) = l { Some(p) } else { None })?;
+            Some(format!(
+                "The {} of {:.2} um is [effects.{effect}] {parameter} = {:.4e} (half of it over the {:.4e} m/rad of {}).",
+                e.kind.name(),
+                1e6 * e.size,
+                0.5 * e.size / of(axis),
+                of(axis),
+                axis.name()
+            ))
+        }
         Kind::Cyclic(axis) => {
             let pitch = e.pitch?;
+            let (effect, parameter) = setting(|l| if let Length::Periods(p) = l { Some(p) } else { None })?;
             Some(format!(
-                "The {} every {:.3} mm is {:.4} to the turn of the motor: order = {:.4} of [effects.torque_ripple] where a torque \
+                "The {} every {:.3} mm is {:.4} to the turn of the motor: {parameter} = {:.4} of [effects.{effect}] where a torque \
                  makes it.",
                 e.kind.name(),
                 1e3 * pitch,
