@@ -53,9 +53,3 @@ pub struct Replay {
     /// `[theta1, omega1, theta2, omega2]` at its first sample.
     pub initial: [f64; 4],
 }
-
-/// Diagnoses a record.
-#[must_use]
-pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
-    super::torque::diagnose(case, progress)
-}

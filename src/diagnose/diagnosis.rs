@@ -3,7 +3,6 @@
 use std::fmt;
 
 use super::closed_loop::ClosedLoop;
-use super::gap::Figures;
 use super::location::{Appearance, Location};
 use super::model::BaseParameter;
 use super::torque::Confusable;
@@ -263,6 +262,30 @@ pub struct GapReport {
     pub closure_of: ClosureOf,
     /// What the held-out data are.
     pub holdout_is: HeldOut,
+}
+
+/// rms errors over the rms of the signal; `noise_floor` likewise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Levels {
+    /// The model as given.
+    pub before: f64,
+    /// Its parameters fitted.
+    pub reidentified: f64,
+    /// With the effect.
+    pub after: f64,
+    /// Noise of the encoders.
+    pub noise_floor: f64,
+}
+
+/// Levels combined over the signals and of each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figures {
+    /// All signals, each in units of its rms.
+    pub combined: Levels,
+    /// Each signal, see [`CHANNELS`](super::CHANNELS).
+    pub signals: Vec<(&'static str, Levels)>,
+    /// The same errors as multiples of the noise floor: before, re-identified, after.
+    pub multiples: [f64; 3],
 }
 
 /// Readings that come in steps.

@@ -3,7 +3,6 @@
 mod assess;
 mod closed_loop;
 mod diagnosis;
-mod gap;
 mod lattice;
 pub mod location;
 mod model;
@@ -14,17 +13,16 @@ mod repair;
 mod torque;
 mod verdict;
 
-pub use assess::{Case, Outcome, Replay, diagnose};
+pub use assess::{Case, Outcome, Replay};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
 pub use diagnosis::{
-    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Hypothesis, Ranked, Remainder, Rounding,
-    RoundingRole, Site, Where,
+    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Hypothesis, Levels, Ranked,
+    Remainder, Rounding, RoundingRole, Site, Where,
 };
-pub use gap::{Figures, Levels};
 pub use location::Location;
 pub use model::{BaseParameter, Model};
 pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
 pub use overlay::Overlay;
 pub use record::{CHANNELS, Record};
-pub use torque::{Confusable, Decision, Fit, Weighed};
+pub use torque::{Confusable, Decision, Fit, Weighed, diagnose};
 pub use verdict::Verdict;

@@ -113,7 +113,7 @@ mod tests {
         let (order, line) = (part(PartOf::Turn(3), 0.7, 0.8), part(PartOf::Foreign, 0.9, 0.9));
         let turn = OwnFrequency::OfTheTurn { order: 3, share: 0.7 };
         assert_eq!(frequency(&[line.clone(), order.clone()], Side::Motor), Some(turn));
-        assert_eq!(frequency(&[line.clone()], Side::Motor), Some(OwnFrequency::Foreign(1.5)));
+        assert_eq!(frequency(std::slice::from_ref(&line), Side::Motor), Some(OwnFrequency::Foreign(1.5)));
         let broad = FrequencyPart { peak_rms: 0.5, ..line };
         assert_eq!(frequency(&[broad], Side::Motor), None);
         assert_eq!(frequency(&[FrequencyPart { share: 0.4, ..order }], Side::Motor), None);

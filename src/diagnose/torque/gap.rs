@@ -9,8 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::super::diagnosis::ClosureOf;
-use super::super::gap::{Figures, Levels};
+use super::super::diagnosis::{ClosureOf, Figures, Levels};
 use super::super::model::Model;
 use super::super::record::{CHANNELS, Record};
 use super::tracking::{Run, start_states};
@@ -241,13 +240,17 @@ fn finite(v: f64) -> f64 {
     if v.is_finite() { v.min(1e6) } else { 1e6 }
 }
 
-/// [`closure`](super::super::gap::closure) of what stays finite: a run that leaves every bound closes nothing.
+/// `1 - (after - floor)/(before - floor)` of mean squares; one when there is no gap to close and none is left. A run that leaves every
+/// bound closes nothing.
 fn closure(before: f64, after: f64, floor: f64) -> f64 {
-    match (before.is_finite(), after.is_finite()) {
-        (true, true) => super::super::gap::closure(before, after, floor).max(-1e6),
-        (false, true) => 1.0,
-        _ => 0.0,
+    if !before.is_finite() || !after.is_finite() {
+        return f64::from(u8::from(after.is_finite()));
     }
+    let gap = before - floor;
+    if gap <= 1e-3 * floor {
+        return f64::from(u8::from(after <= before));
+    }
+    (1.0 - (after - floor).max(0.0) / gap).max(-1e6)
 }
 
 /// Block bootstrap (Kunsch, Ann. Statist. 17(3), 1989): 95 % interval of the closure.
