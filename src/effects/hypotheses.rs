@@ -71,3 +71,31 @@ impl Family {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{EFFECTS, Length};
+
+    #[test]
+    fn a_gain_a_step_and_a_length_are_parameters_of_their_effect() {
+        for e in EFFECTS {
+            let length = e.length().and_then(|l| match l {
+                Length::HalfPlay(p) | Length::Periods(p) => Some(p),
+                Length::Turn => None,
+            });
+            for p in [e.gain_parameter(), e.step_parameter(), length].into_iter().flatten() {
+                assert!(p < e.info().parameters.len(), "{e:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_effect_is_the_gain_and_one_the_rounding_and_neither_is_fitted() {
+        let count = |of: fn(Effect) -> Option<usize>| EFFECTS.iter().filter(|e| of(**e).is_some()).count();
+        assert_eq!((count(Effect::gain_parameter), count(Effect::step_parameter)), (1, 1));
+        for (effect, _) in [Effect::of_gain(), Effect::of_rounding()].into_iter().flatten() {
+            assert!(!effect.info().named, "{effect:?}");
+        }
+    }
+}
