@@ -202,7 +202,7 @@ fn found(diagnosed: &Diagnosed) -> Found {
     let held = &d.gap.holdout.combined;
     let causes: Vec<&str> = d.causes.iter().map(|c| c.effect.info().id).collect();
     let facts = vec![
-        json!(d.verdict.as_str()),
+        json!(contract::verdict(d.verdict)),
         json!(contract::site(d.location.site)),
         if causes.is_empty() { Value::Null } else { json!(causes.join("+")) },
         json!(d.causes.first().map(|c| c.probability)),

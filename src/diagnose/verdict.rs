@@ -12,16 +12,3 @@ pub enum Verdict {
     /// Nothing in the library brings the residual to the floor.
     Unexplained,
 }
-
-impl Verdict {
-    /// Its name in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Effect => "effect",
-            Self::Parameters => "parameters",
-            Self::NoGap => "no_gap",
-            Self::Unexplained => "unexplained",
-        }
-    }
-}

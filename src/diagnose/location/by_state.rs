@@ -57,34 +57,6 @@ pub enum StateVariable {
     TwistRate,
 }
 
-impl StateVariable {
-    /// Its name in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Omega1 => "omega1",
-            Self::Turn1 => "theta1 within the turn",
-            Self::Theta1 => "theta1",
-            Self::Torque => "T",
-            Self::Omega2 => "omega2",
-            Self::Turn2 => "theta2 within the turn",
-            Self::Theta2 => "theta2",
-            Self::Twist => "twist",
-            Self::TwistRate => "twist rate",
-        }
-    }
-
-    /// Its unit on a rotary axis.
-    #[must_use]
-    pub const fn unit(self) -> &'static str {
-        match self {
-            Self::Omega1 | Self::Omega2 | Self::TwistRate => "rad/s",
-            Self::Torque => "N.m",
-            Self::Turn1 | Self::Theta1 | Self::Turn2 | Self::Theta2 | Self::Twist => "rad",
-        }
-    }
-}
-
 /// The angle within its turn, rad.
 #[must_use]
 pub fn within_turn(angles: &[f64]) -> Vec<f64> {

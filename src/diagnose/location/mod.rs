@@ -28,20 +28,6 @@ pub enum Side {
     Table,
 }
 
-impl Side {
-    /// Its name in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Motor => "r1",
-            Self::Table => "r2",
-        }
-    }
-
-    /// Its unit on a rotary axis.
-    pub const UNIT: &str = "N.m";
-}
-
 /// Where a residual torque shows.
 #[derive(Debug, Clone)]
 pub struct Location {

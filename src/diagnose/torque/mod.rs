@@ -74,18 +74,23 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     Outcome { diagnosis, improved: models[2], models, decision, overlays, replay }
 }
 
-fn remains(p: &Prepared, fit: &Fit) -> Remainder {
-    let rigid = fit.model.structure == Structure::Rigid;
-    let tracked = track(&fit.model, &p.record, fit.bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
+/// What a model lacks along the record, in the band, and where that shows.
+fn lacked(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
+    let tracked = track(model, &p.record, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
-    let site = where_by_torque(&series, rigid);
-    let shown = along(&p.record, &residual(&series[usize::from(site == Site::At(Place::Table))], &tracked), site);
+    let site = where_by_torque(&series, model.structure == Structure::Rigid);
+    (tracked, series, site)
+}
+
+fn remains(p: &Prepared, fit: &Fit) -> Remainder {
+    let (tracked, series, site) = lacked(p, &fit.model, fit.bandwidth);
+    let shown = &series[usize::from(site == Site::At(Place::Table))];
     Remainder {
         torque_rms: p.band.torque_rms(fit.discrepancy),
         share: p.band.torque_share(fit.discrepancy, &p.record),
         noise_multiple: p.band.noise_multiple(&fit.rows),
         site,
-        looks: shown.looks,
+        looks: along(&p.record, &residual(shown, &tracked), site).looks,
     }
 }
 
@@ -129,12 +134,9 @@ fn prepared(record: &Record, nominal: &Model) -> Prepared {
 
 /// Where the torque that a model lacks shows along the record.
 fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
-    let tracked = track(model, &p.record, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
-    let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
-    let rigid = model.structure == Structure::Rigid;
-    let site = where_by_torque(&series, rigid);
+    let (tracked, series, site) = lacked(p, model, bandwidth);
     let mut residual = residual(&series[0], &tracked);
-    if !rigid {
+    if model.structure == Structure::TwoInertia {
         let [_, r2] = series;
         residual.r2 = r2;
     }

@@ -2,12 +2,12 @@
 
 use serde_json::{Map, Value, json};
 
-use super::naming::held_out;
+use super::naming::{RESIDUAL, held_out, variable};
 use super::words;
 use crate::diagnose::location::{FrequencyPart, PartOf, Side, StateCurve, TimeSlot};
 use crate::diagnose::{
     AxisParameter, Cause, ClosedLoop, ClosureOf, Diagnosis, Estimate, Figures, GapReport, Levels, LoopErrors, Ranked,
-    Remainder, Site, Where,
+    Remainder, Site, Verdict, Where,
 };
 
 /// Name and version of the format.
@@ -20,7 +20,7 @@ pub fn value(d: &Diagnosis) -> Value {
     let mut all = json!({
         "schema": SCHEMA,
         "machine": d.machine,
-        "verdict": d.verdict.as_str(),
+        "verdict": verdict(d.verdict),
         "sentence": words::sentence(d),
         "causes": list(&d.causes, cause),
         "ranking": list(&d.ranking, ranked),
@@ -42,6 +42,24 @@ pub fn value(d: &Diagnosis) -> Value {
 #[must_use]
 pub fn site(site: Option<Site>) -> &'static str {
     site.map_or("none", Site::as_str)
+}
+
+/// The name of a verdict.
+#[must_use]
+pub const fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Effect => "effect",
+        Verdict::Parameters => "parameters",
+        Verdict::NoGap => "no_gap",
+        Verdict::Unexplained => "unexplained",
+    }
+}
+
+const fn residual(side: Side) -> &'static str {
+    match side {
+        Side::Motor => "r1",
+        Side::Table => "r2",
+    }
 }
 
 fn list<T>(items: &[T], of: fn(&T) -> Value) -> Value {
@@ -103,7 +121,7 @@ fn part(p: &FrequencyPart) -> Value {
         PartOf::Band => "band".to_owned(),
     };
     json!({
-        "residual": p.residual.as_str(),
+        "residual": residual(p.residual),
         "kind": kind,
         "from": p.from,
         "to": p.to,
@@ -115,12 +133,13 @@ fn part(p: &FrequencyPart) -> Value {
 }
 
 fn curve(c: &StateCurve) -> Value {
+    let (against, against_unit) = variable(c.against);
     let bins = c.bins.iter().map(|b| json!({ "x": b.x, "mean": b.mean, "std": b.std, "count": b.count }));
     json!({
-        "residual": c.residual.as_str(),
-        "unit": Side::UNIT,
-        "against": c.against.as_str(),
-        "against_unit": c.against.unit(),
+        "residual": residual(c.residual),
+        "unit": RESIDUAL,
+        "against": against,
+        "against_unit": against_unit,
         "bins": bins.collect::<Vec<_>>(),
         "explained": c.explained,
     })

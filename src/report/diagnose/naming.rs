@@ -1,6 +1,6 @@
 //! Hypotheses, effects and signals as people call them.
 
-use crate::diagnose::location::Side;
+use crate::diagnose::location::{Side, StateVariable};
 use crate::diagnose::{Diagnosis, HeldOut, Hypothesis, Verdict};
 use crate::effects::{EffectInfo, Family};
 
@@ -44,6 +44,24 @@ pub const fn held_out(what: HeldOut) -> &'static str {
     match what {
         HeldOut::SecondRecord => "a second record",
         HeldOut::LastThird => "the last third of the record",
+    }
+}
+
+/// Unit of a residual torque on a rotary axis.
+pub const RESIDUAL: &str = "N.m";
+
+/// A variable of the motion, and its unit on a rotary axis.
+pub const fn variable(v: StateVariable) -> (&'static str, &'static str) {
+    match v {
+        StateVariable::Omega1 => ("omega1", "rad/s"),
+        StateVariable::Turn1 => ("theta1 within the turn", "rad"),
+        StateVariable::Theta1 => ("theta1", "rad"),
+        StateVariable::Torque => ("T", "N.m"),
+        StateVariable::Omega2 => ("omega2", "rad/s"),
+        StateVariable::Turn2 => ("theta2 within the turn", "rad"),
+        StateVariable::Theta2 => ("theta2", "rad"),
+        StateVariable::Twist => ("twist", "rad"),
+        StateVariable::TwistRate => ("twist rate", "rad/s"),
     }
 }
 

@@ -75,7 +75,7 @@ pub(super) fn blocks(w: &Where, motion: Motion) -> Vec<Block> {
     let located = &w.shown;
     let has = |side: Side| located.by_frequency.iter().any(|p| p.residual == side);
     let name = if w.site == Some(Site::At(Place::Table)) && has(Side::Table) { Side::Table } else { Side::Motor };
-    let unit = motion.unit(Side::UNIT);
+    let unit = motion.unit(naming::RESIDUAL);
     let mut figures = vec![along_time(located, name, unit)];
     figures.extend(over_frequency(&located.by_frequency, name, unit));
     let mut curves: Vec<&StateCurve> = located.by_state.iter().filter(|c| c.residual == name).collect();
@@ -128,13 +128,14 @@ fn over_frequency(parts: &[FrequencyPart], name: Side, unit: &str) -> Option<Fig
 }
 
 fn against_state(c: &StateCurve, unit: &str) -> Figure {
+    let (against, against_unit) = naming::variable(c.against);
     let x: Arc<[f64]> = c.bins.iter().map(|b| b.x).collect();
     let mean: Arc<[f64]> = c.bins.iter().map(|b| b.mean).collect();
     let low: Vec<f64> = c.bins.iter().map(|b| b.mean - b.std).collect();
     let high: Vec<f64> = c.bins.iter().map(|b| b.mean + b.std).collect();
     let chart = Chart::new(
-        format!("Against {}", c.against.as_str()),
-        Axis::linear(c.against.as_str(), c.against.unit()),
+        format!("Against {against}"),
+        Axis::linear(against, against_unit),
         Axis::linear(naming::residual(c.residual), unit),
     )
     .with(Series::band("± 1 standard deviation", x.clone(), low, high).in_colour(Colour::Orange))

@@ -1,6 +1,6 @@
 //! The sentences of a diagnosis: pure functions of the typed result.
 
-use super::naming::{lower, short_title, title};
+use super::naming::{lower, short_title, title, variable};
 use super::percent;
 use crate::diagnose::location::{Appearance, Location, OwnFrequency, Shape, Spread};
 use crate::diagnose::{Cause, ClosedLoop, Confusable, Diagnosis, LoopRanked, RoundingRole, Verdict};
@@ -114,7 +114,7 @@ pub fn gap_shows(l: &Location) -> String {
 /// What a residual looks like.
 pub fn looks(a: &Appearance) -> String {
     let dependence = a.dependence.map(|d| {
-        let of = d.against.as_str();
+        let of = variable(d.against).0;
         let form = match d.shape {
             Shape::Step => format!("flat against the sign of {of}"),
             Shape::Line => format!("linear in {of}"),
