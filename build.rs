@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, exit};
 
 /// What the lean library is made of.
-const SOURCES: [&str; 7] =
-    ["src/lib.rs", "src/scalar.rs", "src/axis", "src/drive", "src/effects", "src/fmi2", "src/variables"];
+const SOURCES: [&str; 8] =
+    ["src/lib.rs", "src/scalar.rs", "src/axis", "src/drive", "src/effects", "src/fmi2", "src/fmi3", "src/variables"];
 
 /// Platforms that can be asked for: folder of FMI 2.0, target, extension.
 const PLATFORMS: [(&str, &str, &str); 2] =

@@ -15,12 +15,18 @@ fn main() {
     row("static rules", 30, &fmu, &["--static"]);
     row("full run", 5, &fmu, &[]);
     row("not fenced", 5, &fmu, &["--no-sandbox"]);
+    let three = folder.path().join("axis3.fmu");
+    let export = Command::new(env!("CARGO_BIN_EXE_eixo")).args(["export", "--fmi", "3"]).arg(&three).output();
+    assert!(export.expect("eixo export").status.success());
+    row("FMI 3.0, full", 5, &three, &[]);
     let fmus = std::env::var_os("EIXO_FMUS").map_or_else(|| "../shared/fmus".into(), std::path::PathBuf::from);
-    let foreign = fmus.join("fmi2/VanDerPol.fmu");
-    if foreign.is_file() {
-        row("VanDerPol", 5, &foreign, &[]);
-    } else {
-        eprintln!("SKIPPED: no {} (EIXO_FMUS)", foreign.display());
+    for (name, file) in [("VanDerPol", "fmi2/VanDerPol.fmu"), ("VanDerPol 3.0", "fmi3/VanDerPol.fmu")] {
+        let foreign = fmus.join(file);
+        if foreign.is_file() {
+            row(name, 5, &foreign, &[]);
+        } else {
+            eprintln!("SKIPPED: no {} (EIXO_FMUS)", foreign.display());
+        }
     }
 }
 

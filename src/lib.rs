@@ -1,13 +1,14 @@
-//! `eixo`: the drive axis of a machine tool as an FMI 2.0 co-simulation FMU, its identification from logged traces,
+//! `eixo`: the drive axis of a machine tool as a co-simulation FMU of FMI 2.0 or 3.0, its identification from logged traces,
 //! and the diagnosis of the gap between the model and the machine.
 //!
 //! Imports run downward only: `cli -> fleet -> report -> diagnose -> identify -> trace -> axis -> effects`,
-//! `cli -> examine -> trace`, `cli -> fmu -> variables -> axis` and `fmi2 -> variables`.
+//! `cli -> examine -> trace`, `cli -> fmu -> variables -> axis`, `fmi2 -> variables` and `fmi3 -> fmi2`.
 
 pub mod axis;
 pub mod drive;
 pub mod effects;
 pub mod fmi2;
+pub mod fmi3;
 pub mod scalar;
 pub mod variables;
 

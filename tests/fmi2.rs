@@ -539,7 +539,7 @@ fn the_start_values_of_the_description_are_those_of_the_binary() {
             (Causality::Output, _) => {}
             (_, Type::Real) => assert_eq!(i.get_real(&[v.reference]).unwrap(), [starts.values[index]], "{v}"),
             (_, Type::Enumeration(_)) => {
-                assert_eq!(f64::from(i.get_integer(&[v.reference]).unwrap()[0]), starts.values[index], "{v}");
+                assert_eq!(i.get_integer(&[v.reference]).unwrap()[0] as f64, starts.values[index], "{v}");
             }
         }
     }

@@ -9,6 +9,7 @@ use std::ffi::{CString, c_void};
 use std::ptr::{null, null_mut};
 
 use eixo::fmi2::*;
+use eixo::fmi3::*;
 use eixo::variables::{Starts, all, guid};
 
 thread_local! {
@@ -176,5 +177,82 @@ fn null_pointers_are_refused_everywhere() {
         assert_eq!(fmi2GetRealStatus(c, 2, null_mut()), 3);
         assert_eq!(fmi2GetStatus(c, 0, null_mut()), 2);
         fmi2FreeInstance(c);
+    }
+}
+
+/// An instance by the ABI of FMI 3.0.
+fn instance3() -> *mut c_void {
+    let token = CString::new(guid(&Starts::default()).to_string()).unwrap();
+    let (name, none) = (c"axis".as_ptr(), null_mut());
+    // SAFETY: all pointers live through the call.
+    let c =
+        unsafe { fmi3InstantiateCoSimulation(name, token.as_ptr(), null(), 0, 0, 0, 0, null(), 0, none, None, null()) };
+    assert!(!c.is_null());
+    c
+}
+
+#[test]
+fn a_step_of_fmi_3_takes_nothing_from_the_heap_either() {
+    let c = instance3();
+    let (outputs, mut values) = ([1_u32, 2, 3, 4, 5, 6, 7], [0.0; 7]);
+    // SAFETY: an instance; every array has the length given.
+    unsafe {
+        assert_eq!(fmi3EnterInitializationMode(c, 0, 0.0, 0.0, 0, 0.0), 0);
+        assert_eq!(fmi3ExitInitializationMode(c), 0);
+        let before = ALLOCATIONS.with(Cell::get);
+        for k in 0..500 {
+            let (torque, point) = (0.03 * (0.1 * f64::from(k)).sin(), f64::from(k) * DT);
+            let (mut event, mut end, mut early, mut last) = (9, 9, 9, -1.0);
+            let (e, t, r, l) = (&raw mut event, &raw mut end, &raw mut early, &raw mut last);
+            assert_eq!(fmi3SetFloat64(c, [0].as_ptr(), 1, &raw const torque, 1), 0);
+            assert_eq!(fmi3DoStep(c, point, DT, 1, e, t, r, l), 0);
+            assert_eq!((event, end, early), (0, 0, 0));
+            assert!((last - point - DT).abs() < 1e-12);
+            assert_eq!(fmi3GetFloat64(c, outputs.as_ptr(), 7, values.as_mut_ptr(), 7), 0);
+            assert_eq!(fmi3GetOutputDerivatives(c, outputs.as_ptr(), 7, [1; 7].as_ptr(), values.as_mut_ptr(), 7), 0);
+            // Refused, in two ways.
+            assert_eq!(fmi3DoStep(c, -1.0, DT, 1, e, t, r, l), 3);
+            assert_eq!(fmi3GetFloat64(c, outputs.as_ptr(), 7, values.as_mut_ptr(), 6), 3);
+        }
+        assert_eq!(ALLOCATIONS.with(Cell::get), before);
+        fmi3FreeInstance(c);
+    }
+    assert!(values.iter().all(|v| v.is_finite()));
+}
+
+#[test]
+fn null_pointers_and_modes_that_are_not_there_are_refused_in_fmi_3() {
+    let c = instance3();
+    let token = CString::new(guid(&Starts::default()).to_string()).unwrap();
+    let (name, none) = (c"a".as_ptr(), null_mut());
+    // SAFETY: null pointers are what is tested; the rest are valid.
+    unsafe {
+        let make = |name, token, event| {
+            fmi3InstantiateCoSimulation(name, token, null(), 0, 0, event, 0, null(), 0, none, None, null())
+        };
+        assert!(make(null(), token.as_ptr(), 0).is_null());
+        assert!(make(name, null(), 0).is_null());
+        assert!(make(name, token.as_ptr(), 1).is_null(), "event mode");
+        assert!(make(c" ".as_ptr(), token.as_ptr(), 0).is_null());
+        fmi3FreeInstance(null_mut());
+        assert_eq!(fmi3Reset(null_mut()), 3);
+        assert_eq!(fmi3EnterEventMode(c), 3);
+        assert_eq!(fmi3EnterConfigurationMode(c), 3);
+        assert_eq!(fmi3EnterInitializationMode(c, 0, 0.0, f64::NAN, 0, 0.0), 3);
+        assert_eq!(fmi3EnterInitializationMode(c, 0, 0.0, 1.0, 1, 1.0), 3);
+        assert_eq!(fmi3EnterInitializationMode(c, 0, 0.0, 0.0, 0, 0.0), 0);
+        assert_eq!(fmi3GetFloat64(c, null(), 1, [0.0].as_mut_ptr(), 1), 3);
+        assert_eq!(fmi3GetFloat64(c, null(), 0, null_mut(), 0), 0);
+        assert_eq!(fmi3SetFloat64(c, [0].as_ptr(), 1, null(), 1), 3);
+        assert_eq!(fmi3GetBoolean(c, [0].as_ptr(), 1, [0].as_mut_ptr(), 1), 3);
+        assert_eq!(fmi3GetClock(c, [0].as_ptr(), 1, [0].as_mut_ptr()), 3);
+        assert_eq!(fmi3ExitInitializationMode(c), 0);
+        let mut last = 0.0;
+        assert_eq!(fmi3DoStep(c, 0.0, DT, 1, null_mut(), null_mut(), null_mut(), &raw mut last), 3);
+        // Nothing was done.
+        let mut flags = [7_u8; 3];
+        let [e, t, r] = &mut flags;
+        assert_eq!(fmi3DoStep(c, 0.0, DT, 1, e, t, r, &raw mut last), 0);
+        fmi3FreeInstance(c);
     }
 }

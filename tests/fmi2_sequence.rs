@@ -5,13 +5,14 @@
 
 use std::sync::OnceLock;
 
-use eixo::fmu::description::{BaseType, Causality};
+use eixo::fmu::description::{BaseType, Causality, Fmi};
 use eixo::fmu::host::{Fmu, HostError, Instance, StateHandle};
 use eixo::fmu::package::Package;
 use eixo::variables::{at, find};
 use proptest::prelude::*;
 
 const DT: f64 = 5.626e-4;
+
 const OUTPUTS: [u32; 7] = [1, 2, 3, 4, 5, 6, 7];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,14 +143,22 @@ impl Model {
     }
 }
 
+fn open(fmi: Fmi) -> Fmu {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("axis.fmu");
+    Package { fmi, ..Package::default() }.write(&file).unwrap();
+    Fmu::open(&file).unwrap()
+}
+
 fn fmu() -> &'static Fmu {
     static FMU: OnceLock<Fmu> = OnceLock::new();
-    FMU.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("axis.fmu");
-        Package::default().write(&file).unwrap();
-        Fmu::open(&file).unwrap()
-    })
+    FMU.get_or_init(|| open(Fmi::Two))
+}
+
+/// The same by the ABI of FMI 3.0.
+fn fmu3() -> &'static Fmu {
+    static FMU: OnceLock<Fmu> = OnceLock::new();
+    FMU.get_or_init(|| open(Fmi::Three))
 }
 
 fn reference(name: &str) -> u32 {
@@ -228,8 +237,10 @@ proptest! {
         sets in prop::collection::vec((any::<prop::sample::Index>(), extreme()), 0..6),
         inputs in prop::collection::vec((extreme(), extreme()), 1..8),
         step in prop_oneof![Just(DT), Just(1e-9), Just(1.0), 1e-6..1e-2_f64],
+        three in any::<bool>(),
     ) {
-        let mut i = fmu().instantiate("axis").unwrap();
+        // By either ABI; the variables have the same value references.
+        let mut i = if three { fmu3() } else { fmu() }.instantiate("axis").unwrap();
         let settable: Vec<u32> = fmu()
             .description
             .variables

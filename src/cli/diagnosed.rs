@@ -38,7 +38,7 @@ fn from_fmu(machine: &Machine, file: &Path) -> anyhow::Result<Machine> {
         let start = description.variable(&name).and_then(|v| v.start.clone());
         starts.values[index] = match (start, at(index).kind) {
             (Some(Start::Real(x)), Type::Real) if x.is_finite() => x,
-            (Some(Start::Integer(i)), Type::Enumeration(_)) => f64::from(i),
+            (Some(Start::Integer(i)), Type::Enumeration(_)) => i as f64,
             _ => bail!("it has no start value of {name}: it is no axis of this version of eixo; export it again"),
         };
     }

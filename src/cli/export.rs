@@ -12,7 +12,7 @@ use crate::fmu::isolation;
 use crate::fmu::output;
 use crate::fmu::package::{Package, XyTable};
 use crate::fmu::archive::{Archive, Limits};
-use crate::fmu::description::Description;
+use crate::fmu::description::{Description, Fmi};
 use crate::fmu::validation::{Options, validate};
 use crate::trace::{Machine, write_text};
 
@@ -25,6 +25,9 @@ pub struct Args {
     /// Machine whose parameters and effects become the start values; without it the paper's axis with every effect off
     #[arg(long, value_name = "AXIS.TOML")]
     pub axis: Option<PathBuf>,
+    /// Version of FMI
+    #[arg(long, value_enum, default_value_t = Version::Two, conflicts_with = "y")]
+    pub fmi: Version,
     /// Write the FMU of the axis' drive in place of the axis
     #[arg(long, conflicts_with = "y")]
     pub drive: bool,
@@ -42,6 +45,17 @@ pub struct Args {
     pub drives: Drives,
 }
 
+/// A version of FMI.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Version {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[value(name = "3")]
+    Three,
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -50,6 +64,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     outputs::check(args.axis.as_deref().into_iter().chain(args.y.as_deref()), [Some(&args.fmu)])?;
     let x = args.axis.as_deref().map(Machine::read).transpose()?;
     if args.fmu.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
+        anyhow::ensure!(args.fmi == Version::Two, "--fmi 3 writes an FMU: give {} the end .fmu", args.fmu.display());
         anyhow::ensure!(!args.drive, "--drive writes an FMU: give {} the end .fmu", args.fmu.display());
         anyhow::ensure!(!args.check, "--check is for an FMU: give {} the end .fmu", args.fmu.display());
         return table(&args, x.unwrap_or_default());
@@ -66,11 +81,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Package::drive("drive", &gains, rho, args.drives.dt, motion).with_context(file)?
         }
     };
+    let (fmi, spelt) = match args.fmi {
+        Version::Two => (Fmi::Two, "2.0"),
+        Version::Three => (Fmi::Three, "3.0"),
+    };
+    let package = Package { fmi, ..package };
     let bytes = package.archive()?;
     read_back(&bytes, "modelDescription.xml").with_context(file)?;
     write_text(&args.fmu, &bytes)?;
     let platforms: Vec<&str> = Package::platforms().collect();
-    say_line!("{}: FMI 2.0 co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
+    say_line!("{}: FMI {spelt} co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
     if args.check { check(&args.fmu) } else { Ok(ExitCode::SUCCESS) }
 }
 

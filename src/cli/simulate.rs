@@ -63,6 +63,12 @@ pub struct Args {
     /// Record the outputs as each step left them, before the next inputs are set (as most importers do)
     #[arg(long)]
     pub step_end: bool,
+    /// FMI 3.0: handle events in event mode, if the FMU has it (always so with an FMU that has clocks)
+    #[arg(long)]
+    pub event_mode: bool,
+    /// FMI 3.0: let steps return early at events, and go on from there to the next row
+    #[arg(long)]
+    pub early_return: bool,
     /// Run the FMU in a sandbox: no network, no new processes, no files but its own (as `validate` does)
     #[arg(long)]
     pub sandbox: bool,
@@ -201,6 +207,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         settings: args.set,
         outputs: args.outputs,
         rows: if args.step_end { Rows::StepEnd } else { Rows::InputsSet },
+        event_mode: args.event_mode,
+        early_return: args.early_return,
     };
     // What the run would be, where that is asked for: the run itself says what is wrong with it otherwise.
     let stop = options.stop.or(inputs.time.last().copied());

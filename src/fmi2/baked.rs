@@ -53,7 +53,7 @@ static BLOCK: Block = Block {
 };
 
 /// The start values of this binary.
-pub(super) fn starts() -> Starts {
+pub(crate) fn starts() -> Starts {
     // SAFETY: the pointer is to a static, valid and aligned. Volatile, because an export has perhaps changed the bytes
     // after the compiler saw them; every pattern of bits is a valid `u64` and `f64`.
     let block = unsafe { (&raw const BLOCK).read_volatile() };

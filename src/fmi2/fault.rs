@@ -9,7 +9,7 @@ use crate::variables::Named;
 
 /// A refused call. Nothing has changed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Fault {
+pub(crate) enum Fault {
     /// Not allowed at this place of the call sequence.
     Mode(Mode),
     /// `fmi2SetupExperiment` is missing.
@@ -40,6 +40,8 @@ pub(super) enum Fault {
     UnknownState,
     /// A stored state that cannot be read.
     Stored(&'static str),
+    /// Not as many values as scalars.
+    Count { given: usize, needed: usize },
     /// Too small a buffer.
     Buffer { given: usize, needed: usize },
     /// A log category that is not declared.
@@ -87,6 +89,9 @@ impl fmt::Display for Fault {
             Self::Order(order) => write!(f, "order {order}: only derivatives of order 1 are offered"),
             Self::UnknownState => f.write_str("this FMU state is none of this instance, or has been freed"),
             Self::Stored(why) => write!(f, "the serialised state cannot be used: {why}"),
+            Self::Count { given, needed } => {
+                write!(f, "{given} values for {needed} value references: every variable is a scalar")
+            }
             Self::Buffer { given, needed } => write!(f, "the buffer has {given} bytes, {needed} are needed"),
             Self::Category => f.write_str("a log category that modelDescription.xml does not declare"),
             Self::StatusKind(kind) => write!(f, "status kind {kind} is not offered: steps are never pending"),

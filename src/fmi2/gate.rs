@@ -39,7 +39,7 @@ pub enum Mode {
 
 impl Mode {
     /// The mode with that bit; none for [`Mode::Fatal`], which nothing leads back to.
-    pub(super) fn from_bits(bits: u8) -> Option<Self> {
+    pub(crate) fn from_bits(bits: u8) -> Option<Self> {
         [Self::Instantiated, Self::Initialization, Self::Step, Self::Terminated, Self::Error]
             .into_iter()
             .find(|m| *m as u8 == bits)
@@ -52,7 +52,7 @@ impl fmt::Display for Mode {
             Self::Instantiated => "before initialisation",
             Self::Initialization => "during initialisation",
             Self::Step => "after initialisation",
-            Self::Terminated => "after fmi2Terminate",
+            Self::Terminated => "after the termination",
             Self::Error => "after an error: set a stored state, reset or free the instance",
             Self::Fatal => "after a fatal error: free the instance",
         })
@@ -63,6 +63,7 @@ const INSTANTIATED: u8 = Mode::Instantiated as u8;
 const INITIALIZATION: u8 = Mode::Initialization as u8;
 const STEP: u8 = Mode::Step as u8;
 const AFTER: u8 = Mode::Terminated as u8 | Mode::Error as u8;
+const NOWHERE: u8 = 0;
 const ANY: u8 = INSTANTIATED | INITIALIZATION | STEP | AFTER;
 
 macro_rules! functions {
@@ -70,10 +71,11 @@ macro_rules! functions {
         /// The functions that take an instance.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         #[allow(non_camel_case_types, clippy::enum_variant_names)]
-        pub(super) enum Function { $($name),* }
+        pub(crate) enum Function { $($name),* }
 
         impl Function {
-            /// Modes in which the call is legal (FMI 2.0.4, section 4.2.4, table of allowed calls).
+            /// Modes in which the call is legal (FMI 2.0.4, section 4.2.4, table of allowed calls; FMI 3.0, sections 2.3
+            /// and 4.2).
             const fn mask(self) -> u8 {
                 match self { $(Self::$name => $mask),* }
             }
@@ -110,19 +112,89 @@ functions! {
     fmi2SetRealInputDerivatives: INSTANTIATED | INITIALIZATION | STEP;
     fmi2GetRealOutputDerivatives: STEP | AFTER;
     fmi2DoStep: STEP;
-    fmi2CancelStep: 0;
+    fmi2CancelStep: NOWHERE;
     fmi2GetStatus: STEP | AFTER;
     fmi2GetRealStatus: STEP | AFTER;
     fmi2GetIntegerStatus: STEP | AFTER;
     fmi2GetBooleanStatus: STEP | AFTER;
     fmi2GetStringStatus: STEP | AFTER;
+    fmi3SetDebugLogging: ANY;
+    fmi3EnterInitializationMode: INSTANTIATED;
+    fmi3ExitInitializationMode: INITIALIZATION;
+    fmi3EnterEventMode: NOWHERE;
+    fmi3EnterStepMode: NOWHERE;
+    fmi3EnterConfigurationMode: NOWHERE;
+    fmi3ExitConfigurationMode: NOWHERE;
+    fmi3EvaluateDiscreteStates: NOWHERE;
+    fmi3UpdateDiscreteStates: NOWHERE;
+    fmi3Terminate: STEP;
+    fmi3Reset: ANY;
+    fmi3GetFloat32: ANY;
+    fmi3SetFloat32: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetFloat64: ANY;
+    fmi3SetFloat64: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetInt8: ANY;
+    fmi3SetInt8: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetUInt8: ANY;
+    fmi3SetUInt8: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetInt16: ANY;
+    fmi3SetInt16: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetUInt16: ANY;
+    fmi3SetUInt16: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetInt32: ANY;
+    fmi3SetInt32: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetUInt32: ANY;
+    fmi3SetUInt32: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetInt64: ANY;
+    fmi3SetInt64: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetUInt64: ANY;
+    fmi3SetUInt64: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetBoolean: ANY;
+    fmi3SetBoolean: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetString: ANY;
+    fmi3SetString: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetBinary: ANY;
+    fmi3SetBinary: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetClock: ANY;
+    fmi3SetClock: INSTANTIATED | INITIALIZATION | STEP;
+    fmi3GetIntervalDecimal: ANY;
+    fmi3GetIntervalFraction: ANY;
+    fmi3GetShiftDecimal: ANY;
+    fmi3GetShiftFraction: ANY;
+    fmi3SetIntervalDecimal: ANY;
+    fmi3SetIntervalFraction: ANY;
+    fmi3SetShiftDecimal: ANY;
+    fmi3SetShiftFraction: ANY;
+    fmi3GetFMUState: ANY;
+    fmi3SetFMUState: ANY;
+    fmi3FreeFMUState: ANY;
+    fmi3SerializedFMUStateSize: ANY;
+    fmi3SerializeFMUState: ANY;
+    fmi3DeserializeFMUState: ANY;
+    fmi3GetDirectionalDerivative: INITIALIZATION | STEP | AFTER;
+    fmi3GetAdjointDerivative: NOWHERE;
+    fmi3GetNumberOfVariableDependencies: NOWHERE;
+    fmi3GetVariableDependencies: NOWHERE;
+    fmi3GetOutputDerivatives: STEP | AFTER;
+    fmi3DoStep: STEP;
+    fmi3EnterContinuousTimeMode: NOWHERE;
+    fmi3CompletedIntegratorStep: NOWHERE;
+    fmi3SetTime: NOWHERE;
+    fmi3SetContinuousStates: NOWHERE;
+    fmi3GetContinuousStateDerivatives: NOWHERE;
+    fmi3GetEventIndicators: NOWHERE;
+    fmi3GetContinuousStates: NOWHERE;
+    fmi3GetNominalsOfContinuousStates: NOWHERE;
+    fmi3GetNumberOfEventIndicators: NOWHERE;
+    fmi3GetNumberOfContinuousStates: NOWHERE;
+    fmi3ActivateModelPartition: NOWHERE;
 }
 
 /// What an instance marks itself with, so that a pointer to something else is noticed.
 const MARK: u64 = 0x6569_786f_2d46_4d55;
 
 /// An instance, as the importer's pointer leads to it.
-pub(super) struct Instance {
+pub(crate) struct Instance {
     mark: u64,
     /// Set while a call is under way: the logger may not call back into the instance.
     busy: AtomicBool,
@@ -130,7 +202,7 @@ pub(super) struct Instance {
 }
 
 /// The instance itself.
-pub(super) struct Body {
+pub(crate) struct Body {
     pub kernel: Simulation,
     pub mode: Mode,
     pub set_up: bool,
@@ -141,11 +213,25 @@ pub(super) struct Body {
 }
 
 /// Where log messages go.
-pub(super) struct Log {
+pub(crate) struct Log {
     pub name: CString,
-    pub callbacks: Callbacks,
+    pub sink: Sink,
     /// By status: warning, discard, error, fatal.
     pub on: [bool; 4],
+}
+
+/// The importer's logger, by the version of FMI.
+#[derive(Clone, Copy)]
+pub(crate) enum Sink {
+    /// FMI 2.0: a variadic function.
+    Two(Callbacks),
+    /// FMI 3.0.
+    Three {
+        /// Handed back to the logger.
+        environment: *mut std::ffi::c_void,
+        /// Log messages go here.
+        message: Option<crate::fmi3::LogMessage>,
+    },
 }
 
 /// A message on the stack; too long a text is cut.
@@ -176,8 +262,11 @@ impl Log {
 
     /// Sends a message of that status, if anyone listens.
     pub fn send(&self, status: Status, message: impl fmt::Display) {
-        let Some(logger) = self.callbacks.logger else { return };
-        if !self.wants(status) {
+        let there = match self.sink {
+            Sink::Two(callbacks) => callbacks.logger.is_some(),
+            Sink::Three { message, .. } => message.is_some(),
+        };
+        if !there || !self.wants(status) {
             return;
         }
         let mut text = Message { bytes: [0; 480], len: 0 };
@@ -185,17 +274,20 @@ impl Log {
         let _ = write!(text, "{message}");
         let mut category = Message { bytes: [0; 480], len: 0 };
         let _ = category.write_str(LOG_CATEGORIES[status as usize - 1].0);
-        // SAFETY: the logger has the signature of FMI 2.0; all texts end in zero and live through the call; the message
-        // goes through "%s", so that no sign in it is taken for a format.
+        let category = category.bytes.as_ptr().cast();
+        // SAFETY: the logger has the signature of its version; all texts end in zero and live through the call; in FMI 2.0
+        // the message goes through "%s", so that no sign in it is taken for a format.
         unsafe {
-            logger(
-                self.callbacks.environment,
-                self.name.as_ptr(),
-                status as i32,
-                category.bytes.as_ptr().cast(),
-                c"%s".as_ptr(),
-                text.bytes.as_ptr(),
-            );
+            match self.sink {
+                Sink::Two(Callbacks { logger: Some(logger), environment, .. }) => {
+                    let text = text.bytes.as_ptr();
+                    logger(environment, self.name.as_ptr(), status as i32, category, c"%s".as_ptr(), text);
+                }
+                Sink::Three { environment, message: Some(message) } => {
+                    message(environment, status as i32, category, text.bytes.as_ptr().cast());
+                }
+                _ => {}
+            }
         }
     }
 }
@@ -221,7 +313,7 @@ impl Body {
 }
 
 /// Makes an instance and hands its ownership to the importer.
-pub(super) fn create(starts: Starts, log: Log) -> Component {
+pub(crate) fn create(starts: Starts, log: Log) -> Component {
     let body = Body {
         kernel: Simulation::new(&starts),
         mode: Mode::Instantiated,
@@ -252,7 +344,7 @@ unsafe fn instance<'a>(c: Component) -> Option<&'a Instance> {
 ///
 /// # Safety
 /// `c` is null or comes from [`create`] and has not been freed.
-pub(super) unsafe fn destroy(c: Component) {
+pub(crate) unsafe fn destroy(c: Component) {
     // SAFETY: the caller's.
     let Some(found) = (unsafe { instance(c) }) else { return };
     if found.busy.swap(true, Ordering::Acquire) {
@@ -273,7 +365,7 @@ pub(super) unsafe fn destroy(c: Component) {
 /// # Safety
 /// `c` is null or an instance that lives through the call.
 #[inline]
-pub(super) unsafe fn enter(
+pub(crate) unsafe fn enter(
     c: Component,
     function: Function,
     call: impl FnOnce(&mut Body) -> Result<Status, Fault>,
@@ -308,7 +400,7 @@ pub(super) unsafe fn enter(
 ///
 /// # Safety
 /// `text` is null or a C string that lives as long as the result is used.
-pub(super) unsafe fn text<'a>(text: super::abi::Text) -> &'a str {
+pub(crate) unsafe fn text<'a>(text: super::abi::Text) -> &'a str {
     if text.is_null() {
         return "";
     }
@@ -328,7 +420,7 @@ mod tests {
             step_finished: None,
             environment: std::ptr::null_mut(),
         };
-        Log { name: CString::default(), callbacks, on: [true; 4] }
+        Log { name: CString::default(), sink: Sink::Two(callbacks), on: [true; 4] }
     }
 
     #[test]

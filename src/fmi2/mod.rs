@@ -1,4 +1,4 @@
-//! The FMU: FMI 2.0 co-simulation, its C ABI and the simulation behind it.
+//! The FMU: FMI 2.0 co-simulation, its C ABI and the simulation behind it, which [`crate::fmi3`] shares.
 //!
 //! [`simulation`] is what runs, safe and without a heap: [`kernel`] the axis, [`drive`] the drive; [`stored`] is its state as bytes; `gate` the one way in from C (null
 //! check, call sequence, `catch_unwind`), and `exports` the functions of `fmi2Functions.h`. No globals: everything lives
@@ -17,5 +17,13 @@ pub mod stored;
 pub use abi::*;
 #[cfg(feature = "cli")]
 pub use baked::bake;
+pub(crate) use baked::starts;
 pub use exports::*;
+pub(crate) use exports::{
+    array, array_mut, choose_categories, deserialise, directional, finite, finite_value, free_state, get_state,
+    none_of, output_derivatives, resolve, serialise, serialised_size, set, set_state, step, typed,
+};
+pub(crate) use fault::Fault;
 pub use gate::Mode;
+pub(crate) use gate::{Body, Function, Log, Sink, create, destroy, enter, text};
+pub(crate) use simulation::Simulation;

@@ -55,7 +55,7 @@ pub fn simulate(path: &Path, inputs: &Inputs, options: &Options, keep: &Host) ->
     };
     simulate::check(&description, inputs, options)?;
     let folder = archive.extract().map_err(HostError::from)?;
-    host::binary_file(folder.path(), interface)?;
+    host::binary_file(folder.path(), description.fmi, interface)?;
     let child = |reason: std::io::Error| SimulateError::Child(format!("cannot start a process for the FMU: {reason}"));
     let scratch = temporary::folder().map_err(child)?;
     let fence = keep.sandbox.then(|| Fence { read: sandbox::configured(), write: vec![folder.path().to_owned()] });

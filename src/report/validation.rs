@@ -26,7 +26,7 @@ pub fn report(v: &Validation, comparison: Option<&Comparison>, strict: bool) -> 
         title: "Validation".to_owned(),
         subject: v.model.as_ref().map_or_else(|| v.file.clone(), |model| format!("{model}, {}", v.file)),
         sections,
-        footer: format!("eixo {}, rules of FMI 2.0.4", env!("CARGO_PKG_VERSION")),
+        footer: format!("eixo {}, rules of {}", env!("CARGO_PKG_VERSION"), v.fmi.standard()),
     }
 }
 
@@ -70,8 +70,8 @@ fn findings(v: &Validation) -> Section {
         for (rule, _) in v.rules.iter().filter(|(rule, _)| rule.severity == severity) {
             let found: Vec<_> = v.findings.iter().filter(|f| f.rule == rule.id).collect();
             let Some(first) = found.first() else { continue };
-            let caption =
-                format!("{severity}: {} ({}, FMI 2.0.4, section {}, {})", rule.title, rule.id, rule.section, rule.kind);
+            let (title, standard, section) = (rule.title(v.fmi), v.fmi.standard(), of(v, rule));
+            let caption = format!("{severity}: {title} ({}, {standard}, section {section}, {})", rule.id, rule.kind);
             let mut table = Table::new(caption, ["what was seen", "where"]);
             for finding in found.iter().take(MOST) {
                 let place = finding.place.as_ref().map(|place| match place.position {
@@ -87,13 +87,21 @@ fn findings(v: &Validation) -> Section {
                 table.row(vec![Cell::text(format!("and {} more", found.len() - MOST)), Cell::Empty]);
             }
             blocks.push(Block::Table(table));
-            blocks.push(Block::Paragraph(format!("To do: {}", first.advice.as_deref().unwrap_or(rule.advice))));
+            blocks.push(Block::Paragraph(format!(
+                "To do: {}",
+                first.advice.clone().unwrap_or_else(|| rule.advice(v.fmi))
+            )));
         }
     }
     if blocks.is_empty() {
         blocks.push(Block::Paragraph("Nothing was found.".to_owned()));
     }
     Section::new("Findings", blocks)
+}
+
+/// The section of a rule in the standard that was tested.
+fn of(v: &Validation, rule: &Rule) -> &'static str {
+    rule.section(v.fmi).unwrap_or("-")
 }
 
 /// A verdict in words, with its reason.
@@ -108,22 +116,22 @@ fn words(rule: &Rule, verdict: &Result) -> (String, String) {
 }
 
 fn by_section(v: &Validation) -> Section {
-    let mut names: Vec<&str> = v.rules.iter().map(|(rule, _)| rule.section).collect();
+    let mut names: Vec<&str> = v.rules.iter().map(|(rule, _)| of(v, rule)).collect();
     let key = |section: &str| section.split('.').map(|n| n.parse::<u32>().unwrap_or(0)).collect::<Vec<u32>>();
     names.sort_by_key(|section| key(section));
     names.dedup();
     let blocks = names.into_iter().map(|section| {
-        let rules: Vec<_> = v.rules.iter().filter(|(rule, _)| rule.section == section).collect();
+        let rules: Vec<_> = v.rules.iter().filter(|(rule, _)| of(v, rule) == section).collect();
         let found = rules.iter().filter(|(_, verdict)| *verdict == Result::Failed).count();
         let mut table = Table::new("", ["rule", "what holds when it passes", "verdict", "why"]);
         for (rule, verdict) in &rules {
             let (word, why) = words(rule, verdict);
-            table.row(vec![Cell::text(rule.id), Cell::text(rule.title), Cell::text(word), Cell::text(why)]);
+            table.row(vec![Cell::text(rule.id), Cell::text(rule.title(v.fmi)), Cell::text(word), Cell::text(why)]);
         }
         let label = format!("Section {section}: {} rules, {found} with findings", rules.len());
         Block::Details(label, vec![Block::Table(table)])
     });
-    Section::new("Rules by section of FMI 2.0.4", blocks.collect())
+    Section::new(format!("Rules by section of {}", v.fmi.standard()), blocks.collect())
 }
 
 fn untested(v: &Validation) -> Option<Section> {

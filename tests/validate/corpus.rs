@@ -81,16 +81,26 @@ fn scratch() -> &'static Path {
 
 /// The binary with a defect.
 pub fn binary(defect: &str) -> Vec<u8> {
+    binary_of("fmu.c", defect, "")
+}
+
+/// The binary of a source with a defect, and one of FMI 3.0 alone where it is named.
+pub fn binary_of(source: &str, defect: &str, own: &str) -> Vec<u8> {
     static LOCK: Mutex<()> = Mutex::new(());
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/fmu.c");
-    let file = scratch().join(format!("{defect}.so"));
+    let file = scratch().join(format!("{source}-{defect}-{own}.so"));
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(source);
     // Tests of one process may ask for the same binary at the same time.
-    let guard = (defect == "NONE").then(|| LOCK.lock().unwrap());
+    let guard = (defect == "NONE" && own.is_empty()).then(|| LOCK.lock().unwrap());
     if !file.exists() {
         let part = file.with_extension("part");
         let output = Command::new("cc")
             .args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden"])
-            .args([format!("-DDEFECT={defect}"), format!("-DDEFECT_{defect}=1"), "-o".into()])
+            .args([
+                format!("-DDEFECT={defect}"),
+                format!("-DDEFECT_{defect}=1"),
+                format!("-DDEFECT3_{own}=1"),
+                "-o".into(),
+            ])
             .args([&part, &source])
             .args(["-lm", "-lpthread"])
             .output()

@@ -2,7 +2,7 @@
 
 use super::corpus::{self, DESCRIPTION, Mutant, pack};
 
-const DEFECTS: &[(&str, &str)] = &[
+pub const DEFECTS: &[(&str, &str)] = &[
     ("UNRESOLVED", "binary-load"),
     ("SYMBOL_MISSING", "binary-symbols"),
     ("SYMBOL_OPTIONAL", "binary-all-symbols"),

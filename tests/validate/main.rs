@@ -17,6 +17,7 @@ mod descriptions;
 mod foreign;
 mod hostile;
 mod pipeline;
+mod three;
 mod variants;
 
 use std::collections::BTreeSet;
@@ -53,7 +54,8 @@ fn each_defect_of_the_binary_is_killed_by_exactly_the_rule_meant() {
 
 #[test]
 fn every_rule_has_a_mutant_and_every_mutant_a_rule() {
-    let mutants: Vec<Mutant> = static_mutants().into_iter().chain(defects::mutants()).collect();
+    let two = static_mutants().into_iter().chain(defects::mutants());
+    let mutants: Vec<Mutant> = two.chain(three::mutants()).collect();
     let aimed: BTreeSet<&str> = mutants.iter().map(|m| m.rule).collect();
     let rules: BTreeSet<&str> = RULES.iter().map(|r| r.id).collect();
     assert_eq!(aimed, rules);
@@ -72,4 +74,26 @@ fn unusual_but_legal_fmus_have_no_finding_at_all() {
         (!report.findings.is_empty()).then(|| format!("{}: {:#?}", variant.name, report.findings))
     });
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// Writes the mutants as files for `scripts/validators.py`, which asks other validators about them: into the folder
+/// `EIXO_MUTANTS`, where it is named.
+#[test]
+fn writes_the_mutants() {
+    let Some(folder) = std::env::var_os("EIXO_MUTANTS").map(std::path::PathBuf::from) else { return };
+    let running = if corpus::compiler() { defects::mutants() } else { Vec::new() };
+    let groups = [
+        ("2.0 archive and XML", static_mutants()),
+        ("2.0 binary", running),
+        ("3.0 archive and XML", three::static_mutants()),
+        ("3.0 binary", if corpus::compiler() { three::running_mutants() } else { Vec::new() }),
+    ];
+    for (name, mutants) in groups {
+        let folder = folder.join(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        for mutant in mutants {
+            let plain: String = mutant.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+            std::fs::write(folder.join(format!("{}--{plain}.fmu", mutant.rule)), mutant.build()).unwrap();
+        }
+    }
 }

@@ -48,3 +48,47 @@ fn the_action_calls_the_script_and_names_its_exit_codes() {
         assert!(action.contains(part), "{part}");
     }
 }
+
+/// The lines of a step's `run: |` in the action.
+fn step(name: &str) -> String {
+    let action = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("action.yml")).unwrap();
+    let step = action.split(&format!("- name: {name}\n")).nth(1).unwrap();
+    let lines = step.split("run: |\n").nth(1).unwrap().lines();
+    lines.take_while(|l| l.starts_with("        ")).map(|l| &l[8..]).collect::<Vec<_>>().join("\n")
+}
+
+/// The action's own steps, run by bash as the runner runs them: what they call, what they hand on, how they judge.
+#[test]
+fn the_steps_of_the_action_run_and_judge() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().unwrap();
+    let build = folder.path().join("build");
+    std::fs::create_dir_all(&build).unwrap();
+    let run = |options: &str| -> String {
+        let told = folder.path().join("output");
+        std::fs::write(&told, "").unwrap();
+        let mut bash = Command::new("bash");
+        bash.args(["--noprofile", "--norc", "-eo", "pipefail", "-c", &step("Validate")]);
+        bash.env("GITHUB_ACTION_PATH", root).env("GITHUB_OUTPUT", &told).env("EIXO", corpus::program());
+        bash.env("FOLDER", &build).env("REPORTS", folder.path().join("reports")).env("OPTIONS", options);
+        let output = bash.output().unwrap();
+        // Uploading comes first: this step never fails.
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        std::fs::read_to_string(told).unwrap()
+    };
+    std::fs::write(build.join("sound.fmu"), pack(&files(DESCRIPTION))).unwrap();
+    assert_eq!(run("--static"), "code=0\n");
+    // Nothing of an option is shell code.
+    assert_eq!(run("--static --skip guid;touch${IFS}owned"), "code=2\n");
+    assert!(!Path::new("owned").exists());
+    std::fs::write(build.join("broken.fmu"), pack(&files(&description(&[("start=\"9.81\"", "start=\"9,81\"")]))))
+        .unwrap();
+    assert_eq!(run("--static"), "code=1\n");
+    let judge = |code: &str, not_tested: &str| {
+        let mut bash = Command::new("bash");
+        bash.args(["-eo", "pipefail", "-c", &step("Judge")]).env("CODE", code).env("NOT_TESTED", not_tested);
+        bash.status().unwrap().code()
+    };
+    assert_eq!([judge("0", "false"), judge("1", "false"), judge("2", "false")], [Some(0), Some(1), Some(2)]);
+    assert_eq!([judge("3", "false"), judge("3", "true")], [Some(0), Some(3)]);
+}

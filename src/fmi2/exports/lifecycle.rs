@@ -6,7 +6,7 @@ use std::panic::catch_unwind;
 use super::super::abi::{Callbacks, Component, LOG_CATEGORIES, Status, Text};
 use super::super::baked;
 use super::super::fault::Fault;
-use super::super::gate::{self, Function, Log, Mode};
+use super::super::gate::{self, Body, Function, Log, Mode, Sink};
 use super::super::simulation::Simulation;
 use super::{array, call, typed};
 use crate::variables::guid;
@@ -45,7 +45,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
         };
         // Errors always, the rest on request.
         let on = logging != 0;
-        let log = Log { name, callbacks, on: [on, on, true, true] };
+        let log = Log { name, sink: Sink::Two(callbacks), on: [on, on, true, true] };
         let refuse = |why: std::fmt::Arguments<'_>| {
             log.send(Status::Error, format_args!("fmi2Instantiate: {why}"));
             std::ptr::null_mut()
@@ -79,21 +79,30 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(c: Component, on: c_int, count: usi
     call!(c, fmi2SetDebugLogging, |body| {
         // SAFETY: the importer's.
         let categories = unsafe { array(categories, count, "categories") }?;
-        let mut chosen = [categories.is_empty(); 4];
-        for &category in categories {
-            // SAFETY: null or a C string by the standard's contract.
-            let category = unsafe { gate::text(category) };
-            match LOG_CATEGORIES.iter().position(|(name, _)| *name == category) {
-                Some(i) if i < 4 => chosen[i] = true,
-                Some(_) => chosen = [true; 4],
-                None => return Err(Fault::Category),
-            }
-        }
-        for (now, _) in body.log.on.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
-            *now = on != 0;
-        }
-        Ok(Status::Ok)
+        // SAFETY: C strings or null, by the standard's contract.
+        unsafe { choose_categories(body, on != 0, categories) }
     })
+}
+
+/// Switches log categories on or off; all of them where none is named.
+///
+/// # Safety
+/// The categories are C strings or null.
+pub(crate) unsafe fn choose_categories(body: &mut Body, on: bool, categories: &[Text]) -> Result<Status, Fault> {
+    let mut chosen = [categories.is_empty(); 4];
+    for &category in categories {
+        // SAFETY: the caller's.
+        let category = unsafe { gate::text(category) };
+        match LOG_CATEGORIES.iter().position(|(name, _)| *name == category) {
+            Some(i) if i < 4 => chosen[i] = true,
+            Some(_) => chosen = [true; 4],
+            None => return Err(Fault::Category),
+        }
+    }
+    for (now, _) in body.log.on.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
+        *now = on;
+    }
+    Ok(Status::Ok)
 }
 
 #[unsafe(no_mangle)]
@@ -159,6 +168,6 @@ pub unsafe extern "C" fn fmi2Reset(c: Component) -> c_int {
     })
 }
 
-fn finite(name: &'static str, value: f64) -> Result<f64, Fault> {
+pub(crate) fn finite(name: &'static str, value: f64) -> Result<f64, Fault> {
     if value.is_finite() { Ok(value) } else { Err(Fault::Number { name, value, must_be: "a finite number" }) }
 }

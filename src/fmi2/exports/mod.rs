@@ -34,10 +34,15 @@ macro_rules! call {
     }};
 }
 
+pub(crate) use lifecycle::{choose_categories, finite};
+pub(crate) use states::{deserialise, free_state, get_state, serialise, serialised_size, set_state};
+pub(crate) use steps::step;
+pub(crate) use values::{directional, finite_value, none_of, output_derivatives, resolve, set};
+
 use call;
 
 /// Tells the compiler what a closure for the gate takes.
-fn typed<F: FnOnce(&mut Body) -> Result<Status, Fault>>(call: F) -> F {
+pub(crate) fn typed<F: FnOnce(&mut Body) -> Result<Status, Fault>>(call: F) -> F {
     call
 }
 
@@ -45,7 +50,7 @@ fn typed<F: FnOnce(&mut Body) -> Result<Status, Fault>>(call: F) -> F {
 ///
 /// # Safety
 /// `data` is null or holds `len` entries that live through the call.
-unsafe fn array<'a, T>(data: *const T, len: usize, name: &'static str) -> Result<&'a [T], Fault> {
+pub(crate) unsafe fn array<'a, T>(data: *const T, len: usize, name: &'static str) -> Result<&'a [T], Fault> {
     match len {
         0 => Ok(&[]),
         _ if data.is_null() || !data.is_aligned() => Err(Fault::Null(name)),
@@ -58,7 +63,7 @@ unsafe fn array<'a, T>(data: *const T, len: usize, name: &'static str) -> Result
 ///
 /// # Safety
 /// `data` is null or holds `len` entries that live through the call and that nothing else refers to.
-unsafe fn array_mut<'a, T>(data: *mut T, len: usize, name: &'static str) -> Result<&'a mut [T], Fault> {
+pub(crate) unsafe fn array_mut<'a, T>(data: *mut T, len: usize, name: &'static str) -> Result<&'a mut [T], Fault> {
     match len {
         0 => Ok(&mut []),
         _ if data.is_null() || !data.is_aligned() => Err(Fault::Null(name)),

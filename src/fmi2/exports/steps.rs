@@ -16,30 +16,34 @@ const TIME_ROUNDING: f64 = 1e-12;
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2DoStep(c: Component, point: f64, step: f64, _no_set_state_before: c_int) -> c_int {
-    call!(c, fmi2DoStep, |body| {
-        // Written so that NaN is refused too.
-        if !(step > 0.0 && step.is_finite()) {
-            let must_be = "finite and greater than zero";
-            return Err(Fault::Number { name: "communicationStepSize", value: step, must_be });
-        }
-        let (expected, stop) = (body.kernel.time(), body.kernel.stop());
-        let slack = TIME_SLACK * step + TIME_ROUNDING * expected.abs();
-        if point.is_nan() || (point - expected).abs() > slack {
-            return Err(Fault::Time { given: point, expected });
-        }
-        if point + step > stop + slack {
-            return Err(Fault::PastStop { end: point + step, stop });
-        }
-        match body.kernel.step(point, step) {
-            Ok(()) => Ok(Status::Ok),
-            Err(error) => {
-                if let StepError::NotFinite { .. } = error {
-                    body.mode = Mode::Error;
-                }
-                Err(Fault::Step(error))
+    call!(c, fmi2DoStep, |body| self::step(body, point, step))
+}
+
+/// A step from a communication point.
+#[inline]
+pub(crate) fn step(body: &mut Body, point: f64, step: f64) -> Result<Status, Fault> {
+    // Written so that NaN is refused too.
+    if !(step > 0.0 && step.is_finite()) {
+        let must_be = "finite and greater than zero";
+        return Err(Fault::Number { name: "communicationStepSize", value: step, must_be });
+    }
+    let (expected, stop) = (body.kernel.time(), body.kernel.stop());
+    let slack = TIME_SLACK * step + TIME_ROUNDING * expected.abs();
+    if point.is_nan() || (point - expected).abs() > slack {
+        return Err(Fault::Time { given: point, expected });
+    }
+    if point + step > stop + slack {
+        return Err(Fault::PastStop { end: point + step, stop });
+    }
+    match body.kernel.step(point, step) {
+        Ok(()) => Ok(Status::Ok),
+        Err(error) => {
+            if let StepError::NotFinite { .. } = error {
+                body.mode = Mode::Error;
             }
+            Err(Fault::Step(error))
         }
-    })
+    }
 }
 
 #[unsafe(no_mangle)]

@@ -10,7 +10,7 @@ use crate::variables::{Causality, Model, Named, Type, Variability};
 
 /// Index of the Real variable, or of the Enumeration, with a value reference.
 #[inline]
-fn resolve(model: Model, reference: c_uint, real: bool) -> Result<usize, Fault> {
+pub(crate) fn resolve(model: Model, reference: c_uint, real: bool) -> Result<usize, Fault> {
     let wanted = if real { "Real" } else { "Integer or Enumeration" };
     // The head of the table needs no look into it.
     if real && (reference as usize) < model.plain() {
@@ -42,7 +42,12 @@ fn settable(body: &Body, index: usize, value: f64) -> Result<(), Fault> {
 }
 
 /// Sets values: all, or none of them where one is refused.
-fn set(body: &mut Body, references: &[c_uint], real: bool, value: impl Fn(usize) -> f64) -> Result<Status, Fault> {
+pub(crate) fn set(
+    body: &mut Body,
+    references: &[c_uint],
+    real: bool,
+    value: impl Fn(usize) -> f64,
+) -> Result<Status, Fault> {
     let model = body.kernel.model();
     for (i, &reference) in references.iter().enumerate() {
         settable(body, resolve(model, reference, real)?, value(i))?;
@@ -55,12 +60,12 @@ fn set(body: &mut Body, references: &[c_uint], real: bool, value: impl Fn(usize)
 
 /// A value for the importer: no infinity and no NaN passes as fmi2OK.
 #[inline]
-fn finite(model: Model, index: usize, value: f64) -> Result<f64, Fault> {
+pub(crate) fn finite_value(model: Model, index: usize, value: f64) -> Result<f64, Fault> {
     if value.is_finite() { Ok(value) } else { Err(Fault::NoNumber { index: Named(model, index), value }) }
 }
 
 /// Refuses every value reference: there is no variable of that type.
-fn none_of(references: &[c_uint], wanted: &'static str) -> Result<Status, Fault> {
+pub(crate) fn none_of(references: &[c_uint], wanted: &'static str) -> Result<Status, Fault> {
     match references.first() {
         None => Ok(Status::Ok),
         Some(&reference) => Err(Fault::Reference { reference, wanted }),
@@ -75,7 +80,7 @@ pub unsafe extern "C" fn fmi2GetReal(c: Component, vr: *const c_uint, count: usi
         let model = body.kernel.model();
         for (out, &reference) in value.iter_mut().zip(vr) {
             let index = resolve(model, reference, true)?;
-            *out = finite(model, index, body.kernel.get(index)?)?;
+            *out = finite_value(model, index, body.kernel.get(index)?)?;
         }
         Ok(Status::Ok)
     })
@@ -160,36 +165,47 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
             unsafe { (array(unknown, unknowns, "vUnknown_ref")?, array(known, knowns, "vKnown_ref")?) };
         // SAFETY: the importer's.
         let (seed, result) = unsafe { (array(seed, knowns, "dvKnown")?, array_mut(result, unknowns, "dvUnknown")?) };
-        let model = body.kernel.model();
-        for &reference in unknown {
-            let index = resolve(model, reference, true)?;
-            if model.at(index).causality != Causality::Output {
-                return Err(Fault::Not { index: Named(model, index), what: "output" });
-            }
-        }
-        let initialising = body.mode == Mode::Initialization;
-        for (&reference, &value) in known.iter().zip(seed) {
-            let index = resolve(model, reference, true)?;
-            if !model.may_be_known(index, initialising) {
-                return Err(Fault::Not { index: Named(model, index), what: "known of the outputs here" });
-            }
-            if !value.is_finite() {
-                return Err(Fault::NotFinite { index: Named(model, index), value });
-            }
-        }
-        // Every reference has just been resolved once.
-        let index = |reference: c_uint| resolve(model, reference, true).unwrap_or(0);
-        let seeds = known.iter().zip(seed).map(|(&reference, &value)| (index(reference), value));
-        body.kernel.directional(seeds, |derivative| {
-            for (out, &reference) in result.iter_mut().zip(unknown) {
-                *out = derivative(index(reference));
-            }
-        })?;
-        for (out, &reference) in result.iter().zip(unknown) {
-            finite(model, index(reference), *out)?;
-        }
-        Ok(Status::Ok)
+        directional(body, unknown, known, seed, result)
     })
+}
+
+/// Directional derivatives of outputs; by the same value references.
+pub(crate) fn directional(
+    body: &mut Body,
+    unknown: &[c_uint],
+    known: &[c_uint],
+    seed: &[f64],
+    result: &mut [f64],
+) -> Result<Status, Fault> {
+    let model = body.kernel.model();
+    for &reference in unknown {
+        let index = resolve(model, reference, true)?;
+        if model.at(index).causality != Causality::Output {
+            return Err(Fault::Not { index: Named(model, index), what: "output" });
+        }
+    }
+    let initialising = body.mode == Mode::Initialization;
+    for (&reference, &value) in known.iter().zip(seed) {
+        let index = resolve(model, reference, true)?;
+        if !model.may_be_known(index, initialising) {
+            return Err(Fault::Not { index: Named(model, index), what: "known of the outputs here" });
+        }
+        if !value.is_finite() {
+            return Err(Fault::NotFinite { index: Named(model, index), value });
+        }
+    }
+    // Every reference has just been resolved once.
+    let index = |reference: c_uint| resolve(model, reference, true).unwrap_or(0);
+    let seeds = known.iter().zip(seed).map(|(&reference, &value)| (index(reference), value));
+    body.kernel.directional(seeds, |derivative| {
+        for (out, &reference) in result.iter_mut().zip(unknown) {
+            *out = derivative(index(reference));
+        }
+    })?;
+    for (out, &reference) in result.iter().zip(unknown) {
+        finite_value(model, index(reference), *out)?;
+    }
+    Ok(Status::Ok)
 }
 
 #[unsafe(no_mangle)]
@@ -238,17 +254,27 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
         let (vr, order) = unsafe { (array(vr, count, "vr")?, array(order, count, "order")?) };
         // SAFETY: the importer's.
         let value = unsafe { array_mut(value, count, "value") }?;
-        let model = body.kernel.model();
-        for ((&reference, &order), out) in vr.iter().zip(order).zip(value) {
-            let index = resolve(model, reference, true)?;
-            if model.at(index).causality != Causality::Output {
-                return Err(Fault::Not { index: Named(model, index), what: "output" });
-            }
-            if order != 1 {
-                return Err(Fault::Order(order));
-            }
-            *out = finite(model, index, body.kernel.output_derivative(index)?)?;
-        }
-        Ok(Status::Ok)
+        output_derivatives(body, vr, order, value)
     })
+}
+
+/// Derivatives of outputs to time.
+pub(crate) fn output_derivatives(
+    body: &mut Body,
+    vr: &[c_uint],
+    order: &[c_int],
+    value: &mut [f64],
+) -> Result<Status, Fault> {
+    let model = body.kernel.model();
+    for ((&reference, &order), out) in vr.iter().zip(order).zip(value) {
+        let index = resolve(model, reference, true)?;
+        if model.at(index).causality != Causality::Output {
+            return Err(Fault::Not { index: Named(model, index), what: "output" });
+        }
+        if order != 1 {
+            return Err(Fault::Order(order));
+        }
+        *out = finite_value(model, index, body.kernel.output_derivative(index)?)?;
+    }
+    Ok(Status::Ok)
 }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::super::description::{BaseType, Causality, Value, Variability, Variable};
+use super::super::description::{BaseType, Causality, Fmi, Value, Variability, Variable};
 use super::super::host::abi::{CALLS, Call};
-use super::super::host::{Binary, Instance, InstanceOptions, Status, abuse};
+use super::super::host::{Binary, Instance, InstanceOptions, Status, abuse, resource_location};
 use super::measure;
 use super::probe::{Learned, Probe, Tested};
 use super::{Setup, settable_real};
@@ -45,8 +45,53 @@ const CORE: [Call; 19] = [
     Call::do_step,
 ];
 
+/// The same of FMI 3.0.
+const CORE3: [Call; 21] = [
+    Call::get_version3,
+    Call::set_debug_logging3,
+    Call::instantiate3,
+    Call::free_instance3,
+    Call::enter_initialization3,
+    Call::exit_initialization3,
+    Call::terminate3,
+    Call::reset3,
+    Call::get3_float32,
+    Call::get3_float64,
+    Call::get3_int32,
+    Call::get3_int64,
+    Call::get3_boolean,
+    Call::get3_string,
+    Call::set3_float32,
+    Call::set3_float64,
+    Call::set3_int32,
+    Call::set3_int64,
+    Call::set3_boolean,
+    Call::set3_string,
+    Call::do_step3,
+];
+
+/// Whether a function is of a version of FMI.
+fn is_of(function: &str, fmi: Fmi) -> bool {
+    function.starts_with(if fmi == Fmi::Three { "fmi3" } else { "fmi2" })
+}
+
 fn needed(p: &Probe) -> Vec<&'static str> {
     let i = p.interface();
+    if p.d.fmi == Fmi::Three {
+        let mut calls = CORE3.to_vec();
+        for (flag, more) in [
+            (i.can_get_and_set_state, &[Call::get_state3, Call::set_state3, Call::free_state3][..]),
+            (i.can_serialize_state, &[Call::serialized_size3, Call::serialize3, Call::deserialize3]),
+            (i.provides_directional_derivative, &[Call::directional_derivative3]),
+            (i.max_output_derivative_order > 0, &[Call::get_output_derivatives3]),
+            (i.has_event_mode, &[Call::enter_event_mode, Call::enter_step_mode, Call::update_discrete_states]),
+        ] {
+            if flag {
+                calls.extend_from_slice(more);
+            }
+        }
+        return calls.into_iter().map(|c| CALLS[c as usize]).collect();
+    }
     let mut calls = CORE.to_vec();
     let mut add = |flag: bool, more: &[Call]| {
         if flag {
@@ -65,14 +110,36 @@ fn needed(p: &Probe) -> Vec<&'static str> {
     calls.into_iter().map(|c| CALLS[c as usize]).collect()
 }
 
+/// Functions of FMI 3.0 for other interfaces, which importers look up all the same (FMPy 0.3.32 does).
+const OTHERS3: [&str; 13] = [
+    "fmi3InstantiateModelExchange",
+    "fmi3InstantiateScheduledExecution",
+    "fmi3EnterContinuousTimeMode",
+    "fmi3CompletedIntegratorStep",
+    "fmi3SetTime",
+    "fmi3SetContinuousStates",
+    "fmi3GetContinuousStateDerivatives",
+    "fmi3GetEventIndicators",
+    "fmi3GetContinuousStates",
+    "fmi3GetNominalsOfContinuousStates",
+    "fmi3GetNumberOfEventIndicators",
+    "fmi3GetNumberOfContinuousStates",
+    "fmi3ActivateModelPartition",
+];
+
 pub(super) fn symbols(p: &Probe) -> Tested {
     Ok(needed(p).into_iter().filter(|s| !p.binary.exports(s)).map(|s| format!("{s} is not exported")).collect())
 }
 
 pub(super) fn all_symbols(p: &Probe) -> Tested {
     let needed = needed(p);
-    let missing: Vec<&str> =
-        CALLS.iter().skip(3).filter(|s| !needed.contains(s) && !p.binary.exports(s)).copied().collect();
+    let others: &[&str] = if p.d.fmi == Fmi::Three { &OTHERS3 } else { &[] };
+    let missing: Vec<&str> = CALLS
+        .iter()
+        .chain(others)
+        .filter(|s| is_of(s, p.d.fmi) && !needed.contains(s) && !p.binary.exports(s))
+        .copied()
+        .collect();
     Ok(if missing.is_empty() { vec![] } else { vec![format!("not exported: {}", missing.join(", "))] })
 }
 
@@ -82,6 +149,10 @@ pub(super) fn types_platform(p: &Probe) -> Tested {
 }
 
 pub(super) fn version(p: &Probe) -> Tested {
+    if p.d.fmi == Fmi::Three {
+        let text = super::super::host::static_text(&p.binary, Call::get_version3)?;
+        return Ok(if text == "3.0" { vec![] } else { vec![format!("fmi3GetVersion gives {text:?}, not \"3.0\"")] });
+    }
     let text = super::super::host::static_text(&p.binary, Call::get_version)?;
     Ok(if text == "2.0" { vec![] } else { vec![format!("fmi2GetVersion gives {text:?}, not \"2.0\"")] })
 }
@@ -92,7 +163,7 @@ pub(super) fn instantiate(p: &Probe) -> Tested {
 }
 
 pub(super) fn free_null(p: &Probe) -> Tested {
-    abuse::free_null(&p.binary)?;
+    abuse::free_null(&p.binary, p.d.fmi)?;
     Ok(vec![])
 }
 
@@ -105,6 +176,9 @@ pub(super) fn initialise(p: &Probe) -> Tested {
 }
 
 pub(super) fn step_status(p: &Probe) -> Tested {
+    if p.d.fmi == Fmi::Three {
+        return super::three::status(p);
+    }
     let mut instance = p.ready()?;
     for k in 0..3 {
         match instance.do_step_status(p.time(k), p.step, true)? {
@@ -163,7 +237,7 @@ pub(super) fn guid(p: &Probe) -> Tested {
 }
 
 pub(super) fn resources(p: &Probe) -> Tested {
-    let options = InstanceOptions { resources: "file:///nowhere/at/all/resources".into(), ..p.options() };
+    let options = InstanceOptions { resources: resource_location("/nowhere/at/all".as_ref(), p.d.fmi), ..p.options() };
     if let Ok(mut instance) = Instance::new(Arc::clone(&p.binary), None, &options)
         && instance.initialize(p.start, p.stop).is_ok()
     {
@@ -290,6 +364,6 @@ pub(super) fn unload(setup: &Setup) -> Tested {
 }
 
 pub(super) fn null_component(p: &Probe) -> Tested {
-    abuse::null_component(&p.binary);
+    abuse::null_component(&p.binary, p.d.fmi);
     Ok(vec![])
 }

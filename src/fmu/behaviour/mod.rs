@@ -14,12 +14,13 @@ mod references;
 mod state;
 mod steps;
 mod surroundings;
+mod three;
 mod values;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::description::{BaseType, Description, Initial, Value, Variable};
+use super::description::{BaseType, Description, Initial, Kind, Value, Variable};
 use super::host::{HostError, Instance};
 pub(crate) use probe::Stop;
 use probe::{Learned, Probe, Tested, not_tested};
@@ -188,6 +189,11 @@ pub(crate) fn behaviour(id: &str) -> Option<Behaviour> {
         "side-environment" => Raw(effects::environment),
         "side-locale" => Raw(effects::locale),
         "side-files" => Raw(effects::files),
+        "step-report" => Loaded(three::report),
+        "early-return" => Loaded(three::early_return),
+        "event-mode" => Loaded(three::event_mode),
+        "configuration-mode" => Loaded(three::configuration_mode),
+        "array-count" => Loaded(three::array_count),
         _ => return None,
     })
 }
@@ -214,6 +220,11 @@ impl Probe {
     }
 }
 
+/// A number as a variable holds it: one of 32 bits rounds it.
+fn held(v: &Variable, x: f64) -> f64 {
+    if v.cell.is_some_and(|c| c.kind == Kind::Float32) { f64::from(x as f32) } else { x }
+}
+
 /// Another value for a Real that the environment sets, within its limits; none when it cannot be chosen.
 fn settable_real(p: &Probe, v: &Variable) -> Option<f64> {
     if v.base() != BaseType::Real
@@ -227,5 +238,6 @@ fn settable_real(p: &Probe, v: &Variable) -> Option<f64> {
     let step = 0.05 * start.abs().max(if start == 0.0 { 1.0 } else { 0.0 });
     [start + step, start - step, 0.5 * (start + high), 0.5 * (start + low)]
         .into_iter()
+        .map(|x| held(v, x))
         .find(|x| x.is_finite() && (low..=high).contains(x) && *x != start)
 }

@@ -7,8 +7,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::super::description::{BaseType, Causality, Description, Initial, Interface, Value, Variability, Variable};
-use super::super::host::{Binary, HostError, Instance, InstanceOptions, resource_uri};
+use super::super::description::{
+    BaseType, Causality, Description, Fmi, Initial, Interface, Value, Variability, Variable,
+};
+use super::super::host::{Binary, HostError, Instance, InstanceOptions, Layout, needs_event_mode, resource_location};
 
 /// Largest number of variables of a type that are observed beside the outputs.
 const MOST_OBSERVED: usize = 2000;
@@ -78,7 +80,7 @@ pub(crate) struct Observed {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Snapshot {
     pub reals: Vec<f64>,
-    pub integers: Vec<i32>,
+    pub integers: Vec<i64>,
     pub booleans: Vec<i32>,
     pub strings: Vec<String>,
 }
@@ -86,6 +88,8 @@ pub(crate) struct Snapshot {
 /// The FMU under test.
 pub(crate) struct Probe {
     pub d: Description,
+    /// There for FMI 3.0.
+    pub layout: Option<Arc<Layout>>,
     pub folder: PathBuf,
     pub binary_path: PathBuf,
     pub binary: Arc<Binary>,
@@ -132,7 +136,10 @@ impl Probe {
         let stop = e.stop_time.filter(|&stop| stop > start);
         let step = e.step_size.filter(|&h| h > 0.0).or(Some(learned.step).filter(|&h| h > 0.0));
         let step = step.or_else(|| stop.map(|stop| (stop - start) / 500.0)).unwrap_or(0.01);
+        let fixed = d.co_simulation.as_ref().and_then(|i| i.fixed_step);
+        let step = if e.step_size.is_none() && learned.step <= 0.0 { fixed.unwrap_or(step) } else { step };
         let mut probe = Self {
+            layout: Layout::of(&d),
             observed: Default::default(),
             instances: AtomicUsize::new(0),
             folder,
@@ -177,7 +184,9 @@ impl Probe {
         InstanceOptions {
             name: "instance".into(),
             guid: self.d.guid.clone(),
-            resources: resource_uri(&self.folder),
+            resources: resource_location(&self.folder, self.d.fmi),
+            layout: self.layout.clone(),
+            event_mode: needs_event_mode(&self.d),
             ..InstanceOptions::default()
         }
     }
@@ -241,7 +250,7 @@ impl Probe {
         let phase = 0.7 + 1.3 * order as f64;
         let turns = (time - self.start) / (STEPS as f64 * self.step);
         let value = start + 0.1 * room * (std::f64::consts::TAU * 1.7 * turns + phase).sin();
-        value.clamp(low.min(high), high)
+        super::held(v, value.clamp(low.min(high), high))
     }
 
     /// Sets the inputs for a time.
@@ -298,11 +307,14 @@ impl Probe {
                 return say(&o.name, y.to_string(), x.to_string());
             }
         }
-        for (index, (x, y)) in [(1, (&a.integers, &b.integers)), (2, (&a.booleans, &b.booleans))] {
-            for ((o, x), y) in self.observed[index].iter().zip(x).zip(y) {
-                if x != y {
-                    return say(&o.name, y.to_string(), x.to_string());
-                }
+        for ((o, x), y) in self.observed[1].iter().zip(&a.integers).zip(&b.integers) {
+            if x != y {
+                return say(&o.name, y.to_string(), x.to_string());
+            }
+        }
+        for ((o, x), y) in self.observed[2].iter().zip(&a.booleans).zip(&b.booleans) {
+            if x != y {
+                return say(&o.name, y.to_string(), x.to_string());
             }
         }
         for ((o, x), y) in self.observed[3].iter().zip(&a.strings).zip(&b.strings) {
@@ -368,10 +380,11 @@ impl Probe {
             let real = |((o, x), y): ((&Observed, &f64), &f64)| {
                 o.calculated && !without.contains(&o.reference) && (x - y).abs() > 1e-12 * x.abs().max(y.abs())
             };
-            let whole = |((o, x), y): ((&Observed, &i32), &i32)| o.calculated && x != y;
+            let whole = |((o, x), y): ((&Observed, &i64), &i64)| o.calculated && x != y;
+            let flag = |((o, x), y): ((&Observed, &i32), &i32)| o.calculated && x != y;
             self.observed[0].iter().zip(&x.reals).zip(&y.reals).any(real)
                 || self.observed[1].iter().zip(&x.integers).zip(&y.integers).any(whole)
-                || self.observed[2].iter().zip(&x.booleans).zip(&y.booleans).any(whole)
+                || self.observed[2].iter().zip(&x.booleans).zip(&y.booleans).any(flag)
         })
     }
 
@@ -409,7 +422,7 @@ impl Probe {
             .d
             .variables
             .iter()
-            .filter(|v| type_index(v.base()) == type_index(base))
+            .filter(|v| self.d.fmi == Fmi::Three || type_index(v.base()) == type_index(base))
             .map(|v| v.value_reference)
             .collect();
         [4_242_424_242, 987_654_321, u32::MAX]
@@ -422,5 +435,6 @@ impl Probe {
 /// Whether the environment may set a variable before initialisation.
 pub(super) fn settable(v: &Variable) -> bool {
     v.variability != Variability::Constant
+        && v.causality != Causality::StructuralParameter
         && (v.causality == Causality::Input || matches!(v.initial(), Some(Initial::Exact | Initial::Approx)))
 }

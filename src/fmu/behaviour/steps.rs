@@ -1,6 +1,6 @@
 //! Stepping through time (FMI 2.0.4, sections 4.2.1, 4.2.2 and 4.2.4).
 
-use super::super::description::{BaseType, Causality, Variability, Variable};
+use super::super::description::{BaseType, Causality, Fmi, Variability, Variable};
 use super::super::host::{HostError, Instance};
 use super::probe::{Probe, Tested, not_applicable, not_tested};
 
@@ -358,6 +358,9 @@ pub(super) fn initialisation_order(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     if instance.enter_initialization().is_ok() {
         problems.push("fmi2EnterInitializationMode returned fmi2OK after initialisation".into());
+    }
+    if p.d.fmi == Fmi::Three {
+        return Ok(problems);
     }
     let mut instance = p.ready()?;
     if instance.setup_experiment(None, p.start, p.stop).is_ok() {

@@ -6,7 +6,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::host::{HostError, Instance, InstanceOptions, resource_uri};
+use super::super::description::Fmi;
+use super::super::host::{HostError, Instance, InstanceOptions, resource_location};
 use super::Setup;
 use super::probe::{Probe, Snapshot, Tested, not_tested};
 
@@ -27,7 +28,7 @@ pub(super) fn resources(setup: &Setup) -> Tested {
     if p.interface().only_once {
         return super::probe::not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
     }
-    let expected = run(&p, resource_uri(&p.folder))?;
+    let expected = run(&p, resource_location(&p.folder, p.d.fmi))?;
     let odd = setup.workplace.join("ein Ordner \u{e4}");
     #[cfg(unix)]
     let made = std::os::unix::fs::symlink(&setup.folder, &odd);
@@ -36,7 +37,7 @@ pub(super) fn resources(setup: &Setup) -> Tested {
     if made.is_err() {
         return not_tested("no second path to the resources can be made");
     }
-    let uri = resource_uri(&odd);
+    let (uri, fmi) = (resource_location(&odd, p.d.fmi), p.d.fmi);
     let found = run(&p, uri.clone());
     let what = match found {
         Ok(found) => p.difference_beyond_tolerance(&expected, &found, 0),
@@ -44,8 +45,9 @@ pub(super) fn resources(setup: &Setup) -> Tested {
     };
     std::mem::forget(p);
     let place = uri.rsplit_once("/ein").map_or("", |(_, rest)| rest);
+    let scheme = if fmi == Fmi::Three { "" } else { "file://" };
     Ok(what
-        .map(|what| format!("with resources at file:///.../ein{place} (a blank and an umlaut), {what}"))
+        .map(|what| format!("with resources at {scheme}/.../ein{place} (a blank and an umlaut), {what}"))
         .into_iter()
         .collect())
 }
@@ -104,11 +106,11 @@ pub(super) fn locale(setup: &Setup) -> Tested {
     if p.interface().only_once {
         return super::probe::not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
     }
-    let expected = run(&p, resource_uri(&p.folder))?;
+    let expected = run(&p, resource_location(&p.folder, p.d.fmi))?;
     if !set_comma(&setup.workplace) {
         return not_tested("this C library takes no locale with a decimal comma");
     }
-    let found = run(&p, resource_uri(&p.folder));
+    let found = run(&p, resource_location(&p.folder, p.d.fmi));
     let what = match found {
         Ok(found) => p.difference_beyond_tolerance(&expected, &found, 0),
         Err(error) => Some(error.to_string()),

@@ -54,7 +54,7 @@ pub(super) fn start_values(p: &Probe) -> Tested {
     for v in &p.d.variables {
         let Some(start) = &v.start else { continue };
         // Discrete variables may have changed at an event at the start.
-        let kept = matches!(v.causality, Causality::Parameter | Causality::Input)
+        let kept = matches!(v.causality, Causality::Parameter | Causality::Input | Causality::StructuralParameter)
             || v.variability == Variability::Constant
             || v.initial() == Some(Initial::Exact) && v.variability == Variability::Continuous;
         if kept {
@@ -374,13 +374,13 @@ pub(super) fn finite(p: &Probe) -> Tested {
 }
 
 pub(super) fn range(p: &Probe) -> Tested {
-    let watched: Vec<(&Variable, f64, f64, Vec<i32>)> =
+    let watched: Vec<(&Variable, f64, f64, Vec<i64>)> =
         p.d.variables
             .iter()
             .filter(|v| matches!(v.causality, Causality::Output | Causality::Local))
             .filter_map(|v| {
                 let r = p.d.resolved(v);
-                let items: Vec<i32> = r.items.iter().map(|i| i.1).collect();
+                let items: Vec<i64> = r.items.iter().map(|i| i.1).collect();
                 let bounded = r.min.is_some() || r.max.is_some() || !items.is_empty();
                 bounded.then(|| (v, r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY), items))
             })
@@ -396,7 +396,7 @@ pub(super) fn range(p: &Probe) -> Tested {
                 Value::Integer(i) if !items.is_empty() && !items.contains(&i) => {
                     return Ok(Some(format!("\"{}\" is {i} at t = {time}, no item of its enumeration", v.name)));
                 }
-                Value::Integer(i) => f64::from(i),
+                Value::Integer(i) => i as f64,
                 _ => continue,
             };
             // A rounding error beyond the limit is none of the user's concern.
@@ -425,7 +425,8 @@ fn other(p: &Probe, v: &Variable) -> Option<Value> {
 
 pub(super) fn fixed_set(p: &Probe) -> Tested {
     let fixed = |v: &&Variable| {
-        v.causality == Causality::Parameter && v.variability == Variability::Fixed
+        matches!(v.causality, Causality::Parameter | Causality::StructuralParameter)
+            && v.variability == Variability::Fixed
             || v.variability == Variability::Constant
     };
     let mut any = false;

@@ -1,16 +1,19 @@
-//! `modelDescription.xml` of FMI 2.0 as types (FMI 2.0.4, section 2.2), each with its line and column.
+//! `modelDescription.xml` as types (FMI 2.0.4, section 2.2; FMI 3.0, section 2.4: see [`three`]), each with its line and
+//! column.
 //!
 //! Reading is tolerant: a value that cannot be understood falls back to its default, so that the rules can go on and
 //! report it (see `rules::schema`, which checks every attribute). [`Description::parse`] fails only on a document that
-//! is not well-formed or whose root is not an FMI 2.0 model description.
+//! is not well-formed or whose root is not a model description of FMI 2.0 or 3.0.
 
 mod read;
+pub mod three;
 mod words;
 
 use super::xml::{Document, Position, XmlError};
 
 use read::*;
 pub use read::{parse_boolean, parse_integer, parse_real};
+pub use three::{Cell, Clock, Kind};
 pub use words::*;
 
 /// Why no description could be read.
@@ -21,7 +24,38 @@ pub enum DescriptionError {
     Xml(#[from] XmlError),
     /// Some other document, or another version of FMI.
     #[error("modelDescription.xml: {0}")]
-    NotFmi2(String),
+    NotFmi(String),
+}
+
+/// A version of FMI that is understood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fmi {
+    /// FMI 2.0, and 2.0.1 to 2.0.5.
+    #[default]
+    Two,
+    /// FMI 3.0, and 3.0.1 and later.
+    Three,
+}
+
+impl Fmi {
+    /// The version of the standard whose sections are named.
+    #[must_use]
+    pub fn standard(self) -> &'static str {
+        match self {
+            Self::Two => "FMI 2.0.4",
+            Self::Three => "FMI 3.0",
+        }
+    }
+
+    /// Of the `fmiVersion` of a description; none of another version.
+    #[must_use]
+    pub fn of(version: &str) -> Option<Self> {
+        match version.trim() {
+            "2.0" => Some(Self::Two),
+            three if three == "3" || three.starts_with("3.") => Some(Self::Three),
+            _ => None,
+        }
+    }
 }
 
 /// A start value.
@@ -29,8 +63,8 @@ pub enum DescriptionError {
 pub enum Value {
     /// Of a Real.
     Real(f64),
-    /// Of an Integer or an Enumeration.
-    Integer(i32),
+    /// Of an integer of any size, or an Enumeration; of 64 bits without a sign, by its bits.
+    Integer(i64),
     /// Of a Boolean.
     Boolean(bool),
     /// Of a String.
@@ -64,6 +98,14 @@ pub struct Interface {
     pub provides_directional_derivative: bool,
     /// Names of source files, for FMUs with sources.
     pub source_files: Vec<(String, Position)>,
+    /// FMI 3.0: `hasEventMode`.
+    pub has_event_mode: bool,
+    /// FMI 3.0: `mightReturnEarlyFromDoStep`.
+    pub might_return_early: bool,
+    /// FMI 3.0: `fixedInternalStepSize`, s.
+    pub fixed_step: Option<f64>,
+    /// FMI 3.0: what it declares to offer and no rule tests, with its section.
+    pub untested: Vec<&'static str>,
     /// Where.
     pub position: Position,
 }
@@ -128,7 +170,7 @@ pub struct TypeAttributes {
     /// Typical magnitude.
     pub nominal: Option<f64>,
     /// Values of an enumeration: name and value.
-    pub items: Vec<(String, i32, Position)>,
+    pub items: Vec<(String, i64, Position)>,
     /// Where.
     pub position: Position,
 }
@@ -173,6 +215,8 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// Model exchange: the state may be reinitialised.
     pub reinit: bool,
+    /// FMI 3.0: the variable and element that this is.
+    pub cell: Option<Cell>,
     /// Where.
     pub position: Position,
 }
@@ -197,7 +241,9 @@ impl Variable {
 pub fn default_initial(causality: Causality, variability: Variability) -> Option<Initial> {
     use {Causality as C, Variability as V};
     match (causality, variability) {
-        (C::Output | C::Local, V::Constant) | (C::Parameter, V::Fixed | V::Tunable) => Some(Initial::Exact),
+        (C::Output | C::Local, V::Constant) | (C::Parameter | C::StructuralParameter, V::Fixed | V::Tunable) => {
+            Some(Initial::Exact)
+        }
         (C::CalculatedParameter | C::Local, V::Fixed | V::Tunable)
         | (C::Output | C::Local, V::Discrete | V::Continuous) => Some(Initial::Calculated),
         _ => None,
@@ -209,6 +255,8 @@ pub fn default_initial(causality: Causality, variability: Variability) -> Option
 pub struct Unknown {
     /// One-based index into the variables; 0 when it could not be understood.
     pub index: u32,
+    /// As it stands in the XML: the index, or in FMI 3.0 the value reference.
+    pub reference: u32,
     /// One-based indices of the knowns; `None` means "all, as far as one knows".
     pub dependencies: Option<Vec<u32>>,
     /// Kinds, as many as dependencies.
@@ -248,7 +296,9 @@ pub struct DefaultExperiment {
 /// A `modelDescription.xml`.
 #[derive(Debug, Clone)]
 pub struct Description {
-    /// `2.0`.
+    /// The version of FMI.
+    pub fmi: Fmi,
+    /// As it is spelt.
     pub fmi_version: String,
     /// Name of the model.
     pub model_name: String,
@@ -290,26 +340,28 @@ pub struct Description {
     pub variables: Vec<Variable>,
     /// The model structure.
     pub structure: ModelStructure,
+    /// FMI 3.0: the clocks.
+    pub clocks: Vec<Clock>,
 }
 
 impl Description {
     /// Parses a `modelDescription.xml`.
     ///
     /// # Errors
-    /// When the document is not well-formed, or not a model description of FMI 2.0.
+    /// When the document is not well-formed, or not a model description of FMI 2.0 or 3.0.
     pub fn parse(bytes: &[u8]) -> Result<Self, DescriptionError> {
         let document = Document::parse(bytes)?;
         let root = &document.root;
         if root.name != "fmiModelDescription" {
-            return Err(DescriptionError::NotFmi2(format!(
+            return Err(DescriptionError::NotFmi(format!(
                 "the root element is {}, not fmiModelDescription",
                 root.name
             )));
         }
         match root.get("fmiVersion") {
-            Some("2.0") => Ok(Self::from_document(&document)),
-            Some(other) => Err(DescriptionError::NotFmi2(format!("FMI version {other}; only 2.0 is supported"))),
-            None => Err(DescriptionError::NotFmi2("no fmiVersion attribute".into())),
+            Some(version) if Fmi::of(version).is_some() => Ok(Self::from_document(&document)),
+            Some(other) => Err(DescriptionError::NotFmi(format!("FMI version {other}; 2.0 and 3.0 are supported"))),
+            None => Err(DescriptionError::NotFmi("no fmiVersion attribute".into())),
         }
     }
 
@@ -317,12 +369,17 @@ impl Description {
     #[must_use]
     pub fn from_document(document: &Document) -> Self {
         let root = &document.root;
+        if root.get("fmiVersion").and_then(Fmi::of) == Some(Fmi::Three) {
+            return Self::of_three(root);
+        }
         let structure = root.child("ModelStructure");
         let unknowns = |name: &str| -> Vec<Unknown> {
             let section = structure.and_then(|s| s.child(name));
             section.into_iter().flat_map(|s| s.children_named("Unknown")).map(unknown).collect()
         };
         Self {
+            fmi: Fmi::Two,
+            clocks: Vec::new(),
             fmi_version: text(root, "fmiVersion").unwrap_or_default(),
             model_name: text(root, "modelName").unwrap_or_default(),
             guid: text(root, "guid").unwrap_or_default(),
@@ -339,9 +396,7 @@ impl Description {
             model_exchange: root.child("ModelExchange").map(interface),
             units: within(root, "UnitDefinitions", "Unit").map(unit).collect(),
             types: within(root, "TypeDefinitions", "SimpleType").filter_map(simple_type).collect(),
-            log_categories: within(root, "LogCategories", "Category")
-                .map(|e| (text(e, "name").unwrap_or_default(), text(e, "description"), e.position))
-                .collect(),
+            log_categories: log_categories(root),
             default_experiment: root.child("DefaultExperiment").map(|e| DefaultExperiment {
                 start_time: real(e, "startTime"),
                 stop_time: real(e, "stopTime"),

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::super::xml::Element;
+use super::super::xml::{Element, Position};
 use super::{
     BaseType, BaseUnit, Causality, DisplayUnit, Interface, SI_BASE, SimpleType, TypeAttributes, Unit, Unknown, Value,
     Variability, Variable,
@@ -72,8 +72,18 @@ pub(super) fn interface(e: &Element) -> Interface {
         source_files: within(e, "SourceFiles", "File")
             .map(|f| (text(f, "name").unwrap_or_default(), f.position))
             .collect(),
+        has_event_mode: false,
+        might_return_early: false,
+        fixed_step: None,
+        untested: Vec::new(),
         position: e.position,
     }
+}
+
+pub(super) fn log_categories(root: &Element) -> Vec<(String, Option<String>, Position)> {
+    within(root, "LogCategories", "Category")
+        .map(|e| (text(e, "name").unwrap_or_default(), text(e, "description"), e.position))
+        .collect()
 }
 
 pub(super) fn unit(e: &Element) -> Unit {
@@ -123,7 +133,7 @@ pub(super) fn variable(e: &Element) -> Variable {
     let (base, inner) = type_element(e).unwrap_or((BaseType::Real, e));
     let start = inner.get("start").and_then(|start| match base {
         BaseType::Real => parse_real(start).map(Value::Real),
-        BaseType::Integer | BaseType::Enumeration => parse_integer(start).map(Value::Integer),
+        BaseType::Integer | BaseType::Enumeration => parse_integer::<i32>(start).map(|i| Value::Integer(i.into())),
         BaseType::Boolean => parse_boolean(start).map(Value::Boolean),
         BaseType::String => Some(Value::String(start.to_owned())),
     });
@@ -141,6 +151,7 @@ pub(super) fn variable(e: &Element) -> Variable {
         start,
         derivative: number(inner, "derivative"),
         reinit: flag(inner, "reinit"),
+        cell: None,
         position: e.position,
     }
 }
@@ -151,8 +162,10 @@ pub(super) fn word<T: FromStr>(e: &Element, name: &str) -> Option<T> {
 
 pub(super) fn unknown(e: &Element) -> Unknown {
     let list = |name: &str| e.get(name).map(|text| text.split_whitespace().collect::<Vec<_>>());
+    let index = number(e, "index").unwrap_or(0);
     Unknown {
-        index: number(e, "index").unwrap_or(0),
+        index,
+        reference: index,
         dependencies: list("dependencies").map(|l| l.iter().filter_map(|i| i.parse().ok()).collect()),
         kinds: list("dependenciesKind").map(|l| l.iter().filter_map(|k| k.parse().ok()).collect()),
         position: e.position,

@@ -1,4 +1,4 @@
-//! The closed sets of words of FMI 2.0.
+//! The closed sets of words of FMI 2.0 and 3.0.
 
 use std::str::FromStr;
 
@@ -42,6 +42,8 @@ words! {
         Parameter = "parameter",
         /// Computed from parameters.
         CalculatedParameter = "calculatedParameter",
+        /// FMI 3.0: the size of arrays, set in configuration mode.
+        StructuralParameter = "structuralParameter",
         /// Set by the environment.
         Input = "input",
         /// Read by the environment.

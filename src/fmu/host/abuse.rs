@@ -9,6 +9,7 @@ use super::abi::{self, CALLS, Call};
 use super::instance::{ALLOCATION_FAILS, Instance};
 use super::logger::lossy;
 use super::{Binary, HostError, Status, note};
+use crate::fmu::description::Fmi;
 
 /// Calls of callbacks through the structure after it was poisoned.
 static POISON: AtomicU32 = AtomicU32::new(0);
@@ -45,18 +46,22 @@ pub(crate) fn fail_allocations(fail: bool) {
     ALLOCATION_FAILS.store(fail, Ordering::Relaxed);
 }
 
-/// `fmi2FreeInstance(NULL)`, which has no effect.
-pub(crate) fn free_null(binary: &Binary) -> Result<(), HostError> {
-    let function = binary.functions.free_instance.ok_or(HostError::Missing("fmi2FreeInstance"))?;
-    note(Call::free_instance);
-    // SAFETY: the standard allows null (FMI 2.0.4, section 2.1.5).
+/// `fmi2FreeInstance(NULL)` or `fmi3FreeInstance(NULL)`, which has no effect.
+pub(crate) fn free_null(binary: &Binary, fmi: Fmi) -> Result<(), HostError> {
+    let (function, call) = match fmi {
+        Fmi::Two => (binary.functions.free_instance, Call::free_instance),
+        Fmi::Three => (binary.functions.free_instance3, Call::free_instance3),
+    };
+    let function = function.ok_or(HostError::Missing(CALLS[call as usize]))?;
+    note(call);
+    // SAFETY: the standard allows null (FMI 2.0.4, section 2.1.5; FMI 3.0, section 2.3.1).
     unsafe { function(std::ptr::null_mut()) };
     note(Call::None);
     Ok(())
 }
 
 /// Functions that change an instance, of no instance.
-pub(crate) fn null_component(binary: &Binary) {
+pub(crate) fn null_component(binary: &Binary, fmi: Fmi) {
     let c = std::ptr::null_mut();
     let f = &binary.functions;
     macro_rules! call {
@@ -70,6 +75,19 @@ pub(crate) fn null_component(binary: &Binary) {
         )*};
     }
     let (reference, mut value) = (0_u32, 0.0);
+    if fmi == Fmi::Three {
+        let (mut event, mut end, mut early, mut last) = (0, 0, 0, 0.0);
+        call!(
+            enter_initialization3(0, 0.0, 0.0, 0, 0.0),
+            exit_initialization3(),
+            get3_float64(&raw const reference, 1, &raw mut value, 1),
+            set3_float64(&raw const reference, 1, &raw const value, 1),
+            do_step3(0.0, 0.01, 1, &raw mut event, &raw mut end, &raw mut early, &raw mut last),
+            reset3(),
+            terminate3()
+        );
+        return;
+    }
     call!(
         setup_experiment(0, 0.0, 0.0, 0, 0.0),
         enter_initialization(),
@@ -101,6 +119,9 @@ impl Instance {
 
     /// `fmi2GetBoolean` as raw integers.
     pub(crate) fn get_boolean_raw(&mut self, references: &[u32]) -> Result<Vec<i32>, HostError> {
+        if self.three.is_some() {
+            return self.get_flag3(references);
+        }
         let mut values = vec![i32::MIN; references.len()];
         let function = self.binary.functions.get_boolean.ok_or(HostError::Missing("fmi2GetBoolean"))?;
         note(Call::get_boolean);
@@ -115,6 +136,9 @@ impl Instance {
         &mut self,
         references: &[u32],
     ) -> Result<Vec<Result<String, &'static str>>, HostError> {
+        if self.three.is_some() {
+            return self.get_text3(references);
+        }
         let mut values = vec![std::ptr::null::<c_char>(); references.len()];
         let function = self.binary.functions.get_string.ok_or(HostError::Missing("fmi2GetString"))?;
         note(Call::get_string);
@@ -137,12 +161,13 @@ impl Instance {
     /// Every getter and setter with no value references and null arrays.
     pub(crate) fn empty_calls(&mut self) -> Vec<(&'static str, Status)> {
         let f = &self.binary.functions;
+        let three = self.three.is_some();
         let c = self.component;
         let (n, null) = (0, std::ptr::null());
         let mut results = Vec::new();
         macro_rules! empty {
             ($($function:ident ($array:expr)),*) => {$(
-                if let Some(function) = f.$function {
+                if let Some(function) = f.$function.filter(|_| !three) {
                     note(Call::$function);
                     // SAFETY: a length of 0 lets nothing be read or written.
                     let status = unsafe { function(c, null, n, $array) };
@@ -161,11 +186,39 @@ impl Instance {
             set_boolean(std::ptr::null()),
             set_string(std::ptr::null())
         );
+        macro_rules! empty3 {
+            ($($function:ident ($array:expr)),*) => {$(
+                if let Some(function) = f.$function.filter(|_| three) {
+                    note(Call::$function);
+                    // SAFETY: lengths of 0 let nothing be read or written.
+                    let status = unsafe { function(c, null, n, $array, 0) };
+                    note(Call::None);
+                    results.push((CALLS[Call::$function as usize], Status::from(status)));
+                }
+            )*};
+        }
+        empty3!(
+            get3_float32(std::ptr::null_mut()),
+            get3_float64(std::ptr::null_mut()),
+            get3_int32(std::ptr::null_mut()),
+            get3_int64(std::ptr::null_mut()),
+            get3_boolean(std::ptr::null_mut()),
+            get3_string(std::ptr::null_mut()),
+            set3_float32(std::ptr::null()),
+            set3_float64(std::ptr::null()),
+            set3_int32(std::ptr::null()),
+            set3_int64(std::ptr::null()),
+            set3_boolean(std::ptr::null()),
+            set3_string(std::ptr::null())
+        );
         results
     }
 
     /// Every status function of co-simulation, for every kind of status.
     pub(crate) fn status_calls(&mut self) {
+        if self.three.is_some() {
+            return;
+        }
         let f = &self.binary.functions;
         let c = self.component;
         for kind in 0..4 {
@@ -199,7 +252,11 @@ impl Instance {
         let f = &self.binary.functions;
         let c = self.component;
         let mut problems = Vec::new();
-        let (Some(get), Some(free)) = (f.get_state, f.free_state) else {
+        let (get, free) = match self.three {
+            Some(_) => (f.get_state3, f.free_state3),
+            None => (f.get_state, f.free_state),
+        };
+        let (Some(get), Some(free)) = (get, free) else {
             return Err(HostError::Missing("fmi2GetFMUstate or fmi2FreeFMUstate"));
         };
         let mut state = std::ptr::null_mut();

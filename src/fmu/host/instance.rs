@@ -9,6 +9,7 @@ use tempfile::TempDir;
 
 use super::abi::{self, Call, Callbacks, Component, State, Text};
 use super::logger::{self, LogMessage, LogSink, lossy};
+use super::three::{self, Layout, Three};
 use super::{Binary, HostError, Status, note};
 
 /// How to make an instance.
@@ -16,19 +17,34 @@ use super::{Binary, HostError, Status, note};
 pub struct InstanceOptions {
     /// Name of the instance.
     pub name: String,
-    /// GUID to hand over.
+    /// GUID, or instantiation token, to hand over.
     pub guid: String,
-    /// URI of the resources folder.
+    /// URI of the resources folder; in FMI 3.0 its path.
     pub resources: String,
     /// Whether the FMU may show windows.
     pub visible: bool,
     /// Whether the FMU logs.
     pub logging: bool,
+    /// What lies behind the handles of an FMU of FMI 3.0; none for FMI 2.0.
+    pub layout: Option<Arc<Layout>>,
+    /// FMI 3.0: whether events are handled.
+    pub event_mode: bool,
+    /// FMI 3.0: whether a step may return early.
+    pub early_return: bool,
 }
 
 impl Default for InstanceOptions {
     fn default() -> Self {
-        Self { name: "instance".into(), guid: String::new(), resources: String::new(), visible: false, logging: false }
+        Self {
+            name: "instance".into(),
+            guid: String::new(),
+            resources: String::new(),
+            visible: false,
+            logging: false,
+            layout: None,
+            event_mode: false,
+            early_return: false,
+        }
     }
 }
 
@@ -41,6 +57,8 @@ pub struct Instance {
     pub(crate) component: Component,
     pub(super) callbacks: Box<Callbacks>,
     pub(super) binary: Arc<Binary>,
+    /// There for an FMU of FMI 3.0.
+    pub(super) three: Option<Three>,
     log: Arc<LogSink>,
     freed: bool,
     /// Whether steps may be taken back: what is told by `noSetFMUStatePriorToCurrentPoint`, turned round.
@@ -107,6 +125,64 @@ macro_rules! checked {
     };
 }
 
+/// `fmi2Instantiate`; the texts are name, GUID and resources.
+fn make(
+    binary: &Binary,
+    options: &InstanceOptions,
+    texts: &[Vec<u8>; 3],
+    callbacks: &Callbacks,
+) -> Result<Component, HostError> {
+    let function = binary.functions.instantiate.ok_or(HostError::Missing("fmi2Instantiate"))?;
+    note(Call::instantiate);
+    // SAFETY: all pointers stay valid as long as the instance; co-simulation is 1 in `fmi2Type`.
+    let component = unsafe {
+        let [name, guid, resources] = texts;
+        let flags = (i32::from(options.visible), i32::from(options.logging));
+        function(
+            name.as_ptr().cast(),
+            1,
+            guid.as_ptr().cast(),
+            resources.as_ptr().cast(),
+            &raw const *callbacks,
+            flags.0,
+            flags.1,
+        )
+    };
+    note(Call::None);
+    Ok(component)
+}
+
+/// `fmi3InstantiateCoSimulation`, likewise.
+fn make3(
+    binary: &Binary,
+    options: &InstanceOptions,
+    texts: &[Vec<u8>; 3],
+    environment: *mut c_void,
+) -> Result<Component, HostError> {
+    let function = binary.functions.instantiate3.ok_or(HostError::Missing("fmi3InstantiateCoSimulation"))?;
+    note(Call::instantiate3);
+    // SAFETY: all pointers stay valid as long as the instance; no intermediate variables are asked for.
+    let component = unsafe {
+        let [name, token, resources] = texts;
+        function(
+            name.as_ptr().cast(),
+            token.as_ptr().cast(),
+            resources.as_ptr().cast(),
+            u8::from(options.visible),
+            u8::from(options.logging),
+            u8::from(options.event_mode),
+            u8::from(options.early_return),
+            std::ptr::null(),
+            0,
+            environment,
+            Some(logger::log_message3),
+            Some(three::intermediate_update),
+        )
+    };
+    note(Call::None);
+    Ok(component)
+}
+
 impl Instance {
     /// Makes an instance of a loaded binary; `folder` is kept alive as long as the instance.
     ///
@@ -130,33 +206,31 @@ impl Instance {
             step_finished: std::ptr::null(),
             environment: Arc::as_ptr(&log).cast_mut().cast(),
         });
-        let function = binary.functions.instantiate.ok_or_else(|| {
-            logger::forget(&log);
-            HostError::Missing("fmi2Instantiate")
-        })?;
-        note(Call::instantiate);
-        // SAFETY: all pointers stay valid as long as the instance; co-simulation is 1 in `fmi2Type`.
-        let component = unsafe {
-            let [name, guid, resources] = &texts;
-            let flags = (i32::from(options.visible), i32::from(options.logging));
-            function(
-                name.as_ptr().cast(),
-                1,
-                guid.as_ptr().cast(),
-                resources.as_ptr().cast(),
-                &raw const *callbacks,
-                flags.0,
-                flags.1,
-            )
+        let three = options.layout.as_ref().map(|layout| Three::new(Arc::clone(layout), options.event_mode));
+        let made = match three {
+            Some(_) => make3(&binary, options, &texts, callbacks.environment),
+            None => make(&binary, options, &texts, &callbacks),
         };
-        note(Call::None);
+        let component = match made {
+            Ok(component) => component,
+            Err(error) => {
+                logger::forget(&log);
+                return Err(error);
+            }
+        };
+        let function = if three.is_some() { "fmi3InstantiateCoSimulation" } else { "fmi2Instantiate" };
         let instance =
-            Self { component, callbacks, binary, log, freed: false, may_go_back: false, texts, _folder: folder };
+            Self { component, callbacks, binary, three, log, freed: false, may_go_back: false, texts, _folder: folder };
         if component.is_null() {
             let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
-            return Err(HostError::Refused(said.join("; ")));
+            return Err(HostError::Refused { function, said: said.join("; ") });
         }
         Ok(instance)
+    }
+
+    /// Refuses what FMI 3.0 does not have: a binary may export both interfaces.
+    fn only_two(&self, function: &'static str) -> Result<(), HostError> {
+        if self.three.is_some() { Err(HostError::Missing(function)) } else { Ok(()) }
     }
 
     /// The messages logged since the last time, and forgets them.
@@ -189,14 +263,21 @@ impl Instance {
     pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Result<(), HostError> {
         let texts = categories.iter().map(|c| c_string(c)).collect::<Result<Vec<_>, _>>()?;
         let pointers: Vec<Text> = texts.iter().map(|t| t.as_ptr()).collect();
+        if self.three.is_some() {
+            return checked!(self, set_debug_logging3(u8::from(on), pointers.len(), pointers.as_ptr()));
+        }
         checked!(self, set_debug_logging(i32::from(on), pointers.len(), pointers.as_ptr()))
     }
 
-    /// `fmi2SetupExperiment`; times in s.
+    /// `fmi2SetupExperiment`; times in s. In FMI 3.0 they go with `fmi3EnterInitializationMode`.
     ///
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn setup_experiment(&mut self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Result<(), HostError> {
+        if let Some(three) = &mut self.three {
+            three.experiment = (tolerance, start, stop);
+            return Ok(());
+        }
         let (has_tolerance, has_stop) = (i32::from(tolerance.is_some()), i32::from(stop.is_some()));
         let (tolerance, stop) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
         checked!(self, setup_experiment(has_tolerance, tolerance, start, has_stop, stop))
@@ -207,7 +288,7 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn enter_initialization(&mut self) -> Result<(), HostError> {
-        checked!(self, enter_initialization())
+        if self.three.is_some() { self.enter_initialization3() } else { checked!(self, enter_initialization()) }
     }
 
     /// `fmi2ExitInitializationMode`.
@@ -215,7 +296,7 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn exit_initialization(&mut self) -> Result<(), HostError> {
-        checked!(self, exit_initialization())
+        if self.three.is_some() { self.exit_initialization3() } else { checked!(self, exit_initialization()) }
     }
 
     /// Sets up, enters and exits initialisation.
@@ -233,7 +314,7 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn terminate(&mut self) -> Result<(), HostError> {
-        checked!(self, terminate())
+        if self.three.is_some() { checked!(self, terminate3()) } else { checked!(self, terminate()) }
     }
 
     /// `fmi2Reset`.
@@ -241,6 +322,10 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn reset(&mut self) -> Result<(), HostError> {
+        if let Some(three) = &mut self.three {
+            three.renew();
+            return checked!(self, reset3());
+        }
         checked!(self, reset())
     }
 
@@ -249,6 +334,9 @@ impl Instance {
     /// # Errors
     /// When it is not exported.
     pub fn do_step_status(&mut self, time: f64, step: f64, no_set_prior: bool) -> Result<Status, HostError> {
+        if self.three.is_some() {
+            return self.do_step3(time, step, no_set_prior);
+        }
         call!(self, do_step(time, step, i32::from(no_set_prior))).map(Status::from)
     }
 
@@ -257,6 +345,11 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`]; `fmi2Discard` and `fmi2Pending` are errors too.
     pub fn do_step(&mut self, time: f64, step: f64) -> Result<(), HostError> {
+        if self.three.is_some() {
+            let status = self.do_step3(time, step, !self.may_go_back)?;
+            let function = "fmi3DoStep";
+            return if status.is_ok() { Ok(()) } else { Err(HostError::Status { function, status }) };
+        }
         let no_set_prior = i32::from(!self.may_go_back);
         checked!(self, do_step(time, step, no_set_prior))
     }
@@ -266,6 +359,7 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn cancel_step(&mut self) -> Result<(), HostError> {
+        self.only_two("fmi2CancelStep")?;
         checked!(self, cancel_step())
     }
 
@@ -274,6 +368,9 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn last_successful_time(&mut self) -> Result<f64, HostError> {
+        if self.three.is_some() {
+            return Ok(self.told().time);
+        }
         let mut time = f64::NAN;
         checked!(self, get_real_status(2, &raw mut time)).map(|()| time)
     }
@@ -283,6 +380,9 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn terminated(&mut self) -> Result<bool, HostError> {
+        if self.three.is_some() {
+            return Ok(self.told().terminate);
+        }
         let mut value = 0;
         checked!(self, get_boolean_status(3, &raw mut value)).map(|()| value != 0)
     }
@@ -292,6 +392,7 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn step_status(&mut self) -> Result<Status, HostError> {
+        self.only_two("fmi2GetStatus")?;
         let mut value = -1;
         checked!(self, get_status(0, &raw mut value)).map(|()| Status::from(value))
     }
@@ -305,6 +406,9 @@ impl Instance {
     /// When the lengths differ; so for all that follow.
     pub fn get_real_into(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), HostError> {
         assert_eq!(references.len(), values.len());
+        if self.three.is_some() {
+            return self.get_real3(references, values);
+        }
         checked!(self, get_real(references.as_ptr(), references.len(), values.as_mut_ptr()))
     }
 
@@ -321,9 +425,13 @@ impl Instance {
     ///
     /// # Errors
     /// See [`Instance::set_debug_logging`].
-    pub fn get_integer(&mut self, references: &[u32]) -> Result<Vec<i32>, HostError> {
-        let mut values = vec![0; references.len()];
-        checked!(self, get_integer(references.as_ptr(), references.len(), values.as_mut_ptr())).map(|()| values)
+    pub fn get_integer(&mut self, references: &[u32]) -> Result<Vec<i64>, HostError> {
+        if self.three.is_some() {
+            return self.get_whole3(references);
+        }
+        let mut values = vec![0_i32; references.len()];
+        checked!(self, get_integer(references.as_ptr(), references.len(), values.as_mut_ptr()))?;
+        Ok(values.into_iter().map(i64::from).collect())
     }
 
     /// `fmi2GetBoolean`.
@@ -331,6 +439,9 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn get_boolean(&mut self, references: &[u32]) -> Result<Vec<bool>, HostError> {
+        if self.three.is_some() {
+            return Ok(self.get_flag3(references)?.into_iter().map(|flag| flag != 0).collect());
+        }
         let mut values = vec![0; references.len()];
         checked!(self, get_boolean(references.as_ptr(), references.len(), values.as_mut_ptr()))
             .map(|()| values.iter().map(|&v| v != 0).collect())
@@ -341,6 +452,9 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn get_string(&mut self, references: &[u32]) -> Result<Vec<String>, HostError> {
+        if self.three.is_some() {
+            return Ok(self.get_text3(references)?.into_iter().map(Result::unwrap_or_default).collect());
+        }
         let mut values = vec![std::ptr::null(); references.len()];
         checked!(self, get_string(references.as_ptr(), references.len(), values.as_mut_ptr()))?;
         // SAFETY: the FMU gave C strings, valid until the next call.
@@ -353,6 +467,9 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), HostError> {
         assert_eq!(references.len(), values.len());
+        if self.three.is_some() {
+            return self.set_real3(references, values);
+        }
         checked!(self, set_real(references.as_ptr(), references.len(), values.as_ptr()))
     }
 
@@ -360,8 +477,13 @@ impl Instance {
     ///
     /// # Errors
     /// See [`Instance::set_debug_logging`].
-    pub fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), HostError> {
+    pub fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), HostError> {
         assert_eq!(references.len(), values.len());
+        if self.three.is_some() {
+            return self.set_whole3(references, values);
+        }
+        let narrow = |&value: &i64| i32::try_from(value).map_err(|_| HostError::Range(value, "fmi2Integer"));
+        let values = values.iter().map(narrow).collect::<Result<Vec<_>, _>>()?;
         checked!(self, set_integer(references.as_ptr(), references.len(), values.as_ptr()))
     }
 
@@ -371,6 +493,9 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn set_boolean(&mut self, references: &[u32], values: &[bool]) -> Result<(), HostError> {
         assert_eq!(references.len(), values.len());
+        if self.three.is_some() {
+            return self.set_flag3(references, values);
+        }
         let raw: Vec<i32> = values.iter().map(|&v| i32::from(v)).collect();
         checked!(self, set_boolean(references.as_ptr(), references.len(), raw.as_ptr()))
     }
@@ -381,6 +506,9 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn set_string(&mut self, references: &[u32], values: &[&str]) -> Result<(), HostError> {
         assert_eq!(references.len(), values.len());
+        if self.three.is_some() {
+            return self.set_text3(references, values);
+        }
         let texts = values.iter().map(|c| c_string(c)).collect::<Result<Vec<_>, _>>()?;
         let pointers: Vec<Text> = texts.iter().map(|t| t.as_ptr()).collect();
         checked!(self, set_string(references.as_ptr(), references.len(), pointers.as_ptr()))
@@ -397,6 +525,7 @@ impl Instance {
         values: &[f64],
     ) -> Result<(), HostError> {
         assert!(references.len() == orders.len() && references.len() == values.len());
+        self.only_two("fmi2SetRealInputDerivatives")?;
         let length = references.len();
         checked!(self, set_input_derivatives(references.as_ptr(), length, orders.as_ptr(), values.as_ptr()))
     }
@@ -407,6 +536,9 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn get_output_derivatives(&mut self, references: &[u32], orders: &[i32]) -> Result<Vec<f64>, HostError> {
         assert_eq!(references.len(), orders.len());
+        if self.three.is_some() {
+            return self.output_derivatives3(references, orders);
+        }
         let mut values = vec![f64::NAN; references.len()];
         let length = references.len();
         checked!(self, get_output_derivatives(references.as_ptr(), length, orders.as_ptr(), values.as_mut_ptr()))
@@ -424,6 +556,9 @@ impl Instance {
         seed: &[f64],
     ) -> Result<Vec<f64>, HostError> {
         assert_eq!(knowns.len(), seed.len());
+        if self.three.is_some() {
+            return self.directional3(unknowns, knowns, seed);
+        }
         let mut values = vec![f64::NAN; unknowns.len()];
         let (known, known_len) = (knowns.as_ptr(), knowns.len());
         checked!(
@@ -446,7 +581,11 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn get_state(&mut self) -> Result<StateHandle, HostError> {
         let mut state = std::ptr::null_mut();
-        checked!(self, get_state(&raw mut state)).map(|()| StateHandle(state))
+        let got = match self.three {
+            Some(_) => checked!(self, get_state3(&raw mut state)),
+            None => checked!(self, get_state(&raw mut state)),
+        };
+        got.map(|()| StateHandle(state))
     }
 
     /// `fmi2SetFMUstate`.
@@ -454,7 +593,7 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn set_state(&mut self, state: &StateHandle) -> Result<(), HostError> {
-        checked!(self, set_state(state.0))
+        if self.three.is_some() { checked!(self, set_state3(state.0)) } else { checked!(self, set_state(state.0)) }
     }
 
     /// `fmi2FreeFMUstate`.
@@ -462,7 +601,10 @@ impl Instance {
     /// # Errors
     /// See [`Instance::set_debug_logging`].
     pub fn free_state(&mut self, mut state: StateHandle) -> Result<(), HostError> {
-        checked!(self, free_state(&raw mut state.0))
+        match self.three {
+            Some(_) => checked!(self, free_state3(&raw mut state.0)),
+            None => checked!(self, free_state(&raw mut state.0)),
+        }
     }
 
     /// `fmi2SerializedFMUstateSize` and `fmi2SerializeFMUstate`.
@@ -471,13 +613,20 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn serialize_state(&mut self, state: &StateHandle) -> Result<Vec<u8>, HostError> {
         let mut size = 0;
-        checked!(self, serialized_size(state.0, &raw mut size))?;
+        match self.three {
+            Some(_) => checked!(self, serialized_size3(state.0, &raw mut size))?,
+            None => checked!(self, serialized_size(state.0, &raw mut size))?,
+        }
         // A strip behind the bytes shows whether the FMU keeps to its own size.
         const STRIP: usize = 64;
         let mut bytes = vec![0xA5; size + STRIP];
-        checked!(self, serialize(state.0, bytes.as_mut_ptr(), size))?;
+        match self.three {
+            Some(_) => checked!(self, serialize3(state.0, bytes.as_mut_ptr(), size))?,
+            None => checked!(self, serialize(state.0, bytes.as_mut_ptr(), size))?,
+        }
         if bytes[size..].iter().any(|&byte| byte != 0xA5) {
-            return Err(HostError::Overrun("fmi2SerializeFMUstate"));
+            let three = self.three.is_some();
+            return Err(HostError::Overrun(if three { "fmi3SerializeFMUState" } else { "fmi2SerializeFMUstate" }));
         }
         bytes.truncate(size);
         Ok(bytes)
@@ -489,7 +638,11 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<StateHandle, HostError> {
         let mut state = std::ptr::null_mut();
-        checked!(self, deserialize(bytes.as_ptr(), bytes.len(), &raw mut state)).map(|()| StateHandle(state))
+        let read = match self.three {
+            Some(_) => checked!(self, deserialize3(bytes.as_ptr(), bytes.len(), &raw mut state)),
+            None => checked!(self, deserialize(bytes.as_ptr(), bytes.len(), &raw mut state)),
+        };
+        read.map(|()| StateHandle(state))
     }
 
     /// `fmi2FreeInstance`, which dropping does too.
@@ -500,8 +653,13 @@ impl Instance {
     pub(super) fn free_once(&mut self) {
         if !self.freed && !self.component.is_null() {
             self.freed = true;
-            if let Some(function) = self.binary.functions.free_instance {
-                note(Call::free_instance);
+            let functions = &self.binary.functions;
+            let (function, call) = match self.three {
+                Some(_) => (functions.free_instance3, Call::free_instance3),
+                None => (functions.free_instance, Call::free_instance),
+            };
+            if let Some(function) = function {
+                note(call);
                 // SAFETY: the component is alive and freed once.
                 unsafe { function(self.component) };
                 note(Call::None);
@@ -517,11 +675,14 @@ impl Drop for Instance {
     }
 }
 
-/// `fmi2GetTypesPlatform` or `fmi2GetVersion` of a binary.
+/// `fmi2GetTypesPlatform`, `fmi2GetVersion` or `fmi3GetVersion` of a binary.
 ///
 /// # Errors
 /// When the function is not exported.
 pub(crate) fn static_text(binary: &Binary, call: Call) -> Result<String, HostError> {
+    if call == Call::get_version3 {
+        return three::version3(&binary.functions);
+    }
     let function = match call {
         Call::get_types_platform => binary.functions.get_types_platform,
         _ => binary.functions.get_version,

@@ -154,3 +154,14 @@ mod imp {
 pub(crate) fn logger() -> *const c_void {
     imp::logger as *const c_void
 }
+
+/// `fmi3LogMessageCallback`, which is not variadic and names no instance.
+pub(crate) unsafe extern "C" fn log_message3(
+    environment: *mut c_void,
+    status: i32,
+    category: *const c_char,
+    message: *const c_char,
+) {
+    // SAFETY: C strings or null, by the standard's contract.
+    unsafe { record(environment, std::ptr::null(), status, category, lossy(message)) };
+}

@@ -1,4 +1,4 @@
-//! Loading an FMU's binary and calling it: every FMI 2.0 co-simulation function behind a safe method.
+//! Loading an FMU's binary and calling it: every co-simulation function of FMI 2.0 and 3.0 behind a safe method.
 //!
 //! "Safe" as far as the FMU keeps the standard: its code runs in this process and can do anything. Code that must
 //! survive any FMU runs it in a child process ([`super::isolation`]).
@@ -9,6 +9,7 @@ pub(crate) mod abi;
 pub(crate) mod abuse;
 mod instance;
 pub(crate) mod logger;
+mod three;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,12 +19,13 @@ use libloading::Library;
 use tempfile::TempDir;
 
 use super::archive::{Archive, ArchiveError};
-use super::description::{Description, DescriptionError, Interface};
+use super::description::{Description, DescriptionError, Fmi, Interface};
 use super::isolation::Page;
 use abi::{Call, Functions};
 pub(crate) use instance::static_text;
 pub use instance::{Instance, InstanceOptions, StateHandle};
 pub use logger::LogMessage;
+pub use three::Layout;
 
 /// What a call returned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,11 +113,16 @@ pub enum HostError {
     /// The binary lacks a function.
     #[error("the binary does not export {0}")]
     Missing(&'static str),
-    /// `fmi2Instantiate` returned null.
-    #[error("fmi2Instantiate refused to make an instance{}", match .0.is_empty() { true => String::new(), false => format!(": {}", .0) })]
-    Refused(String),
+    /// `fmi2Instantiate` or `fmi3InstantiateCoSimulation` returned null.
+    #[error("{function} refused to make an instance{}", match said.is_empty() { true => String::new(), false => format!(": {said}") })]
+    Refused {
+        /// Which function.
+        function: &'static str,
+        /// What the FMU logged.
+        said: String,
+    },
     /// A call returned neither `fmi2OK` nor `fmi2Warning`.
-    #[error("{function} returned {status}")]
+    #[error("{function} returned {}", spelt(function, *status))]
     Status {
         /// Which function.
         function: &'static str,
@@ -128,15 +135,36 @@ pub enum HostError {
     /// A call wrote past the memory it was given.
     #[error("{0} wrote past the end of the memory it was given")]
     Overrun(&'static str),
+    /// A number that its type cannot hold.
+    #[error("{0} is no {1}")]
+    Range(i64, &'static str),
+    /// An event iteration without end.
+    #[error("the events of one instant do not come to an end: {0} calls of fmi3UpdateDiscreteStates")]
+    Events(usize),
     /// A text with a NUL byte.
     #[error("the text {0:?} holds a NUL byte, which C strings cannot")]
     Nul(String),
 }
 
-/// Folder of this platform's binaries, and the file name extension (FMI 2.0.4, section 2.3).
+/// A status as the version of FMI spells it that a function is of.
+fn spelt(function: &str, status: Status) -> String {
+    let text = status.to_string();
+    if function.starts_with("fmi3") { text.replace("fmi2", "fmi3") } else { text }
+}
+
+/// Folder of this platform's binaries, and the file name extension (FMI 2.0.4, section 2.3; FMI 3.0, section 2.5.1).
 #[must_use]
-pub fn platform() -> (&'static str, &'static str) {
+pub fn platform(fmi: Fmi) -> (&'static str, &'static str) {
     let wide = cfg!(target_pointer_width = "64");
+    if fmi == Fmi::Three {
+        let arm = cfg!(target_arch = "aarch64");
+        return match (cfg!(windows), cfg!(target_vendor = "apple")) {
+            (true, _) => (if wide { "x86_64-windows" } else { "x86-windows" }, "dll"),
+            (_, true) => (if arm { "aarch64-darwin" } else { "x86_64-darwin" }, "dylib"),
+            _ if arm => ("aarch64-linux", "so"),
+            _ => (if wide { "x86_64-linux" } else { "x86-linux" }, "so"),
+        };
+    }
     if cfg!(windows) {
         (if wide { "win64" } else { "win32" }, "dll")
     } else if cfg!(target_vendor = "apple") {
@@ -295,7 +323,7 @@ impl Fmu {
         let Some(interface) = &description.co_simulation else {
             return Err(HostError::NoCoSimulation(path.to_owned()));
         };
-        let file = binary_file(folder.path(), interface)?;
+        let file = binary_file(folder.path(), description.fmi, interface)?;
         let binary = Arc::new(Binary::load(&file, false)?);
         Ok(Self { description, binary, folder: Folder::Own(Arc::new(folder)) })
     }
@@ -308,7 +336,7 @@ impl Fmu {
         let Some(interface) = &description.co_simulation else {
             return Err(HostError::NoCoSimulation(folder.to_owned()));
         };
-        let binary = Arc::new(Binary::load(&binary_file(folder, interface)?, false)?);
+        let binary = Arc::new(Binary::load(&binary_file(folder, description.fmi, interface)?, false)?);
         Ok(Self { description, binary, folder: Folder::Lent(folder.to_owned()) })
     }
 
@@ -319,10 +347,10 @@ impl Fmu {
         self.description.co_simulation.as_ref().expect("an opened FMU offers co-simulation")
     }
 
-    /// The URI of the resources folder, for `fmi2Instantiate`.
+    /// Where the resources are, as the FMU is told when an instance is made.
     #[must_use]
     pub fn resources(&self) -> String {
-        resource_uri(self.folder.path())
+        resource_location(self.folder.path(), self.description.fmi)
     }
 
     /// Makes an instance with the FMU's own GUID and resources.
@@ -334,6 +362,8 @@ impl Fmu {
             name: name.to_owned(),
             guid: self.description.guid.clone(),
             resources: self.resources(),
+            layout: Layout::of(&self.description),
+            event_mode: needs_event_mode(&self.description),
             ..InstanceOptions::default()
         };
         self.instantiate_with(&options)
@@ -352,9 +382,21 @@ impl Fmu {
     }
 }
 
-/// The URI of the resources folder of an extracted FMU.
+/// Whether an FMU of FMI 3.0 can be run with event mode only: one with clocks (section 2.3.1).
 #[must_use]
-pub fn resource_uri(folder: &Path) -> String {
+pub fn needs_event_mode(d: &Description) -> bool {
+    !d.clocks.is_empty() && d.co_simulation.as_ref().is_some_and(|i| i.has_event_mode)
+}
+
+/// The resources folder of an extracted FMU: a URI in FMI 2.0 (section 2.1.5), in 3.0 an absolute path with a separator at
+/// its end (section 2.3.1).
+#[must_use]
+pub fn resource_location(folder: &Path, fmi: Fmi) -> String {
+    if fmi == Fmi::Three {
+        let path = folder.join("resources");
+        let path = std::path::absolute(&path).unwrap_or(path);
+        return format!("{}{}", path.to_string_lossy(), std::path::MAIN_SEPARATOR);
+    }
     let path = folder.join("resources").to_string_lossy().replace('\\', "/");
     let mut uri = String::from("file://");
     if !path.starts_with('/') {
@@ -374,8 +416,8 @@ pub fn resource_uri(folder: &Path) -> String {
 ///
 /// # Errors
 /// When there is none.
-pub fn binary_file(folder: &Path, interface: &Interface) -> Result<PathBuf, HostError> {
-    let (platform, extension) = platform();
+pub fn binary_file(folder: &Path, fmi: Fmi, interface: &Interface) -> Result<PathBuf, HostError> {
+    let (platform, extension) = platform(fmi);
     let relative = format!("binaries/{platform}/{}.{extension}", interface.model_identifier);
     let file = folder.join(&relative);
     if file.is_file() {

@@ -131,7 +131,7 @@ mod unix {
             Err(Stop::Host(error)) => {
                 let call = match &error {
                     HostError::Status { function, .. } | HostError::Missing(function) => Some((*function).to_owned()),
-                    HostError::Refused(_) => Some("fmi2Instantiate".to_owned()),
+                    HostError::Refused { function, .. } => Some((*function).to_owned()),
                     _ => None,
                 };
                 answer.findings = vec![(error.to_string(), call)];

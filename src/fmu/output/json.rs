@@ -16,7 +16,7 @@ pub fn json(report: &Report, strict: bool) -> Value {
                 "rule": f.rule,
                 "severity": rule.map(|r| r.severity),
                 "kind": rule.map(|r| r.kind),
-                "section": rule.map(|r| r.section),
+                "section": rule.and_then(|r| r.section(report.fmi)),
                 "message": f.message,
             });
             if let Some(place) = &f.place {
@@ -29,7 +29,7 @@ pub fn json(report: &Report, strict: bool) -> Value {
             if let Some(call) = &f.call {
                 value["call"] = json!(call);
             }
-            value["advice"] = json!(f.advice.as_deref().or(rule.map(|r| r.advice)));
+            value["advice"] = json!(f.advice.clone().or(rule.map(|r| r.advice(report.fmi))));
             value
         })
         .collect();
@@ -49,6 +49,7 @@ pub fn json(report: &Report, strict: bool) -> Value {
         "schema": "eixo.validation/1",
         "file": report.file,
         "model": report.model,
+        "standard": report.fmi.standard(),
         "outcome": match report.outcome(strict) {
             Outcome::Passes => "passes",
             Outcome::Fails => "fails",

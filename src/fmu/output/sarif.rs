@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::rules::{RULES, Report, Severity, Verdict, rule};
+use super::super::rules::{self, Report, Severity, Verdict, rule};
 
 fn level(severity: Severity) -> &'static str {
     match severity {
@@ -15,15 +15,15 @@ fn level(severity: Severity) -> &'static str {
 /// The report as SARIF 2.1.0; places are inside the FMU, `model.fmu!/modelDescription.xml`.
 #[must_use]
 pub fn sarif(report: &Report) -> Value {
-    let rules: Vec<Value> = RULES
-        .iter()
+    let fmi = report.fmi;
+    let rules: Vec<Value> = rules::of(fmi)
         .map(|r| {
             json!({
                 "id": r.id,
-                "shortDescription": { "text": r.title },
-                "help": { "text": r.advice },
+                "shortDescription": { "text": r.title(fmi) },
+                "help": { "text": r.advice(fmi) },
                 "defaultConfiguration": { "level": level(r.severity) },
-                "properties": { "kind": r.kind, "section": format!("FMI 2.0.4, {}", r.section) },
+                "properties": { "kind": r.kind, "section": format!("{}, {}", fmi.standard(), r.section(fmi).unwrap_or("-")) },
             })
         })
         .collect();
@@ -45,7 +45,7 @@ pub fn sarif(report: &Report) -> Value {
             };
             json!({
                 "ruleId": f.rule,
-                "ruleIndex": RULES.iter().position(|r| r.id == f.rule),
+                "ruleIndex": rules::of(fmi).position(|r| r.id == f.rule),
                 "level": rule(&f.rule).map(|r| level(r.severity)),
                 "message": { "text": text },
                 "locations": [{ "physicalLocation": location }],

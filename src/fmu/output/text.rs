@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::super::description::Fmi;
 use super::super::rules::{Finding, Outcome, RULES, Report, Rule, Severity, Verdict, rule};
 
 /// Longest part of a source line that is quoted, in characters.
@@ -142,10 +143,11 @@ fn write_cause(out: &mut String, report: &Report, cause: &[&Finding], rule: &Rul
     }
     let _ = writeln!(
         out,
-        "  {} {} (FMI 2.0.4, section {}; {})\n",
+        "  {} {} ({}, section {}; {})\n",
         paint.with("34", "="),
-        finding.advice.as_deref().unwrap_or(rule.advice),
-        rule.section,
+        finding.advice.clone().unwrap_or_else(|| rule.advice(report.fmi)),
+        report.fmi.standard(),
+        rule.section(report.fmi).unwrap_or("-"),
         rule.kind
     );
 }
@@ -204,16 +206,18 @@ fn plural(count: usize, noun: &str) -> String {
 /// The list of rules as Markdown.
 #[must_use]
 pub fn rules_text() -> String {
-    let mut out =
-        String::from("| rule | severity | kind | FMI 2.0.4 | what holds | what to do |\n|---|---|---|---|---|---|\n");
+    let mut out = String::from(
+        "| rule | severity | kind | FMI 2.0.4 | FMI 3.0 | what holds | what to do |\n|---|---|---|---|---|---|---|\n",
+    );
     for r in RULES {
         let _ = writeln!(
             out,
-            "| `{}` | {} | {} | {} | {} | {} |",
+            "| `{}` | {} | {} | {} | {} | {} | {} |",
             r.id,
             r.severity,
             r.kind,
-            r.section,
+            r.sections[0],
+            r.sections[1],
             r.title,
             r.advice.replace('|', "\\|").replace('<', "&lt;")
         );
@@ -228,7 +232,8 @@ pub fn rules_json() -> serde_json::Value {
         .iter()
         .map(|r| {
             serde_json::json!({
-                "id": r.id, "title": r.title, "severity": r.severity, "kind": r.kind, "section": r.section,
+                "id": r.id, "title": r.title, "severity": r.severity, "kind": r.kind,
+                "section": r.section(Fmi::Two), "section3": r.section(Fmi::Three),
                 "advice": r.advice, "tests": if r.check.is_static() { "file" } else { "behaviour" },
             })
         })

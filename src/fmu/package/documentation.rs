@@ -5,6 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::units;
 use crate::axis::Motion;
 use crate::effects::{EFFECTS, Place};
+use crate::fmu::description::Fmi;
 use crate::variables::{Causality, FIXED, Model, Starts, Type, Variable, at, first_of};
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;\
@@ -25,7 +26,19 @@ const LAW: &str = "w* = kp*(r - theta) + velocity_forward*r'\n\
 T  = kv*(w* - omega) + ki*int(w* - omega) + acceleration_forward*inertia*r'',   |T| <= limit";
 
 /// The page for a model of that name.
-pub(super) fn page(name: &str, starts: &Starts) -> String {
+pub(super) fn page(name: &str, starts: &Starts, fmi: Fmi) -> String {
+    let page = page_of_two(name, starts);
+    match fmi {
+        Fmi::Two => page,
+        // There are no input derivatives in FMI 3.0.
+        Fmi::Three => page.replace("an FMI 2.0 co-simulation unit", "an FMI 3.0 co-simulation unit").replace(
+            ", or runs linearly where its first derivative is set (fmi2SetRealInputDerivatives), for that step",
+            "",
+        ),
+    }
+}
+
+fn page_of_two(name: &str, starts: &Starts) -> String {
     let body = match starts.model {
         Model::Axis => axis(name, starts),
         Model::Drive => drive(name, starts),

@@ -7,6 +7,7 @@ mod documentation;
 mod table;
 mod units;
 mod xml;
+mod xml3;
 
 use std::io::{self, Cursor, Write};
 use std::path::Path;
@@ -16,6 +17,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::drive::Gains;
 use crate::fmi2::bake;
+use crate::fmu::description::Fmi;
 use crate::trace::{Machine, Motion, TraceError, write_text};
 use crate::variables::{Model, Starts};
 
@@ -74,12 +76,14 @@ pub struct Package {
     pub name: String,
     /// Start values.
     pub starts: Starts,
+    /// The version of FMI: the same library, another description and another ABI.
+    pub fmi: Fmi,
 }
 
 impl Default for Package {
     /// The paper's axis with every effect off.
     fn default() -> Self {
-        Self { name: NAME.to_owned(), starts: Starts::default() }
+        Self { name: NAME.to_owned(), starts: Starts::default(), fmi: Fmi::Two }
     }
 }
 
@@ -102,7 +106,7 @@ impl Package {
                 return Err(PackageError::Bounds { variable: v.to_string(), value, min, max });
             }
         }
-        Ok(Self { name: name.to_owned(), starts })
+        Ok(Self { name: name.to_owned(), starts, fmi: Fmi::Two })
     }
 
     /// The FMU of a drive with a sampling interval of `dt` s, for an axis with a lead of `rho`.
@@ -118,7 +122,10 @@ impl Package {
     /// # Errors
     /// [`PackageError::Io`].
     pub fn model_description(&self) -> Result<Vec<u8>, PackageError> {
-        Ok(xml::document(&self.name, &self.starts)?)
+        Ok(match self.fmi {
+            Fmi::Two => xml::document(&self.name, &self.starts)?,
+            Fmi::Three => xml3::document(&self.name, &self.starts)?,
+        })
     }
 
     /// Platforms whose library goes into the archive, by their folders; the program's own first.
@@ -152,10 +159,11 @@ impl Package {
             add(&mut zip, "model.png", PICTURE, 0o644)?;
         }
         for library in LIBRARIES {
-            let name = format!("binaries/{}/{}.{}", library.platform, xml::identifier(model), library.extension);
+            let folder = if self.fmi == Fmi::Three { tuple(library.platform) } else { library.platform };
+            let name = format!("binaries/{folder}/{}.{}", xml::identifier(model), library.extension);
             add(&mut zip, &name, &self.baked(library)?, 0o755)?;
         }
-        let page = documentation::page(&self.name, &self.starts);
+        let page = documentation::page(&self.name, &self.starts, self.fmi);
         add(&mut zip, "documentation/index.html", page.as_bytes(), 0o644)?;
         if model == Model::Axis {
             add(&mut zip, "documentation/model.png", PICTURE, 0o644)?;
@@ -170,6 +178,20 @@ impl Package {
     /// See [`PackageError`].
     pub fn write(&self, path: &Path) -> Result<(), PackageError> {
         Ok(write_text(path, &self.archive()?)?)
+    }
+}
+
+/// The platform tuple of FMI 3.0 (section 2.5.1) for a platform folder of FMI 2.0.
+fn tuple(folder: &'static str) -> &'static str {
+    match folder {
+        "linux64" if cfg!(target_arch = "aarch64") => "aarch64-linux",
+        "linux64" => "x86_64-linux",
+        "linux32" => "x86-linux",
+        "win64" => "x86_64-windows",
+        "win32" => "x86-windows",
+        "darwin64" if cfg!(target_arch = "aarch64") => "aarch64-darwin",
+        "darwin64" => "x86_64-darwin",
+        other => other,
     }
 }
 
@@ -216,8 +238,30 @@ mod tests {
     }
 
     #[test]
+    fn the_description_of_fmi_3_names_the_same_variables_and_the_time() {
+        let two = Description::parse(&Package::default().model_description().unwrap()).unwrap();
+        let three = Package { fmi: Fmi::Three, ..Package::default() };
+        let three = Description::parse(&three.model_description().unwrap()).unwrap();
+        assert_eq!(three.fmi, Fmi::Three);
+        assert_eq!(three.guid, two.guid);
+        assert_eq!(three.variables[0].value_reference, crate::fmi3::TIME_REFERENCE);
+        assert_eq!(crate::variables::index_of(crate::fmi3::TIME_REFERENCE), None);
+        for (a, b) in two.variables.iter().zip(&three.variables[1..]) {
+            assert_eq!(
+                (&a.name, a.value_reference, a.base(), &a.start),
+                (&b.name, b.value_reference, b.base(), &b.start)
+            );
+        }
+        for (a, b) in two.structure.initial_unknowns.iter().zip(&three.structure.initial_unknowns) {
+            // One variable more, at the head.
+            let moved = a.dependencies.as_ref().unwrap().iter().map(|i| i + 1).collect::<Vec<_>>();
+            assert_eq!(Some(moved), b.dependencies, "{}", a.index);
+        }
+    }
+
+    #[test]
     fn the_programs_own_platform_comes_first() {
-        assert_eq!(Package::platforms().next(), Some(crate::fmu::host::platform().0));
+        assert_eq!(Package::platforms().next(), Some(crate::fmu::host::platform(crate::fmu::description::Fmi::Two).0));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::units;
 use crate::fmi2::LOG_CATEGORIES;
 use crate::variables::{Causality, Enumeration, FIXED, Model, Starts, Type, Variability, Variable, guid};
 
-type Xml = Writer<Vec<u8>>;
+pub(super) type Xml = Writer<Vec<u8>>;
 
 /// Name of the binary, and prefix of nothing: the functions are exported as the standard names them.
 pub(super) const fn identifier(model: Model) -> &'static str {
@@ -20,7 +20,7 @@ pub(super) const fn identifier(model: Model) -> &'static str {
     }
 }
 
-const fn description(model: Model) -> &'static str {
+pub(super) const fn description(model: Model) -> &'static str {
     match model {
         Model::Axis => "Drive axis of a machine tool: motor and table joined by spring and damper, with effects",
         Model::Drive => "Drive of a machine tool's axis: position loop, velocity loop, feed-forward, torque limit",
@@ -28,7 +28,7 @@ const fn description(model: Model) -> &'static str {
 }
 
 /// Samples of the paper's simulation (Table 1), at its own step.
-const SAMPLES: f64 = 2048.0;
+pub(super) const SAMPLES: f64 = 2048.0;
 
 /// The document, for an axis of that name with these start values.
 pub(super) fn document(name: &str, starts: &Starts) -> io::Result<Vec<u8>> {
@@ -98,12 +98,12 @@ fn content(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
 }
 
 /// A number as the XML writes it: the shortest text that reads back as the same.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-4..1e15).contains(&size) { format!("{value:e}") } else { value.to_string() }
 }
 
-fn unit_definitions(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
+pub(super) fn unit_definitions(xml: &mut Xml, starts: &Starts) -> io::Result<()> {
     let mut names: Vec<Cow<'static, str>> =
         starts.model.all().map(|v| units::of(v.unit, starts.motion)).filter(|u| !u.is_empty()).collect();
     names.sort_unstable();

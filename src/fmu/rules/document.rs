@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::super::description::{Description, Interface};
+use super::super::description::{Description, Fmi, Interface};
 use super::super::xml::{Element, Position};
 use super::finding::Findings;
 use super::names::is_c_identifier;
@@ -10,7 +10,7 @@ use super::names::is_c_identifier;
 /// The version of FMI, where it is one with rules of its own.
 pub(super) fn foreign(root: &Element) -> Option<&str> {
     let version = root.get("fmiVersion").filter(|_| root.name == "fmiModelDescription")?;
-    (!version.trim().starts_with('2')).then_some(version)
+    (!version.trim().starts_with('2') && Fmi::of(version).is_none()).then_some(version)
 }
 
 /// Checks the root and its version; whether the rest is worth reading.
@@ -22,6 +22,13 @@ pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
     }
     match root.get("fmiVersion") {
         Some("2.0") => true,
+        Some(three) if Fmi::of(three) == Some(Fmi::Three) => {
+            if !is_version_3(three) {
+                let message = format!("fmiVersion is \"{three}\"; it is \"3.0\" for every FMI 3.0.x");
+                findings.at("fmi-version", root.position_of("fmiVersion"), message);
+            }
+            true
+        }
         other => {
             let message = match other {
                 Some(other) => format!("fmiVersion is \"{other}\"; it is \"2.0\" for every FMI 2.0.x"),
@@ -36,7 +43,9 @@ pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
 /// Checks what the description says of itself.
 pub(super) fn check(d: &Description, root: &Element, findings: &mut Findings) {
     if d.guid.trim().is_empty() {
-        findings.at("guid", root.position_of("guid"), "the guid is empty, so that it ties no binary to this file");
+        let name = if d.fmi == Fmi::Three { "instantiationToken" } else { "guid" };
+        let message = format!("the {name} is empty, so that it ties no binary to this file");
+        findings.at("guid", root.position_of(name), message);
     }
     if d.model_name.trim().is_empty() {
         findings.at("model-name", root.position_of("modelName"), "the modelName is empty");
@@ -48,10 +57,26 @@ pub(super) fn check(d: &Description, root: &Element, findings: &mut Findings) {
     }
     experiment(d, findings);
     unique("log-category", "log category", d.log_categories.iter().map(|c| (c.0.as_str(), c.2)), findings);
+    if d.fmi == Fmi::Three {
+        return;
+    }
     let tools = root.child("VendorAnnotations");
     let tools =
         tools.into_iter().flat_map(|v| v.children_named("Tool")).map(|t| (t.get("name").unwrap_or(""), t.position));
     unique("vendor-tool", "vendor annotation of tool", tools, findings);
+}
+
+/// The pattern of the schema: `3[.](0|[1-9][0-9]*)([.](0|[1-9][0-9]*))?(-.+)?`.
+fn is_version_3(text: &str) -> bool {
+    let number = |part: &str| {
+        !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()) && (part == "0" || !part.starts_with('0'))
+    };
+    let (numbers, label) = text.split_once('-').map_or((text, None), |(numbers, label)| (numbers, Some(label)));
+    let parts: Vec<&str> = numbers.split('.').collect();
+    (2..=3).contains(&parts.len())
+        && parts[0] == "3"
+        && parts[1..].iter().all(|p| number(p))
+        && label.is_none_or(|l| !l.is_empty())
 }
 
 fn unique<'a>(

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::description::Fmi;
 use super::super::xml::Position;
 use super::{Rule, Severity};
 
@@ -55,7 +56,9 @@ pub struct Report {
     pub file: String,
     /// Model name, where one could be read.
     pub model: Option<String>,
-    /// Every rule and what became of it, in the order of the list.
+    /// The version of FMI whose rules were tested.
+    pub fmi: Fmi,
+    /// Every rule of that version and what became of it, in the order of the list.
     pub rules: Vec<(&'static Rule, Verdict)>,
     /// The findings, in the order of the rules.
     pub findings: Vec<Finding>,

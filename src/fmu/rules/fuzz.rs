@@ -11,6 +11,12 @@ use super::super::xml::Document;
 use super::{Static, check_archive, check_description};
 
 const DESCRIPTION: &str = include_str!("../../../tests/corpus/modelDescription.xml");
+const DESCRIPTION3: &str = include_str!("../../../tests/corpus/modelDescription3.xml");
+
+/// One of the two versions of FMI.
+fn descriptions() -> impl Strategy<Value = &'static str> {
+    prop::sample::select(vec![DESCRIPTION, DESCRIPTION3])
+}
 
 fn archive() -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
@@ -73,8 +79,8 @@ proptest! {
     }
 
     #[test]
-    fn a_mangled_description_is_checked_or_refused(edits in edits()) {
-        let mut bytes = DESCRIPTION.as_bytes().to_vec();
+    fn a_mangled_description_is_checked_or_refused(of in descriptions(), edits in edits()) {
+        let mut bytes = of.as_bytes().to_vec();
         mutate(&mut bytes, &edits);
         let mut result = Static::empty();
         let _ = check_description(&bytes, &mut result);
@@ -93,9 +99,10 @@ proptest! {
 
     #[test]
     fn swapped_values_of_attributes_are_checked(
+        of in descriptions(),
         pairs in proptest::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 1..4)
     ) {
-        let mut parts: Vec<&str> = DESCRIPTION.split('"').collect();
+        let mut parts: Vec<&str> = of.split('"').collect();
         for (a, b) in pairs {
             // Every second part is a value.
             let count = parts.len() / 2;

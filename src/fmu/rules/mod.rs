@@ -1,5 +1,6 @@
 //! Validation rules: what each is ([`list`]), the static ones, and running them.
 
+mod clocks;
 mod document;
 pub mod finding;
 #[cfg(test)]
@@ -8,14 +9,17 @@ pub mod list;
 mod names;
 mod package;
 mod schema;
+mod schema3;
 mod structure;
+mod three;
 mod units;
 mod variables;
+pub mod words;
 
 use std::path::Path;
 
 use super::archive::Archive;
-use super::description::Description;
+use super::description::{Description, Fmi};
 use super::xml::Document;
 use finding::Findings;
 pub use finding::{Finding, Outcome, Place, Report, Verdict};
@@ -65,12 +69,37 @@ pub struct Rule {
     pub severity: Severity,
     /// What it rests on.
     pub kind: Kind,
-    /// Section of FMI 2.0.4.
-    pub section: &'static str,
+    /// Section of FMI 2.0.4 and of FMI 3.0; `-` where the version has none, or the rule is not tested for it.
+    pub sections: [&'static str; 2],
     /// What to do about a finding.
     pub advice: &'static str,
     /// How it is tested.
     pub check: Check,
+}
+
+impl Rule {
+    /// The section of a version of the standard; none where the rule is not one of that version.
+    #[must_use]
+    pub fn section(&self, fmi: Fmi) -> Option<&'static str> {
+        Some(self.sections[fmi as usize]).filter(|section| *section != "-")
+    }
+
+    /// What holds when it passes, in the words of a version.
+    #[must_use]
+    pub fn title(&self, fmi: Fmi) -> String {
+        words::title(self, fmi)
+    }
+
+    /// What to do about a finding, in the words of a version.
+    #[must_use]
+    pub fn advice(&self, fmi: Fmi) -> String {
+        words::advice(self, fmi)
+    }
+}
+
+/// The rules of a version of FMI.
+pub fn of(fmi: Fmi) -> impl Iterator<Item = &'static Rule> {
+    RULES.iter().filter(move |r| r.section(fmi).is_some())
 }
 
 macro_rules! display {
@@ -103,7 +132,9 @@ pub(crate) struct Static {
     pub source: Vec<String>,
     /// Static rules that were not tested, and why.
     pub untested: Vec<(&'static str, String)>,
-    /// The version of FMI, where it is not 2.
+    /// The version of FMI whose rules are tested.
+    pub fmi: Fmi,
+    /// The version of FMI, where it is neither 2 nor 3.
     pub foreign: Option<String>,
 }
 
@@ -124,7 +155,15 @@ pub(crate) fn check_file(path: &Path) -> Result<Static, super::archive::ArchiveE
 impl Static {
     fn empty() -> Self {
         let findings = Findings::default();
-        Self { findings, archive: None, description: None, source: Vec::new(), untested: Vec::new(), foreign: None }
+        Self {
+            findings,
+            archive: None,
+            description: None,
+            source: Vec::new(),
+            untested: Vec::new(),
+            fmi: Fmi::Two,
+            foreign: None,
+        }
     }
 
     /// Notes that the static rules from this one on were not tested.
@@ -173,14 +212,18 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
     let findings = &mut result.findings;
     if let Some(version) = document::foreign(&document.root) {
         result.foreign = Some(version.to_owned());
-        result.stop("fmi-version", "this is no FMI 2.0");
+        result.stop("fmi-version", "this is neither FMI 2.0 nor 3.0");
         return None;
     }
+    result.fmi = document.root.get("fmiVersion").and_then(Fmi::of).unwrap_or_default();
     if !document::root(&document.root, findings) {
-        result.stop("interface-missing", "this is no model description of FMI 2.0");
+        result.stop("interface-missing", "this is no model description of FMI");
         return None;
     }
-    schema::check(&document.root, findings);
+    match result.fmi {
+        Fmi::Two => schema::check(&document.root, findings),
+        Fmi::Three => schema3::check(&document.root, findings),
+    }
     // What the schema refuses reads as its default below; findings that follow from that would mislead.
     if ["schema-element", "schema-required", "schema-value", "interface-missing"].iter().any(|r| findings.has(r)) {
         result.stop("guid", "the schema's findings come first");
@@ -191,5 +234,9 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
     units::check(&description, findings);
     variables::check(&description, findings);
     structure::check(&description, findings);
+    if result.fmi == Fmi::Three {
+        three::check(&document.root, findings);
+        clocks::check(&document.root, findings);
+    }
     Some(description)
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::super::archive::{Archive, ArchiveError, Hazard};
-use super::super::description::Description;
+use super::super::description::{Description, Fmi};
 use super::finding::Findings;
 
 /// A platform folder of the standard: name, file name extension, and what the binary must be.
@@ -47,6 +47,18 @@ const PLATFORMS: [Platform; 6] = [
     Platform { folder: "win32", extension: "dll", format: Format::Pe { wide: false } },
     Platform { folder: "darwin64", extension: "dylib", format: Format::MachO { wide: true } },
     Platform { folder: "darwin32", extension: "dylib", format: Format::MachO { wide: false } },
+];
+
+/// The platforms of FMI 3.0 (section 2.5.1) of which the format is known.
+const PLATFORMS3: [Platform; 8] = [
+    Platform { folder: "x86_64-linux", extension: "so", format: Format::Elf { wide: true } },
+    Platform { folder: "x86-linux", extension: "so", format: Format::Elf { wide: false } },
+    Platform { folder: "aarch64-linux", extension: "so", format: Format::Elf { wide: true } },
+    Platform { folder: "x86_64-windows", extension: "dll", format: Format::Pe { wide: true } },
+    Platform { folder: "x86-windows", extension: "dll", format: Format::Pe { wide: false } },
+    Platform { folder: "aarch64-windows", extension: "dll", format: Format::Pe { wide: true } },
+    Platform { folder: "x86_64-darwin", extension: "dylib", format: Format::MachO { wide: true } },
+    Platform { folder: "aarch64-darwin", extension: "dylib", format: Format::MachO { wide: true } },
 ];
 
 /// Checks the entries themselves; whether the archive can be extracted.
@@ -117,6 +129,7 @@ pub(super) fn description(archive: &Archive, findings: &mut Findings) -> bool {
 pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Findings) {
     let names: Vec<String> = archive.entries().iter().filter(|e| !e.is_dir).map(|e| e.name.clone()).collect();
     let present: HashSet<&str> = names.iter().map(String::as_str).collect();
+    let known: &[Platform] = if d.fmi == Fmi::Three { &PLATFORMS3 } else { &PLATFORMS };
     let has_sources = names.iter().any(|n| n.starts_with("sources/"));
     let folders: BTreeSet<&str> =
         names.iter().filter_map(|n| n.strip_prefix("binaries/")?.split_once('/').map(|(folder, _)| folder)).collect();
@@ -124,13 +137,18 @@ pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Find
         if let Some(rest) = name.strip_prefix("binaries/")
             && !rest.contains('/')
         {
-            let message = "a binary must be in a platform folder such as binaries/linux64/";
+            let message = format!("a binary must be in a platform folder such as binaries/{}/", known[0].folder);
             findings.entry("binary-folder", name, message);
         }
     }
     for folder in &folders {
         let folded = folder.to_lowercase();
-        if !PLATFORMS.iter().any(|p| p.folder == *folder) && PLATFORMS.iter().any(|p| p.folder == folded) {
+        let old = d.fmi == Fmi::Three && PLATFORMS.iter().any(|p| p.folder == *folder);
+        if old {
+            let message = "the folder has a name of FMI 2.0; FMI 3.0 has platform tuples such as x86_64-linux";
+            findings.entry("binary-folder", &format!("binaries/{folder}/"), message);
+        }
+        if !known.iter().any(|p| p.folder == *folder) && known.iter().any(|p| p.folder == folded) {
             let message = format!("the platform folder is spelt {folded}");
             findings.entry("binary-folder", &format!("binaries/{folder}/"), message);
         }
@@ -141,7 +159,7 @@ pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Find
         .map(|interface| interface.model_identifier.as_str())
         .filter(|identifier| !identifier.is_empty())
         .collect();
-    for platform in PLATFORMS.iter().filter(|p| folders.contains(p.folder)) {
+    for platform in known.iter().filter(|p| folders.contains(p.folder)) {
         for identifier in &identifiers {
             let file = format!("binaries/{}/{identifier}.{}", platform.folder, platform.extension);
             if !present.contains(file.as_str()) {

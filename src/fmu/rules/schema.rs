@@ -8,7 +8,7 @@ use super::finding::Findings;
 
 /// Type of an attribute.
 #[derive(Debug, Clone, Copy)]
-enum Type {
+pub(super) enum Type {
     /// `xs:string` or `xs:normalizedString`.
     Text,
     Bool,
@@ -19,39 +19,56 @@ enum Type {
     Word(&'static [&'static str]),
     UnsignedList,
     WordList(&'static [&'static str]),
+    /// A whole number from one to another.
+    Whole(i128, i128),
+    /// `xs:unsignedLong`.
+    UnsignedLong,
+    /// Numbers, for the elements of an array.
+    DoubleList,
+    WholeList(i128, i128),
+    BoolList,
+    /// `xs:hexBinary`.
+    Hex,
 }
 
 /// An attribute: name, type, whether it is required.
-type Attr = (&'static str, Type, bool);
+pub(super) type Attr = (&'static str, Type, bool);
 
 /// How children follow each other.
 #[derive(Debug, Clone, Copy)]
-enum Children {
+pub(super) enum Children {
     /// In this order: name, smallest number, largest number.
     Sequence(&'static [(&'static Node, usize, usize)]),
+    /// As a sequence, and the element may have attributes of others.
+    Open(&'static [(&'static Node, usize, usize)]),
+    /// One or more of these, in any order.
+    Mixed(&'static [&'static Node]),
     /// Anything.
     Any,
 }
 
 /// An element.
 #[derive(Debug)]
-struct Node {
-    name: &'static str,
-    attributes: &'static [Attr],
+pub(super) struct Node {
+    pub name: &'static str,
+    pub attributes: &'static [Attr],
     /// One of these must be the first child.
-    choice: &'static [&'static Node],
-    children: Children,
+    pub choice: &'static [&'static Node],
+    pub children: Children,
 }
 
-const MANY: usize = usize::MAX;
+pub(super) const MANY: usize = usize::MAX;
 const KINDS: &[&str] = &["dependent", "constant", "fixed", "tunable", "discrete"];
-use Type::{Bool, DateTime, Double, Int, Text, Unsigned, UnsignedList, Word, WordList};
+use Type::{
+    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, Text, Unsigned, UnsignedList, UnsignedLong, Whole,
+    WholeList, Word, WordList,
+};
 
-const fn leaf(name: &'static str, attributes: &'static [Attr]) -> Node {
+pub(super) const fn leaf(name: &'static str, attributes: &'static [Attr]) -> Node {
     Node { name, attributes, choice: &[], children: Children::Sequence(&[]) }
 }
 
-const fn parent(
+pub(super) const fn parent(
     name: &'static str,
     attributes: &'static [Attr],
     children: &'static [(&'static Node, usize, usize)],
@@ -92,7 +109,7 @@ static CO_SIMULATION: Node = parent(
     ],
     &[(&SOURCE_FILES, 0, 1)],
 );
-static BASE_UNIT: Node = leaf(
+pub(super) static BASE_UNIT: Node = leaf(
     "BaseUnit",
     &[
         ("kg", Int, false),
@@ -295,8 +312,34 @@ fn element(e: &Element, node: &Node, findings: &mut Findings) {
     sequence(e, children, node, findings);
 }
 
-fn sequence(e: &Element, children: &[Element], node: &Node, findings: &mut Findings) {
-    let Children::Sequence(expected) = node.children else { return };
+/// That one of the interfaces is there.
+pub(super) fn needs_interface(root: &Element, interfaces: &[&Node], findings: &mut Findings) {
+    if !root.children.iter().any(|c| interfaces.iter().any(|node| node.name == c.name)) {
+        let names: Vec<&str> = interfaces.iter().map(|node| node.name).collect();
+        let message = format!("there is none of the elements {}", names.join(", "));
+        findings.at("interface-missing", root.position, message);
+    }
+}
+
+fn mixed(e: &Element, nodes: &[&Node], findings: &mut Findings) {
+    for child in &e.children {
+        match nodes.iter().find(|n| n.name == child.name) {
+            Some(node) => element(child, node, findings),
+            None => {
+                findings.at("schema-element", child.position, format!("{} has no place in {}", child.name, e.name));
+            }
+        }
+    }
+    if e.children.is_empty() {
+        findings.at("schema-element", e.position, format!("{} has no elements", e.name));
+    }
+}
+
+pub(super) fn sequence(e: &Element, children: &[Element], node: &Node, findings: &mut Findings) {
+    if let Children::Mixed(nodes) = node.children {
+        return mixed(e, nodes, findings);
+    }
+    let (Children::Sequence(expected) | Children::Open(expected)) = node.children else { return };
     let mut counts = vec![0_usize; expected.len()];
     let mut current = 0;
     for child in children {
@@ -339,7 +382,7 @@ fn describe(e: &Element) -> String {
     }
 }
 
-fn attributes(e: &Element, node: &Node, findings: &mut Findings) {
+pub(super) fn attributes(e: &Element, node: &Node, findings: &mut Findings) {
     required(e, node, findings);
     for attribute in &e.attributes {
         let name = attribute.name.as_str();
@@ -348,10 +391,13 @@ fn attributes(e: &Element, node: &Node, findings: &mut Findings) {
             continue;
         }
         let Some((_, kind, _)) = node.attributes.iter().find(|(n, ..)| *n == name) else {
+            if matches!(node.children, Children::Open(_)) {
+                continue;
+            }
             findings.at(
                 "schema-attribute",
                 attribute.position,
-                format!("{} has an attribute {name}, which FMI 2.0 does not define there", describe(e)),
+                format!("{} has an attribute {name}, which the schema does not define there", describe(e)),
             );
             continue;
         };
@@ -375,11 +421,27 @@ fn fits(value: &str, kind: Type) -> Result<(), String> {
         UnsignedList => {
             (value.split_whitespace().all(|v| v.parse::<u32>().is_ok()), "a list of unsigned integers".into())
         }
+        Whole(low, high) => (is_whole(value, low, high), format!("a whole number from {low} to {high}")),
+        UnsignedLong => (value.trim().parse::<u64>().is_ok(), "an unsigned 64-bit integer".into()),
+        DoubleList => (value.split_whitespace().all(|v| parse_real(v).is_some()), "a list of numbers".into()),
+        WholeList(low, high) => (
+            value.split_whitespace().all(|v| is_whole(v, low, high)),
+            format!("a list of whole numbers from {low} to {high}"),
+        ),
+        BoolList => (value.split_whitespace().all(|v| parse_boolean(v).is_some()), "a list of booleans".into()),
+        Hex => (
+            value.len().is_multiple_of(2) && value.bytes().all(|b| b.is_ascii_hexdigit()),
+            "an even number of hexadecimal digits".into(),
+        ),
         WordList(words) => {
             (value.split_whitespace().all(|v| words.contains(&v)), format!("a list of {}", words.join(", ")))
         }
     };
     if good { Ok(()) } else { Err(expected) }
+}
+
+fn is_whole(text: &str, low: i128, high: i128) -> bool {
+    text.trim().parse::<i128>().is_ok_and(|value| (low..=high).contains(&value))
 }
 
 /// `xs:dateTime`: `-?YYYY-MM-DDThh:mm:ss(.s+)?(Z|[+-]hh:mm)?` with the ranges of the calendar.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashSet};
 
 use super::super::description::{
-    BaseType, Causality, DependencyKind, Description, Initial, Unknown, Variability, Variable,
+    BaseType, Causality, DependencyKind, Description, Fmi, Initial, Unknown, Variability, Variable,
 };
 use super::finding::Findings;
 
@@ -18,14 +18,20 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
         for unknown in list {
             if d.by_index(unknown.index).is_none() {
                 let last = d.variables.len();
-                let message = format!("{section}: index {} is not from 1 to {last}", unknown.index);
+                let message = match d.fmi {
+                    Fmi::Two => format!("{section}: index {} is not from 1 to {last}", unknown.index),
+                    Fmi::Three => format!("{section}: no variable has the value reference {}", unknown.reference),
+                };
                 findings.at("structure-index", unknown.position, message);
                 sound = false;
             } else if !seen.insert(unknown.index) {
                 let message = format!("{section}: \"{}\" is listed twice", name(d, unknown.index));
                 findings.at("structure-duplicate", unknown.position, message);
             }
-            dependencies(d, section, unknown, findings);
+            // By value reference, and in any order, in FMI 3.0: see `three`.
+            if d.fmi == Fmi::Two {
+                dependencies(d, section, unknown, findings);
+            }
         }
     }
     if sound {
@@ -114,7 +120,7 @@ fn initial_unknowns(d: &Description, findings: &mut Findings) {
         return;
     }
     compare(d, "InitialUnknowns", "structure-initial-unknowns", list, &must, findings);
-    if let Some(pair) = list.windows(2).find(|pair| pair[0].index > pair[1].index) {
+    if let Some(pair) = list.windows(2).find(|pair| d.fmi == Fmi::Two && pair[0].index > pair[1].index) {
         let message = format!(
             "InitialUnknowns: \"{}\" (index {}) comes after \"{}\" (index {}); they go by index",
             name(d, pair[1].index),
@@ -191,7 +197,7 @@ fn is_known(d: &Description, section: &str, known: &Variable) -> bool {
         Causality::Input | Causality::Independent => true,
         _ if known.variability == Variability::Constant => false,
         _ if section == "InitialUnknowns" => known.initial() == Some(Initial::Exact),
-        Causality::Parameter | Causality::CalculatedParameter => false,
+        Causality::Parameter | Causality::CalculatedParameter | Causality::StructuralParameter => false,
         // States are known where they are exposed, and soundly so; else any variable may stand for one.
         _ => {
             let state = |u: &Unknown| d.by_index(d.by_index(u.index)?.derivative?);

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::super::description::{BaseType, Description, TypeAttributes};
+use super::super::description::{BaseType, Description, Fmi, TypeAttributes};
 use super::super::xml::Position;
 use super::finding::Findings;
 
@@ -21,9 +21,11 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
         let Some(name) = &v.declared_type else { continue };
         match d.type_of(v) {
             None => {
-                findings.at("type-undeclared", v.attributes.position, format!("{who}: no SimpleType \"{name}\""));
+                let kind = if d.fmi == Fmi::Three { "type" } else { "SimpleType" };
+                findings.at("type-undeclared", v.attributes.position, format!("{who}: no {kind} \"{name}\""));
             }
-            Some(t) if t.attributes.base != v.base() => {
+            // By its name in FMI 3.0: see `three`.
+            Some(t) if d.fmi == Fmi::Two && t.attributes.base != v.base() => {
                 let message =
                     format!("{who} is of type {}, its declared type \"{name}\" of {}", v.base(), t.attributes.base);
                 findings.at("type-mismatch", v.attributes.position, message);

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::super::description::{
-    BaseType, Causality, Description, Initial, Value, Variability, Variable, default_initial,
+    BaseType, Causality, Description, Fmi, Initial, Value, Variability, Variable, default_initial,
 };
 use super::finding::Findings;
 use super::names;
@@ -13,7 +13,7 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
     unique_names(d, findings);
     let mut independent = 0;
     for v in &d.variables {
-        let allowed = table(v, findings);
+        let allowed = table(d.fmi, v, findings);
         if allowed {
             starts(v, findings);
         }
@@ -27,7 +27,10 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
             }
         }
     }
-    aliases(d, findings);
+    // In FMI 3.0 a second name is declared as one.
+    if d.fmi == Fmi::Two {
+        aliases(d, findings);
+    }
 }
 
 fn unique_names(d: &Description, findings: &mut Findings) {
@@ -49,20 +52,24 @@ fn unique_names(d: &Description, findings: &mut Findings) {
 }
 
 /// The table of causality, variability and initial. Whether the combination is allowed.
-fn table(v: &Variable, findings: &mut Findings) -> bool {
+fn table(fmi: Fmi, v: &Variable, findings: &mut Findings) -> bool {
     use {Causality as C, Variability as V};
     let (causality, variability) = (v.causality, v.variability);
     if variability == V::Continuous && v.base() != BaseType::Real {
-        let message = format!(
-            "variable \"{}\" is of type {} and cannot be continuous, the default; declare its variability",
-            v.name,
-            v.base()
-        );
+        let (name, base) = (&v.name, v.base());
+        let message = match fmi {
+            Fmi::Two => format!(
+                "variable \"{name}\" is of type {base} and cannot be continuous, the default; declare its variability"
+            ),
+            Fmi::Three => format!("variable \"{name}\" is no floating-point number and cannot be continuous"),
+        };
         findings.at("variability-type", v.position, message);
         return false;
     }
     let good = match causality {
-        C::Parameter | C::CalculatedParameter => matches!(variability, V::Fixed | V::Tunable),
+        C::Parameter | C::CalculatedParameter | C::StructuralParameter => {
+            matches!(variability, V::Fixed | V::Tunable)
+        }
         C::Input => matches!(variability, V::Discrete | V::Continuous),
         C::Output => matches!(variability, V::Constant | V::Discrete | V::Continuous),
         C::Local => true,
@@ -75,6 +82,7 @@ fn table(v: &Variable, findings: &mut Findings) -> bool {
     }
     let Some(initial) = v.declared_initial else { return true };
     let allowed: &[Initial] = match default_initial(causality, variability) {
+        None if fmi == Fmi::Three && causality == C::Input => &[Initial::Exact],
         None => &[],
         Some(Initial::Exact) => &[Initial::Exact],
         Some(_) if matches!(variability, V::Fixed | V::Tunable) => &[Initial::Calculated, Initial::Approx],
@@ -125,7 +133,7 @@ fn ranges(d: &Description, v: &Variable, findings: &mut Findings) {
     }
     let start = match v.start {
         Some(Value::Real(x)) => x,
-        Some(Value::Integer(i)) => f64::from(i),
+        Some(Value::Integer(i)) => i as f64,
         _ => return,
     };
     let low = r.min.is_some_and(|min| start < min);
@@ -134,10 +142,7 @@ fn ranges(d: &Description, v: &Variable, findings: &mut Findings) {
         let end = |x: Option<f64>| x.map_or("open".to_owned(), |x| x.to_string());
         let message = format!("variable \"{}\": start={start} outside min={}, max={}", v.name, end(r.min), end(r.max));
         findings.at("start-range", v.attributes.position, message);
-    } else if v.base() == BaseType::Enumeration
-        && !r.items.is_empty()
-        && !r.items.iter().any(|i| f64::from(i.1) == start)
-    {
+    } else if v.base() == BaseType::Enumeration && !r.items.is_empty() && !r.items.iter().any(|i| i.1 as f64 == start) {
         let message = format!("variable \"{}\": start={start} is no item of its enumeration", v.name);
         findings.at("start-range", v.attributes.position, message);
     }

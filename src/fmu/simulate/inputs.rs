@@ -57,7 +57,8 @@ impl Inputs {
         let mut inputs = Self { dt: None, time, signals: Vec::new(), notes: Vec::new() };
         let mut left = Vec::new();
         for (index, header) in table.headers.iter().enumerate().filter(|(i, _)| *i != time_at) {
-            let input = description.variables.iter().find(|v| v.name == header.name && v.causality == Causality::Input);
+            let named = |name: &str| name == header.name || column_name(name) == header.name;
+            let input = description.variables.iter().find(|v| v.causality == Causality::Input && named(&v.name));
             let Some(input) = input.filter(|v| v.base() != BaseType::String) else {
                 left.push(header.name.as_str());
                 continue;
@@ -65,7 +66,7 @@ impl Inputs {
             let own = description.resolved(input).unit;
             let scale = factor(table, &header.name, header.unit.as_deref(), own.as_deref())?;
             let values = table.column(index)?.iter().map(|v| v * scale).collect();
-            inputs.signals.push((header.name.clone(), values));
+            inputs.signals.push((input.name.clone(), values));
         }
         if inputs.signals.is_empty() {
             let names =
@@ -108,6 +109,11 @@ impl Inputs {
         let slope = if hold == Hold::Linear { (value(time + step) - now) / step } else { 0.0 };
         (now, slope)
     }
+}
+
+/// A variable's name as a column has it: indices in parentheses, because brackets hold the unit.
+pub(super) fn column_name(name: &str) -> String {
+    name.replace('[', "(").replace(']', ")")
 }
 
 /// Factor from a column's unit to the FMU's.

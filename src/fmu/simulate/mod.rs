@@ -1,4 +1,4 @@
-//! The harness: any FMI 2.0 co-simulation FMU driven by sampled inputs, its outputs recorded.
+//! The harness: any co-simulation FMU of FMI 2.0 or 3.0 driven by sampled inputs, its outputs recorded.
 //!
 //! Row `k` of the record is the communication point `start + k*step`, after the inputs of that instant have been set:
 //! input and acceleration of a row then belong together. ([`Rows::StepEnd`] records before, as other importers do.)
@@ -6,12 +6,12 @@
 mod inputs;
 mod values;
 
-use super::description::{BaseType, Causality, Description};
-use super::host::{Fmu, HostError, Instance, InstanceOptions, Status};
+use super::description::{BaseType, Causality, Description, Fmi};
+use super::host::{Fmu, HostError, Instance, InstanceOptions, Layout, Status, needs_event_mode};
 use crate::trace::{Hold, Motion, Signal, Trace, TraceError};
 
 pub use inputs::Inputs;
-use values::{Ports, apply};
+use values::{Ports, Which, apply};
 pub use values::{Setting, parse_setting};
 
 /// Most rows that a run records.
@@ -120,6 +120,14 @@ pub enum SimulateError {
         /// Its last log messages.
         log: Vec<String>,
     },
+    /// Event mode or early return with an FMU that has none.
+    #[error("{option}: {why}")]
+    NotOffered {
+        /// What was asked for.
+        option: &'static str,
+        /// Why it cannot be.
+        why: &'static str,
+    },
     /// What became of the child process that ran the FMU.
     #[error("{0}")]
     Child(String),
@@ -157,6 +165,10 @@ pub struct Options {
     pub outputs: Vec<String>,
     /// What a row holds.
     pub rows: Rows,
+    /// FMI 3.0: handle events in event mode; always with an FMU that has clocks.
+    pub event_mode: bool,
+    /// FMI 3.0: let steps return early, and go on from there to the communication point.
+    pub early_return: bool,
 }
 
 /// How [`Hold`], which knows of no files, is written down.
@@ -234,9 +246,10 @@ impl Record {
     pub fn table(&self) -> Vec<(String, &[f64])> {
         let mut table = vec![("time [s]".to_owned(), self.time.as_slice())];
         for c in &self.columns {
+            let name = inputs::column_name(&c.name);
             let header = match &c.unit {
-                Some(unit) => format!("{} [{unit}]", c.name),
-                None => c.name.clone(),
+                Some(unit) => format!("{name} [{unit}]"),
+                None => name,
             };
             table.push((header, &c.values));
         }
@@ -256,7 +269,9 @@ impl Experiment {
         let default = description.default_experiment.unwrap_or_default();
         let start = options.start.or(inputs.time.first().copied()).or(default.start_time).unwrap_or(0.0);
         let stop = options.stop.or(inputs.time.last().copied()).or(default.stop_time).ok_or(SimulateError::NoStop)?;
-        let step = options.step.or(inputs.dt).or(default.step_size.filter(|_| inputs.time.is_empty()));
+        // An FMU of FMI 3.0 may say by which step it goes on inside.
+        let own = || default.step_size.or(description.co_simulation.as_ref().and_then(|i| i.fixed_step));
+        let step = options.step.or(inputs.dt).or_else(|| own().filter(|_| inputs.time.is_empty()));
         let step = step.ok_or(SimulateError::NoStep)?;
         let fail = |why| Err(SimulateError::Experiment { start, stop, step, why });
         if !(start.is_finite() && stop.is_finite() && step.is_finite()) {
@@ -284,6 +299,17 @@ impl Experiment {
 /// See [`SimulateError`].
 pub(crate) fn check(description: &Description, inputs: &Inputs, options: &Options) -> Result<(), SimulateError> {
     Experiment::new(description, inputs, options)?;
+    let interface = description.co_simulation.as_ref();
+    let offers = |flag: bool| description.fmi == Fmi::Three && flag;
+    if options.event_mode && !offers(interface.is_some_and(|i| i.has_event_mode)) {
+        return Err(SimulateError::NotOffered {
+            option: "event mode",
+            why: "the FMU has none (hasEventMode, FMI 3.0)",
+        });
+    }
+    if options.early_return && !offers(true) {
+        return Err(SimulateError::NotOffered { option: "early return", why: "only FMUs of FMI 3.0 have it" });
+    }
     Ports::find(description, inputs, &options.outputs).map(|_| ())
 }
 
@@ -298,6 +324,9 @@ pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Record,
         name: fmu.description.model_name.clone(),
         guid: fmu.description.guid.clone(),
         resources: fmu.resources(),
+        layout: Layout::of(&fmu.description),
+        event_mode: options.event_mode || needs_event_mode(&fmu.description),
+        early_return: options.early_return,
         ..InstanceOptions::default()
     };
     let mut instance = fmu.instantiate_with(&instance_options)?;
@@ -328,21 +357,31 @@ fn run(
         apply(instance, &fmu.description, setting)?;
     }
     let (start, step, hold) = (experiment.start, experiment.step, options.hold);
+    let event_mode = options.event_mode || needs_event_mode(&fmu.description);
+    let which = if event_mode { Which::Continuous } else { Which::All };
     let interpolates = fmu.interface().can_interpolate_inputs && hold == Hold::Linear;
     instance.setup_experiment(None, start, Some(experiment.time(experiment.count)))?;
     instance.enter_initialization()?;
-    ports.set(instance, inputs, start, step, hold, false)?;
+    ports.set(instance, inputs, start, step, hold, false, Which::All)?;
     instance.exit_initialization()?;
     let mut record = ports.record(fmu, inputs, experiment.count + 1);
     record.step = step;
     record.notes.clone_from(&inputs.notes);
+    let mut discrete = ports.discrete(inputs, start, step, hold);
     for k in 0..=experiment.count {
         let time = experiment.time(k);
         *now = time;
         if options.rows == Rows::StepEnd {
             ports.read(instance, &mut record)?;
         }
-        ports.set(instance, inputs, time, step, hold, interpolates && k < experiment.count)?;
+        if event_mode {
+            let now = ports.discrete(inputs, time, step, hold);
+            if now != discrete {
+                instance.handle_events(|i| ports.set(i, inputs, time, step, hold, false, Which::All))?;
+                discrete = now;
+            }
+        }
+        ports.set(instance, inputs, time, step, hold, interpolates && k < experiment.count, which)?;
         if options.rows == Rows::InputsSet {
             ports.read(instance, &mut record)?;
         }
@@ -351,13 +390,20 @@ fn run(
         if k == experiment.count {
             break;
         }
-        match instance.do_step_status(time, step, true)? {
+        let status = match fmu.description.fmi {
+            Fmi::Two => instance.do_step_status(time, step, true)?,
+            Fmi::Three => step3(instance, time, step, event_mode)?,
+        };
+        match status {
             status if status.is_ok() => {}
             Status::Discard if instance.terminated().unwrap_or(false) => {
                 record.notes.push(format!("the FMU ended the simulation of itself after {time} s"));
                 return Ok(record);
             }
-            status => return Err(HostError::Status { function: "fmi2DoStep", status }.into()),
+            status => {
+                let function = if fmu.description.fmi == Fmi::Three { "fmi3DoStep" } else { "fmi2DoStep" };
+                return Err(HostError::Status { function, status }.into());
+            }
         }
     }
     // What has been recorded stands, whatever the FMU says at the end.
@@ -365,6 +411,34 @@ fn run(
         record.notes.push(format!("after the last step {error}"));
     }
     Ok(record)
+}
+
+/// Most parts of a step that returns early, before it is taken for one that makes no progress.
+const MOST_PARTS: usize = 100_000;
+
+/// A step of FMI 3.0 to the next communication point: events are handled where event mode is used, and a step that
+/// returned early is gone on with (section 4.2.1).
+fn step3(instance: &mut Instance, time: f64, step: f64, event_mode: bool) -> Result<Status, HostError> {
+    let (mut from, end) = (time, time + step);
+    for _ in 0..MOST_PARTS {
+        let status = instance.do_step_status(from, if from == time { step } else { end - from }, true)?;
+        if !status.is_ok() {
+            return Ok(status);
+        }
+        let told = instance.told();
+        if told.event && event_mode {
+            instance.handle_events(|_| Ok(()))?;
+            if instance.told().terminate {
+                return Ok(Status::Discard);
+            }
+        }
+        // What is left below rounding is nothing.
+        if !told.early || told.time.is_nan() || told.time >= end - 1e-9 * step {
+            return Ok(status);
+        }
+        from = told.time;
+    }
+    Err(HostError::Events(MOST_PARTS))
 }
 
 /// Whether a variable's values can be recorded as numbers.

@@ -1,7 +1,7 @@
 //! Values in and out of an instance by name, whatever their types.
 
 use super::{Column, Inputs, Record, SimulateError, is_output, numeric};
-use crate::fmu::description::{BaseType, Causality, Description, Variability, Variable};
+use crate::fmu::description::{BaseType, Causality, Description, Kind, Variability, Variable};
 use crate::fmu::host::{Fmu, HostError, Instance};
 use crate::trace::{Hold, nearest};
 
@@ -67,8 +67,10 @@ pub(super) fn apply(
             instance.set_real(&reference, &[value])
         }
         BaseType::Integer => {
-            let value: i32 = text.parse().map_err(|_| fail("it must be a whole number".to_owned()))?;
-            within(f64::from(value))?;
+            let unsigned = || text.parse::<u64>().map(|x| x as i64);
+            let value: i64 =
+                text.parse().or_else(|_| unsigned()).map_err(|_| fail("it must be a whole number".to_owned()))?;
+            within(whole(v, value))?;
             instance.set_integer(&reference, &[value])
         }
         BaseType::Enumeration => {
@@ -94,10 +96,32 @@ pub(super) fn apply(
     })
 }
 
+/// A whole number as it is meant: of 64 bits without a sign, it comes by its bits.
+fn whole(v: &Variable, value: i64) -> f64 {
+    number(v.cell.is_some_and(|c| c.kind == Kind::UInt64), value)
+}
+
+fn number(unsigned: bool, value: i64) -> f64 {
+    if unsigned { value as u64 as f64 } else { value as f64 }
+}
+
 /// One of the FMU's variables that a run touches.
 struct Port {
     reference: u32,
     base: BaseType,
+    /// Of 64 bits without a sign.
+    unsigned: bool,
+    /// Changes at events only.
+    discrete: bool,
+}
+
+/// Which inputs are set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Which {
+    /// All of them.
+    All,
+    /// Those that are not discrete, which are set in event mode.
+    Continuous,
 }
 
 /// The inputs and outputs of a run.
@@ -111,7 +135,12 @@ pub(super) struct Ports {
 
 impl Ports {
     pub fn find(description: &Description, inputs: &Inputs, outputs: &[String]) -> Result<Self, SimulateError> {
-        let port = |v: &Variable| Port { reference: v.value_reference, base: v.base() };
+        let port = |v: &Variable| Port {
+            reference: v.value_reference,
+            base: v.base(),
+            unsigned: v.cell.is_some_and(|c| c.kind == Kind::UInt64),
+            discrete: v.variability != Variability::Continuous,
+        };
         let mut found = Vec::new();
         for (name, _) in &inputs.signals {
             let is_input = |v: &Variable| v.causality == Causality::Input && numeric(v.base());
@@ -162,14 +191,18 @@ impl Ports {
         step: f64,
         hold: Hold,
         slopes: bool,
+        which: Which,
     ) -> Result<(), HostError> {
         for (index, port) in self.inputs.iter().enumerate() {
+            if which == Which::Continuous && port.discrete {
+                continue;
+            }
             let (value, slope) = inputs.at(index, time, step, hold);
             let reference = [port.reference];
             match port.base {
                 BaseType::Real => instance.set_real(&reference, &[value])?,
                 BaseType::Integer | BaseType::Enumeration => {
-                    instance.set_integer(&reference, &[value.round() as i32])?
+                    instance.set_integer(&reference, &[value.round() as i64])?
                 }
                 BaseType::Boolean => instance.set_boolean(&reference, &[value != 0.0])?,
                 // Left out by `find`.
@@ -180,6 +213,12 @@ impl Ports {
             }
         }
         Ok(())
+    }
+
+    /// The values of the discrete inputs at `time`.
+    pub fn discrete(&self, inputs: &Inputs, time: f64, step: f64, hold: Hold) -> Vec<f64> {
+        let discrete = self.inputs.iter().enumerate().filter(|(_, port)| port.discrete);
+        discrete.map(|(index, _)| inputs.at(index, time, step, hold).0).collect()
     }
 
     /// Writes the inputs of `time` into the record.
@@ -205,7 +244,9 @@ impl Ports {
             let reference = [port.reference];
             column.values.push(match port.base {
                 BaseType::Real => instance.get_real(&reference)?[0],
-                BaseType::Integer | BaseType::Enumeration => f64::from(instance.get_integer(&reference)?[0]),
+                BaseType::Integer | BaseType::Enumeration => {
+                    number(port.unsigned, instance.get_integer(&reference)?[0])
+                }
                 BaseType::Boolean => f64::from(u8::from(instance.get_boolean(&reference)?[0])),
                 // Left out by `find`.
                 BaseType::String => f64::NAN,

@@ -7,12 +7,12 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::super::behaviour::probe::Learned;
-use super::super::description::Description;
+use super::super::description::{Description, Fmi};
 use super::super::host;
 use super::super::isolation::{
     self, Answer, Bounds, Ended, Fence, Job, Outcome, Place, Strength, Task, sandbox, temporary,
 };
-use super::super::rules::{self, Finding, RULES, Rule, Verdict};
+use super::super::rules::{self, Finding, Rule, Verdict};
 use super::{Options, ValidationError};
 
 /// Rules that must pass before the others make sense, in order.
@@ -47,6 +47,7 @@ pub(super) struct Bench<'a> {
     scratch: tempfile::TempDir,
     options: &'a Options,
     progress: &'a (dyn Fn(&str, usize) + Sync),
+    fmi: Fmi,
     total: usize,
     /// Whether the FMU says that it needs its tool to run.
     needs_tool: bool,
@@ -65,14 +66,15 @@ impl<'a> Bench<'a> {
         progress: &'a (dyn Fn(&str, usize) + Sync),
     ) -> Result<Self, ValidationError> {
         let interface = description.co_simulation.as_ref().expect("`prepare` lets co-simulation through alone");
-        let binary_path = host::binary_file(folder, interface).map_err(io::Error::other)?;
+        let binary_path = host::binary_file(folder, description.fmi, interface).map_err(io::Error::other)?;
         Ok(Self {
             folder,
             binary_path,
             scratch: temporary::folder()?,
             options,
             progress,
-            total: RULES.iter().filter(|r| !r.check.is_static()).count(),
+            fmi: description.fmi,
+            total: rules::of(description.fmi).filter(|r| !r.check.is_static()).count(),
             needs_tool: interface.needs_execution_tool,
             begin: Instant::now(),
             longest: Mutex::new((Duration::ZERO, false)),
@@ -113,8 +115,7 @@ impl<'a> Bench<'a> {
             }
             tested.push(result);
         }
-        let rest: Vec<&'static Rule> = RULES
-            .iter()
+        let rest: Vec<&'static Rule> = rules::of(self.fmi)
             .filter(|r| !r.check.is_static() && !GATES.contains(&r.id))
             .filter(|r| self.options.wants(r))
             .collect();

@@ -7,9 +7,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::description::Description;
+use super::description::{Description, Fmi};
 use super::host;
-use super::rules::{self, Check, RULES, Report, Rule, Verdict};
+use super::rules::{self, Check, Report, Rule, Verdict, words};
 use bench::Bench;
 
 /// What to validate and how.
@@ -47,7 +47,7 @@ pub enum ValidationError {
     #[error("there is no rule {0}; `eixo validate --rules` lists them")]
     NoRule(String),
     /// Another version of FMI.
-    #[error("{}: this FMU is of FMI {version}, and the rules are those of FMI 2.0: nothing was tested", file.display())]
+    #[error("{}: this FMU is of FMI {version}, and the rules are those of FMI 2.0 and 3.0: nothing was tested", file.display())]
     Version {
         /// The file.
         file: PathBuf,
@@ -101,7 +101,8 @@ pub fn validate(
     }
     let mut verdicts: HashMap<&str, Verdict> = HashMap::new();
     let mut remarks = Vec::new();
-    for rule in RULES.iter().filter(|r| r.check.is_static()) {
+    let fmi = result.fmi;
+    for rule in rules::of(fmi).filter(|r| r.check.is_static()) {
         let untested = result.untested.iter().find(|(id, _)| *id == rule.id);
         let verdict = match untested {
             _ if result.findings.has(rule.id) => Verdict::Failed,
@@ -120,39 +121,59 @@ pub fn validate(
                 findings.extend(found);
             }
             remarks.extend(bench.gap().map(str::to_owned));
+            remarks.extend(untested(&description));
             if options.sandbox && bench::NEEDY.iter().any(|id| verdicts.get(id) == Some(&Verdict::Failed)) {
                 remarks.push("It failed in the sandbox; --no-sandbox, for an FMU that you trust, tells whether it does outside too.".into());
             }
         }
         Err(why) => {
+            if why.starts_with("this is a scheduled execution FMU") {
+                remarks.push(
+                    "This is a scheduled execution FMU: its behaviour was not tested, only its archive and XML.".into(),
+                );
+            }
             if why.starts_with("this is a model exchange FMU") {
                 remarks.push(
                     "This is a model exchange FMU: its behaviour was not tested, only its archive and XML.".into(),
                 );
             }
-            for rule in RULES.iter().filter(|r| !r.check.is_static()) {
+            for rule in rules::of(fmi).filter(|r| !r.check.is_static()) {
                 verdicts.insert(rule.id, Verdict::NotTested(why.clone()));
             }
         }
     }
-    let rules: Vec<_> = RULES
-        .iter()
+    let rules: Vec<_> = rules::of(fmi)
         .map(|rule| {
             let verdict = verdicts.remove(rule.id).unwrap_or(Verdict::Skipped);
             (rule, if options.wants(rule) { verdict } else { Verdict::Skipped })
         })
         .collect();
     findings.retain(|f| rules::rule(&f.rule).is_some_and(|r| options.wants(r)));
-    findings.sort_by_key(|f| RULES.iter().position(|r| r.id == f.rule));
+    findings.sort_by_key(|f| rules::of(fmi).position(|r| r.id == f.rule));
+    for finding in findings.iter_mut().filter(|_| fmi == Fmi::Three) {
+        finding.message = words::in_three(&finding.message);
+        finding.advice = finding.advice.as_deref().map(words::in_three);
+    }
     Ok(Report {
         file: path.display().to_string(),
         model,
+        fmi,
         rules,
         findings,
         remarks,
         source: result.source,
         static_only: options.static_only,
     })
+}
+
+/// What an FMU of FMI 3.0 declares to offer, and no rule tests.
+fn untested(d: &Description) -> Option<String> {
+    let mut what: Vec<String> =
+        d.co_simulation.iter().flat_map(|i| &i.untested).map(|what| (*what).to_owned()).collect();
+    if !d.clocks.is_empty() {
+        what.push("clocks and the variables that belong to them, beyond their declaration (2.2.8)".into());
+    }
+    (!what.is_empty()).then(|| format!("Offered by the FMU and not tested: {}.", what.join(", ")))
 }
 
 /// Extracts the FMU for the behavioural rules, or says why they are not tested.
@@ -162,11 +183,12 @@ fn prepare(result: &mut rules::Static, options: &Options) -> Result<(Description
         return Err("only the archive and the XML were to be tested".into());
     }
     let Some(interface) = &description.co_simulation else {
-        return Err("this is a model exchange FMU".into());
+        let kind = if description.model_exchange.is_some() { "model exchange" } else { "scheduled execution" };
+        return Err(format!("this is a {kind} FMU"));
     };
     let archive = result.archive.as_mut().ok_or("the archive must be safe to extract first")?;
     let folder = archive.extract().map_err(|error| error.to_string())?;
-    host::binary_file(folder.path(), interface).map_err(|error| error.to_string())?;
+    host::binary_file(folder.path(), description.fmi, interface).map_err(|error| error.to_string())?;
     Ok((description, folder))
 }
 

@@ -1,0 +1,165 @@
+//! The words of FMI 3.0 for what the list of rules and the rules' messages say in those of FMI 2.0.
+
+use super::Rule;
+use crate::fmu::description::Fmi;
+
+/// Functions and attributes by another name, longest first where one begins with another.
+const NAMES: [(&str, &str); 27] = [
+    ("fmi2GetRealInputDerivatives", "fmi3GetOutputDerivatives"),
+    ("fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives"),
+    ("fmi2SetupExperiment", "fmi3EnterInitializationMode"),
+    ("fmi2GetRealStatus", "fmi3DoStep"),
+    ("fmi2GetReal", "fmi3GetFloat64"),
+    ("fmi2SetReal", "fmi3SetFloat64"),
+    ("fmi2GetInteger", "fmi3GetInt32"),
+    ("fmi2SetInteger", "fmi3SetInt32"),
+    ("fmi2GetFMUstate", "fmi3GetFMUState"),
+    ("fmi2SetFMUstate", "fmi3SetFMUState"),
+    ("fmi2FreeFMUstate", "fmi3FreeFMUState"),
+    ("fmi2SerializedFMUstateSize", "fmi3SerializedFMUStateSize"),
+    ("fmi2SerializeFMUstate", "fmi3SerializeFMUState"),
+    ("fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"),
+    ("fmi2Instantiate", "fmi3InstantiateCoSimulation"),
+    ("fmi2SetXXX", "fmi3Set{VariableType}"),
+    ("fmi2GetXXX", "fmi3Get{VariableType}"),
+    ("canGetAndSetFMUstate", "canGetAndSetFMUState"),
+    ("canSerializeFMUstate", "canSerializeFMUState"),
+    ("providesDirectionalDerivative is", "providesDirectionalDerivatives is"),
+    ("InitialUnknowns", "InitialUnknown"),
+    ("the component", "the instance"),
+    ("The component", "The instance"),
+    ("fmi2_", "fmi3_"),
+    ("a Real ", "a floating-point number "),
+    ("Real output", "floating-point output"),
+    ("fmi2", "fmi3"),
+];
+
+/// A message in the words of FMI 3.0.
+#[must_use]
+pub fn in_three(text: &str) -> String {
+    NAMES.iter().fold(text.to_owned(), |text, (two, three)| text.replace(two, three))
+}
+
+/// Rules that hold something else in FMI 3.0: title and advice; empty where the words of 2.0 do.
+const OWN: [(&str, &str, &str); 27] = [
+    ("fmi-version", "fmiVersion is 3.0", "Write fmiVersion=\"3.0\", for 3.0.1 and later too."),
+    (
+        "interface-missing",
+        "There is a ModelExchange, CoSimulation or ScheduledExecution element",
+        "Put one of them first in the file.",
+    ),
+    ("schema-attribute", "", "Correct the spelling, or move tool data to Annotations."),
+    (
+        "guid",
+        "The instantiationToken is not empty",
+        "Generate a token (or a hash of the file) at export and compile it into the binary.",
+    ),
+    ("type-undeclared", "", "Add the type to TypeDefinitions."),
+    ("type-mismatch", "", "Let a Float64 have a Float64Type, and so on."),
+    (
+        "variability-type",
+        "Only a floating-point number is continuous",
+        "Declare variability=\"discrete\", the default (or fixed, tunable, constant).",
+    ),
+    ("causality-variability", "", "See the table of combinations in section 2.4.7.4."),
+    ("initial", "", "Leave initial out to get the default, or see the table in section 2.4.7.4."),
+    (
+        "independent-variable",
+        "Exactly one variable is independent, and it is a floating-point number",
+        "Keep the one that stands for time, or add it.",
+    ),
+    (
+        "derivative-index",
+        "derivative names another continuous floating-point variable",
+        "Give the valueReference of the state.",
+    ),
+    (
+        "structure-index",
+        "Value references of the model structure are those of variables",
+        "Entries of the model structure name variables by valueReference.",
+    ),
+    (
+        "structure-outputs",
+        "There is an Output for each variable of causality output, and for no other",
+        "Add or remove the Output.",
+    ),
+    (
+        "structure-derivatives",
+        "ContinuousStateDerivative lists derivatives",
+        "Add the derivative attribute to the variable, or remove the entry.",
+    ),
+    (
+        "dependencies-index",
+        "Dependencies are value references of variables, each once",
+        "Name variables by valueReference.",
+    ),
+    ("dependencies-kind", "", "Give as many kinds as dependencies."),
+    ("binary-missing", "", "Add binaries/<platform tuple>/<modelIdentifier>.<so|dll|dylib>, or sources/."),
+    ("binary-folder", "", "Use platform tuples: x86_64-windows, x86_64-linux, aarch64-darwin and so on."),
+    ("version", "fmi3GetVersion gives \"3.0\"", "Return fmi3Version of the standard header, for 3.0.x too."),
+    ("step-status", "fmi3DoStep returns a status of the standard", "Return fmi3OK, Warning, Discard, Error or Fatal."),
+    (
+        "guid-check",
+        "A wrong instantiationToken is refused",
+        "Compare the token in fmi3InstantiateCoSimulation and return null; it guards against a binary and an XML of different versions.",
+    ),
+    (
+        "instantiate",
+        "",
+        "See the FMU's message; the token compiled in must be the instantiationToken of modelDescription.xml.",
+    ),
+    ("resources-path", "", "resourcePath is a path, not a URI: open files below it as it stands, in UTF-8."),
+    ("start-time", "", "Take startTime of fmi3EnterInitializationMode for the initial time."),
+    ("boolean-values", "Booleans are fmi3False (0) or fmi3True (1)", ""),
+    ("side-directory", "", "Open files by the path of resourcePath instead."),
+    ("output-derivatives", "", "Implement fmi3GetOutputDerivatives or set maxOutputDerivativeOrder to 0."),
+];
+
+fn own(rule: &Rule) -> Option<&'static (&'static str, &'static str, &'static str)> {
+    OWN.iter().find(|(id, ..)| *id == rule.id)
+}
+
+pub(super) fn title(rule: &Rule, fmi: Fmi) -> String {
+    match (fmi, own(rule)) {
+        (Fmi::Two, _) => rule.title.to_owned(),
+        (Fmi::Three, Some((_, title, _))) if !title.is_empty() => (*title).to_owned(),
+        (Fmi::Three, _) => in_three(rule.title),
+    }
+}
+
+pub(super) fn advice(rule: &Rule, fmi: Fmi) -> String {
+    match (fmi, own(rule)) {
+        (Fmi::Two, _) => rule.advice.to_owned(),
+        (Fmi::Three, Some((.., advice))) if !advice.is_empty() => (*advice).to_owned(),
+        (Fmi::Three, _) => in_three(rule.advice),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_entry_is_of_a_rule_of_fmi_3_and_no_rule_of_it_speaks_of_fmi_2() {
+        for (id, ..) in OWN {
+            let rule = super::super::rule(id).unwrap();
+            assert!(rule.section(Fmi::Three).is_some(), "{id}");
+        }
+        for rule in super::super::of(Fmi::Three) {
+            let text = format!("{} {}", rule.title(Fmi::Three), rule.advice(Fmi::Three));
+            for old in
+                ["fmi2", "GUID", "guid", "ScalarVariable", "SimpleType", "fmuResourceLocation", "2.2.", "URI (RFC"]
+            {
+                assert!(!text.contains(old), "{}: {text}", rule.id);
+            }
+        }
+    }
+
+    #[test]
+    fn every_section_is_a_number() {
+        for rule in super::super::RULES {
+            let sound = |s: &str| s == "-" || s.split('.').all(|n| n.parse::<u32>().is_ok());
+            assert!(rule.sections.iter().all(|s| sound(s)) && rule.sections != ["-", "-"], "{}", rule.id);
+        }
+    }
+}
