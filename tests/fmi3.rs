@@ -242,7 +242,8 @@ print(len(result), result['theta2'][-1])
         ["--set", "T=0.02", "--start", "0", "--stop", "0.1", "--step", "1e-3", "--outputs", "theta2", "--step-end"];
     eixo(&[&["simulate", &three, "-o", ours.to_str().unwrap()][..], &own[..]].concat());
     let (_, rows) = table(&ours);
-    assert_eq!(rows.last().unwrap()[1], theirs);
+    // FMPy adds its steps up: the lengths differ in the last bit.
+    assert!((rows.last().unwrap()[1] - theirs).abs() < 1e-12 * theirs.abs(), "{rows:?} {theirs}");
 }
 
 #[test]

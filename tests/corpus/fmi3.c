@@ -166,7 +166,7 @@ EXPORT Status fmi3DoStep(void *c, double point, double step, bool no_set_prior, 
     double span = step, mark = 0.0525;
     bool cut = t && t->early_allowed && point < mark - 1e-9 && point + step > mark + 1e-9;
 #if DEFECT3_EARLY_FORBIDDEN
-    cut = t && point > 0.1 && point < 0.105;
+    cut = t && point > 0.095 && point < 0.105;
 #endif
     if (cut) span = point < mark ? mark - point : 0.5 * step;
     Status status = fmi2DoStep(TWO(c), point, span, no_set_prior);
@@ -178,7 +178,7 @@ EXPORT Status fmi3DoStep(void *c, double point, double step, bool no_set_prior, 
     if (cut) *last = point - 1;
 #endif
 #if DEFECT3_LAST_TIME
-    *last = 0;
+    if (!cut) *last = 0;
 #endif
     return status;
 }
@@ -318,7 +318,6 @@ EXPORT Status fmi3SetString(void *c, const uint32_t r[], size_t count, const cha
     return fmi2SetString(TWO(c), own, count, value);
 }
 
-#if !DEFECT_SYMBOL_OPTIONAL
 EXPORT Status fmi3GetBinary(void *c, const uint32_t r[], size_t count, size_t sizes[], const uint8_t *value[],
                             size_t values) {
     static const uint8_t bytes[] = {0xE1, 0x00, 0x0F};
@@ -331,7 +330,6 @@ EXPORT Status fmi3GetBinary(void *c, const uint32_t r[], size_t count, size_t si
     }
     return OK;
 }
-#endif
 
 /* Types and functions of which there is nothing. */
 #define NOTHING(name, ...)                                                                                               \
@@ -351,7 +349,9 @@ NOTHING(fmi3SetUInt16, const uint16_t value[], size_t values)
 NOTHING(fmi3GetUInt32, uint32_t value[], size_t values)
 NOTHING(fmi3SetUInt32, const uint32_t value[], size_t values)
 NOTHING(fmi3SetBinary, const size_t sizes[], const uint8_t *const value[], size_t values)
+#if !DEFECT_SYMBOL_OPTIONAL
 NOTHING(fmi3GetClock, bool value[])
+#endif
 NOTHING(fmi3SetClock, const bool value[])
 NOTHING(fmi3GetIntervalDecimal, double intervals[], int qualifiers[])
 NOTHING(fmi3GetIntervalFraction, uint64_t counters[], uint64_t resolutions[], int qualifiers[])

@@ -50,6 +50,8 @@ fn running(description: &str, defect: &str, own: &str) -> Vec<u8> {
     pack(&files)
 }
 
+/// Name, rule, and the archive.
+type Made = (&'static str, &'static str, fn() -> Vec<u8>);
 /// Name, rule, and what is replaced in the description.
 type Edit = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
 
@@ -249,7 +251,7 @@ pub fn static_mutants() -> Vec<Mutant> {
     let edits = EDITS.iter().map(|&(name, rule, replacements)| {
         Mutant::new(&format!("3.0: {name}"), rule, move || pack(&files(&description(replacements))))
     });
-    let made: Vec<(&str, &'static str, fn() -> Vec<u8>)> = vec![
+    let made: Vec<Made> = vec![
         ("an identifier with a dash", "model-identifier", || {
             let mut files = files(&description(&[("modelIdentifier=\"corpus\"", "modelIdentifier=\"cor-pus\"")]));
             files[1].0 = "binaries/x86_64-linux/cor-pus.so".into();

@@ -358,11 +358,10 @@ fn run(
     }
     let (start, step, hold) = (experiment.start, experiment.step, options.hold);
     let event_mode = options.event_mode || needs_event_mode(&fmu.description);
-    let which = if event_mode { Which::Continuous } else { Which::All };
     let interpolates = fmu.interface().can_interpolate_inputs && hold == Hold::Linear;
     instance.setup_experiment(None, start, Some(experiment.time(experiment.count)))?;
     instance.enter_initialization()?;
-    ports.set(instance, inputs, start, step, hold, false, Which::All)?;
+    ports.set(instance, inputs, start, step, hold, Which::All)?;
     instance.exit_initialization()?;
     let mut record = ports.record(fmu, inputs, experiment.count + 1);
     record.step = step;
@@ -377,11 +376,16 @@ fn run(
         if event_mode {
             let now = ports.discrete(inputs, time, step, hold);
             if now != discrete {
-                instance.handle_events(|i| ports.set(i, inputs, time, step, hold, false, Which::All))?;
+                instance.handle_events(|i| ports.set(i, inputs, time, step, hold, Which::All))?;
                 discrete = now;
             }
         }
-        ports.set(instance, inputs, time, step, hold, interpolates && k < experiment.count, which)?;
+        let which = match () {
+            () if event_mode => Which::Continuous,
+            () if interpolates && k < experiment.count => Which::Sloped,
+            () => Which::All,
+        };
+        ports.set(instance, inputs, time, step, hold, which)?;
         if options.rows == Rows::InputsSet {
             ports.read(instance, &mut record)?;
         }

@@ -120,6 +120,8 @@ struct Port {
 pub(super) enum Which {
     /// All of them.
     All,
+    /// All of them, with their slopes over the step.
+    Sloped,
     /// Those that are not discrete, which are set in event mode.
     Continuous,
 }
@@ -182,7 +184,7 @@ impl Ports {
         Record { time: Vec::with_capacity(rows), columns: ins.chain(outs).collect(), ..Record::default() }
     }
 
-    /// Sets the inputs of `time`, with their slopes over the step where asked.
+    /// Sets the inputs of `time`.
     pub fn set(
         &self,
         instance: &mut Instance,
@@ -190,7 +192,6 @@ impl Ports {
         time: f64,
         step: f64,
         hold: Hold,
-        slopes: bool,
         which: Which,
     ) -> Result<(), HostError> {
         for (index, port) in self.inputs.iter().enumerate() {
@@ -208,7 +209,7 @@ impl Ports {
                 // Left out by `find`.
                 BaseType::String => {}
             }
-            if slopes && port.base == BaseType::Real {
+            if which == Which::Sloped && port.base == BaseType::Real {
                 instance.set_input_derivatives(&reference, &[1], &[slope])?;
             }
         }
