@@ -165,15 +165,15 @@ EXPORT Status fmi3DoStep(void *c, double point, double step, bool no_set_prior, 
     if (t && t->event) return ERROR;
     double span = step, mark = 0.0525;
     bool cut = t && t->early_allowed && point < mark - 1e-9 && point + step > mark + 1e-9;
-#if DEFECT3_EARLY_FORBIDDEN
-    cut = t && point > 0.095 && point < 0.105;
-#endif
-    if (cut) span = point < mark ? mark - point : 0.5 * step;
+    if (cut) span = mark - point;
     Status status = fmi2DoStep(TWO(c), point, span, no_set_prior);
     *event = cut && t->event_used;
     *terminate = false;
     *early = cut;
     *last = point + span;
+#if DEFECT3_EARLY_FORBIDDEN
+    if (point > 0.095 && point < 0.105) *early = true;
+#endif
 #if DEFECT3_EARLY_STUCK
     if (cut) *last = point - 1;
 #endif
