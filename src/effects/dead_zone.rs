@@ -50,7 +50,7 @@ impl Input for DeadZone {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.3,
         bounds: |p, x| p[0] <= 0.3 * x.torque,
         variants: &[Variant { name: "", free: &[0] }],
     };

@@ -38,7 +38,7 @@ impl Force for EndStop {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.3,
         bounds: |p, x| {
             let touched = x.beyond(p[2], p[1]);
             // Harder than the coupling; on a rigid axis, than what holds the axis in place over the record.

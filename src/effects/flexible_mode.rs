@@ -89,7 +89,7 @@ impl Force for FlexibleMode {
         memory: 3,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.3,
         bounds: is_a_mode,
         variants: VARIANTS,
     };
@@ -120,7 +120,7 @@ impl Force for MotorMode {
         memory: 3,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.3,
         bounds: is_a_mode,
         variants: VARIANTS,
     };

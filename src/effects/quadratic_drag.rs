@@ -22,7 +22,7 @@ impl Force for QuadraticDrag {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.3,
         bounds: |_, _| true,
         variants: &[Variant { name: "", free: &[0] }],
     };

@@ -52,6 +52,8 @@ pub struct Descent<'a> {
     std: Vec<f64>,
     columns: Vec<[Vec<C>; 2]>,
     iterations: usize,
+    /// Whether the last step would have taken an effect out of what physics lets it be.
+    leaves: bool,
 }
 
 impl<'a> Descent<'a> {
@@ -59,7 +61,16 @@ impl<'a> Descent<'a> {
         let free = problem.free(terms);
         let coordinates = free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
         let at = problem.along(start, problem.bandwidth(from))?;
-        Some(Self { problem, terms, coordinates, at, std: Vec::new(), columns: Vec::new(), iterations: 0 })
+        Some(Self {
+            problem,
+            terms,
+            coordinates,
+            at,
+            std: Vec::new(),
+            columns: Vec::new(),
+            iterations: 0,
+            leaves: false,
+        })
     }
 
     /// At most so many steps, each followed at the likeliest bandwidth.
@@ -135,7 +146,7 @@ impl<'a> Descent<'a> {
             normal.g[*i] += g;
         }
         let mut held: Vec<bool> = coordinates.iter().map(|c| sizes_only && c.is_shape()).collect();
-        let mut next = None;
+        let (mut next, mut leaves) = (None, false);
         for _ in 0..TRIALS {
             let (delta, errors) = normal.solve(coordinates, &x, *damping, &held)?;
             if self.std.is_empty() || *damping == 0.0 {
@@ -153,6 +164,7 @@ impl<'a> Descent<'a> {
                     *damping = (10.0 * *damping).max(1e-3);
                 }
                 for i in leaving {
+                    leaves |= matches!(coordinates[i].free, Free::Effect(..));
                     held[i] = true;
                 }
                 continue;
@@ -167,6 +179,7 @@ impl<'a> Descent<'a> {
             }
             *damping = (10.0 * *damping).max(1e-3);
         }
+        self.leaves = leaves;
         Some(next.map(|(model, rows, gain)| {
             (self.at.model, self.at.rows) = (model, rows);
             gain
@@ -205,6 +218,7 @@ impl<'a> Descent<'a> {
             bandwidth: self.at.bandwidth,
             rows: self.at.rows,
             iterations: self.iterations,
+            at_bound: self.leaves,
         }
     }
 }

@@ -56,6 +56,8 @@ pub struct Fit {
     pub log_prior: f64,
     /// Steps that the fit took.
     pub iterations: usize,
+    /// Whether an effect stands where physics would not let it go on to where the record wants it: at the limit where it is another.
+    pub at_bound: bool,
 }
 
 impl Fit {
@@ -244,6 +246,7 @@ impl Problem<'_> {
             log_prior: 0.0,
             rows: at.rows,
             iterations: 0,
+            at_bound: false,
         }
     }
 

@@ -201,7 +201,8 @@ impl Search<'_> {
     }
 
     fn best<'f>(&self, fits: &'f [Fit], independent: f64) -> Option<&'f Fit> {
-        fits.iter().max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
+        let admitted = fits.iter().filter(|f| !f.at_bound);
+        admitted.max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
     }
 
     fn at_floor(&self, fit: &Fit) -> bool {
@@ -501,7 +502,7 @@ impl Search<'_> {
         let mut all: Vec<Weighed> = pool
             .into_iter()
             .map(|fit| Weighed { evidence: self.evidence(&fit, independent), fit, probability: 0.0 })
-            .filter(|w| w.evidence.is_finite())
+            .filter(|w| w.evidence.is_finite() && !w.fit.at_bound)
             .collect();
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let key = |f: &Fit| {
