@@ -293,7 +293,9 @@ impl Search<'_> {
             added.extend(self.added(&nominal, 0));
         }
         pool.extend(added.iter().cloned());
-        let all: Vec<Fit> = added.into_iter().filter(|f| self.is_material(best, f)).collect();
+        let share = self.independent(&added);
+        let all: Vec<Fit> =
+            added.into_iter().filter(|f| self.is_material(best, f) && !is_lost(best, f, share)).collect();
         let share = self.independent(&all);
         let next = self.best(&all, share)?;
         (self.evidence(next, share) > self.evidence(best, share)).then(|| next.clone())
@@ -415,13 +417,12 @@ impl Search<'_> {
             let mut all: Vec<Fit> =
                 (0..best.terms.len()).into_par_iter().filter_map(|i| self.without(&best, i)).collect();
             pool.extend(all.iter().cloned());
+            let share = self.independent(std::slice::from_ref(&best));
             all.retain(|plain| {
-                !self.is_material(plain, &best) || is_lost(plain, &best) || {
-                    let share = self.independent(std::slice::from_ref(&best));
+                !self.is_material(plain, &best) || is_lost(plain, &best, share) || {
                     self.evidence(plain, share) >= self.evidence(&best, share)
                 }
             });
-            let share = self.independent(std::slice::from_ref(&best));
             match self.best(&all, share) {
                 Some(plain) => best = plain.clone(),
                 None => break,
@@ -553,14 +554,14 @@ fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
-/// Whether the effect that the plainer lacks is below two standard errors of the richer's fit.
-fn is_lost(plain: &Fit, rich: &Fit) -> bool {
+/// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
+fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
     rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|(effect, _)| {
         rich.coordinates
             .iter()
             .zip(&rich.std)
             .filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == *effect) && !c.is_shape())
-            .all(|(c, std)| c.value(&rich.model).abs() < 2.0 * std)
+            .all(|(c, std)| c.value(&rich.model).abs() < 2.0 * std / independent.sqrt())
     })
 }
 
