@@ -450,17 +450,20 @@ impl Search<'_> {
         let little = self.leaves_little(&chosen);
         let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
         pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
+        let decisive: Vec<f64> =
+            (0..chosen.terms.len()).map(|i| self.decisive(&chosen, i, &parameters, &pool)).collect();
         let mut ranking = self.weighed(pool, independent);
         let probabilities: Vec<f64> = chosen
             .terms
             .iter()
-            .map(|(e, _)| {
+            .zip(&decisive)
+            .map(|((e, _), decisive)| {
                 let of: f64 = ranking
                     .iter()
                     .filter(|w| w.fit.terms.iter().any(|(o, _)| o.info().family == e.info().family))
                     .map(|w| w.probability)
                     .sum();
-                of * (1.0 - 0.5 * (1.0 - explained).clamp(0.0, 1.0)) * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
+                of * decisive * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
             })
             .collect();
         let likely = |p: &f64| *p >= LIKELY;
@@ -484,6 +487,22 @@ impl Search<'_> {
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
         let shares = self.shares(&chosen);
         Decision { verdict, given, parameters, chosen, ranking, shares, probabilities, independent, confusable }
+    }
+
+    /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
+    /// without it: what no effect explains may be what explains this one, too.
+    fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
+        let others = |f: &&Fit| {
+            f.terms.len() + 1 == chosen.terms.len()
+                && f.terms.iter().all(|t| t.0 != chosen.terms[i].0 && chosen.terms.iter().any(|c| c.0 == t.0))
+        };
+        let plainer = pool.iter().chain([parameters]).filter(others);
+        let Some(plain) = plainer.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)) else { return 1.0 };
+        let share = |e: usize| {
+            let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
+            if without > with { (without - with) / without } else { 0.0 }
+        };
+        (0..self.band().equations()).map(share).fold(0.0, f64::max)
     }
 
     /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.
