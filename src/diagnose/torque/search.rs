@@ -24,6 +24,8 @@ const MATERIAL: f64 = 0.25;
 const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
 const MINOR: f64 = 0.0025;
+/// Share of the gap's variance that is too little for a further cause to be in it: a fiftieth of its torque.
+const LITTLE: f64 = 4e-4;
 /// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better.
 const NEGLIGIBLE: f64 = 2e-3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -156,7 +158,9 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     let nominal = search.problem.nominal;
     let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
     let parameters = search.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
-    search.gap = parameters.discrepancy;
+    // A model may lack more than the torque itself: what matters is measured by no more than that.
+    let over = search.band().torque_share(parameters.discrepancy, search.problem.record).max(1.0);
+    search.gap = parameters.discrepancy.map(|s| s / (over * over));
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = vec![given.clone(), parameters.clone()];
     let mut chosen = search.climb(parameters.clone(), &mut pool);
@@ -303,7 +307,7 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.
     fn leaves_little(&self, fit: &Fit) -> bool {
-        (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
+        (0..self.band().equations()).all(|i| fit.discrepancy[i] < LITTLE * self.gap[i])
     }
 
     /// Whether what a fit leaves is less than a log's torque is true to. (A coupling shows less in its twist.)
