@@ -276,11 +276,13 @@ impl Search<'_> {
 
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
     fn overlooked(&self, chosen: &Fit, pool: &[Fit]) -> Option<Fit> {
-        if self.at_floor(chosen) || self.leaves_little(chosen) || self.is_negligible(chosen) {
+        if self.at_floor(chosen) || self.is_negligible(chosen) {
             return None;
         }
         let share = self.independent(std::slice::from_ref(chosen));
-        let rivals: Vec<Fit> = pool.iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= MOST).cloned().collect();
+        // Of accounts that leave next to nothing the shorter is told.
+        let most = if self.leaves_little(chosen) { chosen.terms.len() } else { MOST };
+        let rivals: Vec<Fit> = pool.iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= most).cloned().collect();
         let best = self.best(&rivals, share)?;
         (self.evidence(best, share) > self.evidence(chosen, share) + ALIKE).then(|| best.clone())
     }
@@ -474,9 +476,11 @@ impl Search<'_> {
         if chosen.terms.len() > 1
             && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
             && !likely(&probabilities[least])
-            && let Some(plain) = self.without(&chosen, least)
+            && let Some(refitted) = self.without(&chosen, least)
         {
-            let pool = ranking.into_iter().map(|w| w.fit).collect();
+            let pool: Vec<Fit> = ranking.into_iter().map(|w| w.fit).filter(|f| !same_effects(f, &chosen)).collect();
+            let known = plainer(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
+            let plain = known.cloned().unwrap_or(refitted);
             return self.conclude(given, parameters, plain, pool);
         }
         let likely = probabilities.iter().all(likely);
@@ -496,12 +500,8 @@ impl Search<'_> {
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
     /// without it: what no effect explains may be what explains this one, too.
     fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
-        let others = |f: &&Fit| {
-            f.terms.len() + 1 == chosen.terms.len()
-                && f.terms.iter().all(|t| t.0 != chosen.terms[i].0 && chosen.terms.iter().any(|c| c.0 == t.0))
-        };
-        let plainer = pool.iter().chain([parameters]).filter(others);
-        let Some(plain) = plainer.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)) else { return 1.0 };
+        let plain = plainer(chosen, i, pool);
+        let Some(plain) = plain.or((chosen.terms.len() == 1).then_some(parameters)) else { return 1.0 };
         let share = |e: usize| {
             let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
             if without > with { (without - with) / without } else { 0.0 }
@@ -575,6 +575,19 @@ impl Search<'_> {
 /// Whether a fit has all effects of another, and more.
 fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
+}
+
+/// Whether two fits are of the same effects, in whatever forms.
+fn same_effects(a: &Fit, b: &Fit) -> bool {
+    a.terms.len() == b.terms.len() && a.terms.iter().all(|t| b.terms.iter().any(|o| o.0 == t.0))
+}
+
+/// The likeliest fit of all effects of another but one.
+fn plainer<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
+    let gone = fit.terms[i].0;
+    pool.iter()
+        .filter(|f| f.terms.len() + 1 == fit.terms.len() && is_more(fit, f) && f.terms.iter().all(|t| t.0 != gone))
+        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 /// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
