@@ -35,7 +35,7 @@ impl Force for StiffnessDrift {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 0.1,
+        odds: 0.05,
         bounds: |p, x| (p[0] * x.length).abs() <= 0.95,
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "that comes to rest", free: &[0, 1] }],
     };
@@ -69,7 +69,7 @@ impl DryFriction for FrictionDrift {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 0.2,
+        odds: 0.02,
         bounds: |p, x| p[0].abs() * x.length <= x.torque,
         variants: &[
             Variant { name: "dry", free: &[0] },

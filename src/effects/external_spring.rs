@@ -25,7 +25,7 @@ impl Force for ExternalSpring {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 0.05,
+        odds: 0.02,
         bounds: |p, x| p[0] * x.travel() <= 4.0 * x.torque,
         variants: &[Variant { name: "", free: &[0, 1] }],
     };

@@ -32,7 +32,7 @@ impl Force for Gravity {
         odds: 1.0,
         bounds: |p, x| {
             p[0].hypot(p[1]) * (0.25 * p[2] * x.travel()).min(1.0) <= x.torque
-                && p[2] * x.travel() >= 0.5
+                && p[2] * x.travel() >= 0.2
                 && p[2] * x.travel() <= 0.75 * std::f64::consts::TAU
         },
         variants: &[Variant { name: "", free: &[0, 1] }],

@@ -24,8 +24,6 @@ const MATERIAL: f64 = 0.25;
 const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
 const MINOR: f64 = 0.0025;
-/// Share of the gap's variance that is too little for a further cause to be in it: a fiftieth of its torque.
-const LITTLE: f64 = 4e-4;
 /// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better.
 const NEGLIGIBLE: f64 = 2e-3;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -309,7 +307,7 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.
     fn leaves_little(&self, fit: &Fit) -> bool {
-        (0..self.band().equations()).all(|i| fit.discrepancy[i] < LITTLE * self.gap[i])
+        (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
     }
 
     /// Whether what a fit leaves is less than a log's torque is true to. (A coupling shows less in its twist.)
