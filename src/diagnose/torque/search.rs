@@ -50,9 +50,9 @@ const EXPLAINED: f64 = 0.75;
 /// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
 /// suspect.
 const LEFT: f64 = 0.25;
-/// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: of causes told beside a remainder of a
-/// hundredth of the torque one in ten was none, beside a tenth one in four (tuning half of the second blind set).
-const DOUBT: f64 = 0.85;
+/// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
+/// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
+const DOUBT: f64 = 0.5;
 /// Probability from which an effect may be named: as likely as one of two that the record cannot tell, and a remainder beside them.
 const LIKELY: f64 = 0.35;
 /// The same where no cause is named and the residual is not white: more than a torque sensor's own error.
