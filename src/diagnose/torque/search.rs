@@ -476,7 +476,9 @@ impl Search<'_> {
             && !likely(&probabilities[least])
             && let Some(refitted) = self.without(&chosen, least)
         {
-            let pool: Vec<Fit> = ranking.into_iter().map(|w| w.fit).filter(|f| !same_effects(f, &chosen)).collect();
+            // What is named without an effect has no rival that has another such effect in it.
+            let pool: Vec<Fit> =
+                ranking.into_iter().map(|w| w.fit).filter(|f| f.terms.len() < chosen.terms.len()).collect();
             let known = plainer(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
             let plain = known.cloned().unwrap_or(refitted);
             return self.conclude(given, parameters, plain, pool);
@@ -573,11 +575,6 @@ impl Search<'_> {
 /// Whether a fit has all effects of another, and more.
 fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
-}
-
-/// Whether two fits are of the same effects, in whatever forms.
-fn same_effects(a: &Fit, b: &Fit) -> bool {
-    a.terms.len() == b.terms.len() && a.terms.iter().all(|t| b.terms.iter().any(|o| o.0 == t.0))
 }
 
 /// The likeliest fit of all effects of another but one.
