@@ -1,73 +1,7 @@
-//! Samples that a log lost: spikes of a disturbed line, and samples that repeat the one before.
-//!
-//! A position runs smoothly from sample to sample, at a blow with a kink that stays; a lost sample is one that its neighbours, which
-//! agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry 36(8), 1964).
+//! Samples that a log lost, bridged in a record.
 
 use super::record::Record;
-
-/// Neighbours on each side, pass by pass: a lost sample hides another beside it until it is bridged, and of two the nearer neighbours
-/// may be free.
-const REACHES: [usize; 4] = [6, 6, 3, 3];
-/// Error of the cubic, in rms of its residual here and about and in noise of the channel, from which a sample is lost: Gaussian noise
-/// makes one in five hundred million.
-const FAR: f64 = 6.0;
-/// Residual of the cubic over the usual one about it up to which the neighbours agree with each other.
-const AGREE: f64 = 2.5;
-/// Samples in which the residual is a usual one.
-const BLOCK: usize = 256;
-/// Share of the samples that may be lost: more are the signal.
-const MOST: f64 = 0.02;
-
-/// The cubic through a sample's neighbours: what it expects at the sample, and the rms of its residual.
-fn cubic(y: &[f64], k: usize, reach: usize) -> (f64, f64) {
-    // Even powers tell the value, odd ones belong to the residual alone.
-    let (mut s, mut s2, mut s4, mut s6) = (0.0, 0.0, 0.0, 0.0);
-    let (mut a, mut a2, mut b, mut b3) = (0.0, 0.0, 0.0, 0.0);
-    let mut squares = 0.0;
-    for j in 1..=reach {
-        let (before, after) = (y[k - j] - y[k], y[k + j] - y[k]);
-        let x = j as f64;
-        let (even, odd) = (before + after, after - before);
-        s += 2.0;
-        s2 += 2.0 * x * x;
-        s4 += 2.0 * x.powi(4);
-        s6 += 2.0 * x.powi(6);
-        a += even;
-        a2 += even * x * x;
-        b += odd * x;
-        b3 += odd * x.powi(3);
-        squares += before * before + after * after;
-    }
-    let even = s * s4 - s2 * s2;
-    let (c0, c2) = ((s4 * a - s2 * a2) / even, (s * a2 - s2 * a) / even);
-    let odd = s2 * s6 - s4 * s4;
-    let (c1, c3) = ((s6 * b - s4 * b3) / odd, (s2 * b3 - s4 * b) / odd);
-    let left = squares - c0 * a - c2 * a2 - c1 * b - c3 * b3;
-    let freedom = 2.0 * reach as f64 - 4.0;
-    (y[k] + c0, (left.max(0.0) / freedom).sqrt())
-}
-
-/// Lost samples of a position whose noise has a standard deviation of `noise`, each with what its neighbours expect.
-fn lost(y: &[f64], noise: f64, reach: usize) -> Vec<(usize, f64)> {
-    if y.len() < BLOCK {
-        return Vec::new();
-    }
-    let inside: Vec<usize> = (reach..y.len() - reach).collect();
-    let mut out = Vec::new();
-    for block in inside.chunks(BLOCK) {
-        let cubics: Vec<(f64, f64)> = block.iter().map(|k| cubic(y, *k, reach)).collect();
-        let mut residuals: Vec<f64> = cubics.iter().map(|c| c.1).collect();
-        let usual = *residuals.select_nth_unstable_by(block.len() / 2, f64::total_cmp).1;
-        for (&k, (expected, residual)) in block.iter().zip(&cubics) {
-            // A fast motion is no cubic: what it leaves now and then is measured by what it leaves as a rule.
-            let agree = *residual <= AGREE * usual.max(noise);
-            if agree && (y[k] - expected).abs() > FAR * residual.max(usual).max(noise) {
-                out.push((k, *expected));
-            }
-        }
-    }
-    out
-}
+use crate::trace::bridge;
 
 /// The record with its lost samples bridged, and how many there were.
 #[must_use]
@@ -76,17 +10,7 @@ pub fn bridged(record: &Record) -> (Record, usize) {
     let mut count = 0;
     for c in [0, 2] {
         let noise = record.noise[c];
-        let Some(y) = &mut out.channels[c] else { continue };
-        for reach in REACHES {
-            let found = lost(y, noise, reach);
-            if (count + found.len()) as f64 > MOST * y.len() as f64 {
-                break;
-            }
-            count += found.len();
-            for (k, expected) in found {
-                y[k] = expected;
-            }
-        }
+        count += out.channels[c].as_mut().map_or(0, |y| bridge(y, noise));
     }
     (out, count)
 }

@@ -31,7 +31,7 @@ use std::ops::Range;
 pub use finding::{Finding, Severity};
 
 use crate::axis::{Motion, Parameters, Structure};
-use crate::trace::{Machine, Signal, Trace};
+use crate::trace::{Machine, Signal, Trace, bridge};
 
 /// The nominal model, where one is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -197,6 +197,17 @@ pub fn examine(input: &Input<'_>) -> Examination {
         for channel in [&mut part.theta1, &mut part.omega1, &mut part.theta2, &mut part.omega2] {
             *channel = channel.filter(|v| robust::span(v) > 0.0);
         }
+        // A lost sample reads as a blow: torque and motion are compared without.
+        let mended = [("theta1", part.theta1), ("theta2", part.theta2)].map(|(name, y)| {
+            let spikes = findings.iter().any(|f| f.id == "spikes" && f.signal == name);
+            y.filter(|_| spikes).map(|y| {
+                let mut y = y.to_vec();
+                bridge(&mut y, 0.0);
+                y
+            })
+        });
+        let [one, two] = &mended;
+        let part = Input { theta1: one.as_deref().or(part.theta1), theta2: two.as_deref().or(part.theta2), ..part };
         pairs::speeds(&part, &mut findings);
         band = balance::examine(&part, &mut inertia, &mut findings);
     }
