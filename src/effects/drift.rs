@@ -69,7 +69,7 @@ impl DryFriction for FrictionDrift {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 0.02,
+        odds: 0.01,
         bounds: |p, x| p[0].abs() * x.length <= x.torque,
         variants: &[
             Variant { name: "dry", free: &[0] },

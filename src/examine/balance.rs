@@ -377,9 +377,12 @@ fn weigh(
     let turned = best(&|s| s.2, 1);
     let turned_anywhere = best(&|s| s.2, DELAYS);
     if turned.1 > CLEAR && 1.0 - turned.1 < 0.5 * (1.0 - plus.1) {
+        // A table that swings against its motor under control can pass for an axis turned round: where the torque as it is explains the
+        // most of the motion, too, that is a doubt.
+        let sure = plus.1 < CLEAR;
         findings.push(Finding::new(
             "sign",
-            Severity::Refuse,
+            if sure { Severity::Refuse } else { Severity::Warn },
             "T",
             format!(
                 "The motion follows the torque backwards: turned round, it explains {:.0} % of it, as it is {:.0} %.",
@@ -389,7 +392,9 @@ fn weigh(
             "Torque and position count in opposite directions: inertia and friction would come out negative.",
             "Give the torque, or all motion, scale = -1 in [signals] of the axis file.",
         ));
-        return None;
+        if sure {
+            return None;
+        }
     }
     // Six coefficients explain some of any torque: each half a line of a single spectrum, less of an averaged one.
     let by_chance = 3.0 / (lines.len() as f64 * s.averages);
@@ -410,7 +415,9 @@ fn weigh(
     }
     let wide = s.omega(lines[lines.len() - 1]) > 2.0 * s.omega(lines[0]);
     let clocked = wide && s.averages >= AVERAGED;
-    if clocked && plus.0.abs() >= LATE && plus.1 > CLEAR && 1.0 - plus.1 < 0.6 * (1.0 - here.1) {
+    // The best of those tried at their very end is no best.
+    let between = plus.0.abs() < DELAYS;
+    if clocked && between && plus.0.abs() >= LATE && plus.1 > CLEAR && 1.0 - plus.1 < 0.6 * (1.0 - here.1) {
         let late = f64::from(plus.0.abs()) * input.dt;
         let (ahead, behind) = (plus.0 < -AHEAD, plus.0 > BEHIND);
         findings.push(Finding::new(
@@ -430,7 +437,7 @@ fn weigh(
             "Log torque and positions in one task; a known delay of the drive belongs into [effects.delay] of the axis file.",
         ));
     }
-    let found = balance.solve(&gram, &at(if clocked { plus.0 } else { here.0 }));
+    let found = balance.solve(&gram, &at(if clocked && between { plus.0 } else { here.0 }));
     let mass = found.x[0] + if collocated { found.x[1] } else { 0.0 };
     // Shares of the torque from which the inertia shows at all, and from which it speaks of units.
     let shown = (found.inertial > 0.05 && mass > 0.0 && mass.is_finite()).then_some(mass);
