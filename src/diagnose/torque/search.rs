@@ -24,8 +24,10 @@ const MATERIAL: f64 = 0.25;
 const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
 const MINOR: f64 = 0.0025;
-/// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better.
+/// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling shows
+/// less of it in its twist.
 const NEGLIGIBLE: f64 = 2e-3;
+const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
 /// Smallest relative change of the parameters that is called one.
@@ -310,10 +312,13 @@ impl Search<'_> {
         (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
     }
 
-    /// Whether what a fit leaves is less than a log's torque is true to. (A coupling shows less in its twist.)
+    /// Whether what a fit leaves is less than a log's torque is true to.
     fn is_negligible(&self, fit: &Fit) -> bool {
-        self.problem.nominal.structure == Structure::Rigid
-            && self.band().torque_share(fit.discrepancy, self.problem.record) < NEGLIGIBLE
+        let least = match self.problem.nominal.structure {
+            Structure::Rigid => NEGLIGIBLE,
+            Structure::TwoInertia => NEGLIGIBLE_IN_TWIST,
+        };
+        self.band().torque_share(fit.discrepancy, self.problem.record) < least
     }
 
     /// The nominal parameters, where fitted ones are far from them: they may have taken what an effect does.
