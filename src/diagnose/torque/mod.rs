@@ -37,7 +37,7 @@ use fit::Problem;
 use gap::Gap;
 use likelihood::Band;
 pub use search::{Confusable, Decision, Weighed};
-use search::{Search, decide};
+use search::{LIKELY, Search, decide};
 use tracking::{Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
@@ -221,6 +221,8 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
             }
         })
         .collect();
+    // An unlikely one stands in the ranking alone.
+    causes.retain(|c| c.probability >= LIKELY);
     causes.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap));
     causes
 }

@@ -56,7 +56,7 @@ const LEFT: f64 = 0.25;
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
 /// Probability from which an effect may be named: as likely as one of two that the record cannot tell, and a remainder beside them.
-const LIKELY: f64 = 0.35;
+pub const LIKELY: f64 = 0.35;
 /// The same where no cause is named and the residual is not white: more than a torque sensor's own error.
 const UNCAUSED: f64 = 0.15;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
