@@ -6,18 +6,29 @@ use std::path::Path;
 use crate::examine::{Examination, Input, Severity, examine};
 use crate::report::Block;
 use crate::report::examine::{findings, verdict};
-use crate::trace::{Loaded, Machine, Signal, Trace, load};
+use crate::trace::{Loaded, LoadedPieces, Machine, Mapping, Signal, Trace, load};
 
-/// Which part of a record is used, and whether it is believed.
+/// Which part of a record is used, and at which steps.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
 #[command(next_help_heading = "The record")]
-pub struct Believed {
+pub struct Part {
     /// First time used, s, as the file counts it
     #[arg(long, allow_negative_numbers = true, value_name = "S", value_parser = finite)]
     pub from: Option<f64>,
     /// Last time used, s
     #[arg(long, allow_negative_numbers = true, value_name = "S", value_parser = finite)]
     pub to: Option<f64>,
+    /// Bring the record to even steps of so many seconds, whatever its time stamps; what that leaves of the band is said
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub resample: Option<f64>,
+}
+
+/// Which part of a record is used, and whether it is believed.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+#[command(next_help_heading = "The record")]
+pub struct Believed {
+    #[command(flatten)]
+    pub part: Part,
     /// Give a verdict though the examination of the record speaks against it
     #[arg(long)]
     pub trust: bool,
@@ -26,6 +37,20 @@ pub struct Believed {
 /// A finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "give a finite number".to_owned())
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|v| *v > 0.0).ok_or_else(|| "give a number above zero".to_owned())
+}
+
+impl Part {
+    /// A log's columns, with the part and the interval that were asked for.
+    pub fn of(&self, mut mapping: Mapping) -> Mapping {
+        (mapping.from, mapping.to) = (self.from.or(mapping.from), self.to.or(mapping.to));
+        mapping.resample = self.resample.or(mapping.resample);
+        mapping
+    }
 }
 
 /// A record that was examined.
@@ -78,9 +103,7 @@ impl Refused {
 /// # Errors
 /// When it cannot be read; [`Refused`] when it cannot be believed and the user does not say so.
 pub fn examined(path: &Path, machine: &Machine, known: bool, believed: Believed) -> anyhow::Result<Examined> {
-    let mut mapping = machine.signals.clone();
-    (mapping.from, mapping.to) = (believed.from.or(mapping.from), believed.to.or(mapping.to));
-    let loaded = load(path, &mapping)?;
+    let loaded = load(path, &believed.part.of(machine.signals.clone()))?;
     judged(loaded, path, machine, known, believed.trust, Extent::Whole)
 }
 
@@ -104,26 +127,12 @@ pub fn judged(
     trust: bool,
     extent: Extent,
 ) -> anyhow::Result<Examined> {
-    let Loaded { mut trace, stamps, mut warnings } = loaded;
-    // The table's position is its angle, where the lead of the screw is known.
-    if let (false, Some(x2)) = (trace.has(Signal::Theta2), trace.get(Signal::X2))
-        && machine.parameters.rho > 0.0
-    {
-        let theta2 = x2.iter().map(|x| x / machine.parameters.rho).collect();
-        trace.set(Signal::Theta2, theta2)?;
-        trace.remove(Signal::X2);
-    }
-    let examination = examine(&Input::of(&trace, stamps.as_deref()).against(machine, known));
+    let Loaded { trace, stamps, mut warnings } = loaded;
+    let Seen { trace, examination } = seen(trace, stamps.as_deref(), machine, known)?;
     if examination.refuses() && !trust {
         return Err(Refused { file: path.display().to_string(), examination }.into());
     }
-    warnings.extend(
-        examination
-            .findings
-            .iter()
-            .filter(|f| f.severity != Severity::Note)
-            .map(|f| format!("[{}] {}", f.id, f.sentence())),
-    );
+    warnings.extend(told(&examination));
     let usable = &examination.usable;
     let taken = match extent {
         Extent::Longest => examination.longest(),
@@ -133,6 +142,7 @@ pub fn judged(
     if let (Extent::Whole, Some(taken), false) = (&extent, &taken, trust) {
         idle.extend(usable.windows(2).map(|w| w[0].end - taken.start..w[1].start - taken.start));
     }
+    let mut trace = trace;
     if let Some(piece) = taken.filter(|p| p.len() < trace.len() && p.len() >= 64 && !trust) {
         warnings.push(format!(
             "{}: {} of {} samples are used, {:.6} s to {:.6} s; another part is taken with --from and --to",
@@ -145,4 +155,116 @@ pub fn judged(
         trace = trace.slice(piece);
     }
     Ok(Examined { trace, idle, warnings })
+}
+
+/// Least samples of a piece that is used beside others.
+const LEAST_PIECE: usize = 64;
+/// Most pieces of a record that are used together, the longest ones: each has an initial state of its own to be fitted.
+const MOST_PIECES: usize = 64;
+
+/// Examines every piece of a record that was read, and gives what is usable of it, to be used together.
+///
+/// # Errors
+/// [`Refused`], when the longest piece cannot be believed; a shorter one is left out with a word.
+pub fn judged_pieces(
+    loaded: LoadedPieces,
+    path: &Path,
+    machine: &Machine,
+    known: bool,
+    trust: bool,
+) -> anyhow::Result<(Vec<Trace>, Vec<String>)> {
+    let LoadedPieces { longest: Loaded { trace, stamps, mut warnings }, others } = loaded;
+    let file = path.display();
+    let first = seen(trace, stamps.as_deref(), machine, known)?;
+    if first.examination.refuses() && !trust {
+        return Err(Refused { file: file.to_string(), examination: first.examination }.into());
+    }
+    warnings.extend(told(&first.examination));
+    let mut total = 0;
+    let mut pieces = Vec::new();
+    let mut take = |seen: &Seen| {
+        let whole = std::iter::once(0..seen.trace.len()).collect();
+        let usable = if trust { &whole } else { &seen.examination.usable };
+        total += seen.trace.len();
+        let long_enough = usable.iter().filter(|r| r.len() >= LEAST_PIECE.min(seen.trace.len()));
+        pieces.extend(long_enough.map(|r| seen.trace.slice(r.clone())));
+    };
+    take(&first);
+    for (trace, stamps) in others {
+        let (start, end) = (trace.start, trace.time(trace.len() - 1));
+        let other = seen(trace, stamps.as_deref(), machine, known)?;
+        if other.examination.refuses() && !trust {
+            let refused = Refused { file: file.to_string(), examination: other.examination };
+            warnings.push(format!("{file}: the piece from {start:.6} s to {end:.6} s is left out: {}", words(&refused.examination)));
+            continue;
+        }
+        let new = other.examination.findings.iter().filter(|f| first.examination.find(f.id).is_none());
+        warnings.extend(new.filter(|f| f.severity != Severity::Note).map(|f| format!("[{}] {}", f.id, f.sentence())));
+        take(&other);
+    }
+    if pieces.is_empty() {
+        // Nothing is long enough: the estimators say what is missing.
+        pieces.push(first.trace);
+    }
+    if pieces.len() > MOST_PIECES {
+        pieces.sort_by_key(|p| std::cmp::Reverse(p.len()));
+        pieces.truncate(MOST_PIECES);
+        warnings.push(format!("{file}: only the {MOST_PIECES} longest pieces are used; take a part with --from and --to"));
+    }
+    pieces.sort_by(|a, b| a.start.total_cmp(&b.start));
+    let used: usize = pieces.iter().map(Trace::len).sum();
+    match &pieces[..] {
+        [piece] if used < total => warnings.push(format!(
+            "{file}: {used} of {total} samples are used, {:.6} s to {:.6} s; another part is taken with --from and --to",
+            piece.start,
+            piece.time(piece.len() - 1)
+        )),
+        [_] => {}
+        many => warnings.push(format!(
+            "{file}: {used} of {total} samples are used, {} pieces together ({}); no difference is taken and nothing is simulated \
+             across what lies between them",
+            many.len(),
+            spans(many)
+        )),
+    }
+    Ok((pieces, warnings))
+}
+
+/// When the pieces are, in words; of many the first ones.
+fn spans(pieces: &[Trace]) -> String {
+    const TOLD: usize = 4;
+    let mut told: Vec<String> = pieces
+        .iter()
+        .take(TOLD)
+        .map(|p| format!("{:.6} s to {:.6} s", p.start, p.time(p.len() - 1)))
+        .collect();
+    if pieces.len() > TOLD {
+        told.push("...".to_owned());
+    }
+    told.join(", ")
+}
+
+/// A piece without gaps, and what was found in it.
+struct Seen {
+    trace: Trace,
+    examination: Examination,
+}
+
+fn seen(mut trace: Trace, stamps: Option<&[f64]>, machine: &Machine, known: bool) -> anyhow::Result<Seen> {
+    // The table's position is its angle, where the lead of the screw is known.
+    if let (false, Some(x2)) = (trace.has(Signal::Theta2), trace.get(Signal::X2))
+        && machine.parameters.rho > 0.0
+    {
+        let theta2 = x2.iter().map(|x| x / machine.parameters.rho).collect();
+        trace.set(Signal::Theta2, theta2)?;
+        trace.remove(Signal::X2);
+    }
+    let examination = examine(&Input::of(&trace, stamps).against(machine, known));
+    Ok(Seen { trace, examination })
+}
+
+/// What is said of a record that is used.
+fn told(examination: &Examination) -> impl Iterator<Item = String> + '_ {
+    let material = examination.findings.iter().filter(|f| f.severity != Severity::Note);
+    material.map(|f| format!("[{}] {}", f.id, f.sentence()))
 }

@@ -12,17 +12,18 @@ use serde_json::json;
 
 use super::say::say;
 use super::FINDINGS;
-use super::examined::{Believed, Extent, Refused, judged};
+use super::examined::{Believed, Extent, Refused, judged, judged_pieces};
 use super::many::Many;
 use super::outputs;
 use crate::axis::{Scheme, Structure};
 use crate::fleet::{Found, Tracked};
 use crate::identify::result::{Estimate, Identification};
-use crate::identify::run::{Method, Request, identify};
+use crate::identify::joined::Joined;
+use crate::identify::run::{Method, Request, identify_joined};
 use crate::identify::stream;
 use crate::report::{Block, Cell, Table, terminal};
 use crate::trace::stream::Stream;
-use crate::trace::{Hold, Loaded, Machine, Mapping, Signal, Trace, load, write_text};
+use crate::trace::{Hold, Loaded, Machine, Signal, Trace, load_pieces, write_text};
 
 /// Estimators on offer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -104,7 +105,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Integration::Auto)]
     integration: Integration,
     /// Read the trace piece by piece, for one larger than memory (CSV or Parquet): LS and RLS alone
-    #[arg(long, conflicts_with_all = ["from", "to", "period", "paper", "paper_tables"])]
+    #[arg(long, conflicts_with_all = ["from", "to", "resample", "period", "paper", "paper_tables"])]
     stream: bool,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE", conflicts_with = "output")]
@@ -147,7 +148,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             format!("{:?} {:?} {:?} {}", request(&args, true), args.hold, args.believed, args.stream);
         return args.many.run("identify", &FACTS, settings, &args.traces, args.axis.as_deref(), &|item| {
             let (_, result, record) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
-            found(&result, record.as_ref())
+            found(&result, Joined::of(&record).ok().as_ref())
         });
     }
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref());
@@ -171,7 +172,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
     if let Some(path) = &args.report {
-        write_text(path, crate::report::html::page(&crate::report::identify::report(&result, record.as_ref())).as_bytes())?;
+        write_text(path, crate::report::html::page(&crate::report::identify::report(&result, Joined::of(&record).ok().as_ref())).as_bytes())?;
     }
     if let Some(path) = &args.axis_out {
         write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
@@ -185,7 +186,7 @@ fn examine(
     axis: Option<&Path>,
     args: &Args,
     progress: &mut dyn FnMut(&str),
-) -> anyhow::Result<(Machine, Identification, Option<Trace>)> {
+) -> anyhow::Result<(Machine, Identification, Vec<Trace>)> {
     let mut machine = match axis {
         Some(axis) => Machine::read(axis)?,
         None => Machine { name: "axis".to_owned(), ..Machine::default() },
@@ -211,20 +212,22 @@ fn examine(
         anyhow::ensure!(!request.methods.is_empty(), "--stream: only --method ls and rls are computed piece by piece");
         let mut result = stream::identify(&stream, &machine, &request, &file, progress).context(file)?;
         result.warnings.splice(0..0, seen.warnings);
-        return Ok((machine, result, None));
+        return Ok((machine, result, Vec::new()));
     }
-    let (from, to) = (args.believed.from, args.believed.to);
-    let loaded = load(path, &Mapping { from, to, ..machine.signals.clone() })?;
+    let loaded = load_pieces(path, &args.believed.part.of(machine.signals.clone()))?;
     // What is not there is said before what is there is judged.
+    let there = &loaded.longest.trace;
     let mut needed = vec![Signal::T, Signal::Theta1];
-    if machine.structure == Structure::TwoInertia && !loaded.trace.has(Signal::X2) {
+    if machine.structure == Structure::TwoInertia && !there.has(Signal::X2) {
         needed.push(Signal::Theta2);
     }
-    needed.into_iter().try_for_each(|s| loaded.trace.require(s).map(|_| ())).context(file.clone())?;
-    let seen = judged(loaded, path, &machine, axis.is_some(), args.believed.trust, Extent::Longest)?;
-    let mut result = identify(&seen.trace, &machine, &request(args, axis.is_some()), &file, progress).context(file)?;
-    result.warnings.splice(0..0, seen.warnings);
-    Ok((machine, result, Some(seen.trace)))
+    needed.into_iter().try_for_each(|s| there.require(s).map(|_| ())).context(file.clone())?;
+    let (pieces, warnings) = judged_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
+    let joined = Joined::of(&pieces)?;
+    let request = request(args, axis.is_some());
+    let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file)?;
+    result.warnings.splice(0..0, warnings);
+    Ok((machine, result, pieces))
 }
 
 fn request(args: &Args, reference: bool) -> Request {
@@ -244,7 +247,7 @@ fn request(args: &Args, reference: bool) -> Request {
 }
 
 /// An identification as a row of the summary: the method to trust.
-fn found(result: &Identification, record: Option<&Trace>) -> anyhow::Result<Found> {
+fn found(result: &Identification, record: Option<&Joined>) -> anyhow::Result<Found> {
     let best = result.recommended.as_ref().context("no method gives an estimate to trust")?;
     let method = &result.methods[best.method];
     let fit = method.outputs.iter().map(|o| o.fit_percent / 100.0).reduce(f64::min);
@@ -329,11 +332,12 @@ fn improved(machine: &Machine, result: &Identification) -> anyhow::Result<Machin
 fn blocks(result: &Identification) -> Vec<Block> {
     let t = &result.trace;
     let mut blocks = vec![Block::Paragraph(format!(
-        "{}: {} samples at dt = {} s ({:.4} s), hold {}{}; signals {}",
+        "{}: {} samples at dt = {} s ({:.4} s{}), hold {}{}; signals {}",
         t.file,
         t.samples,
         t.dt,
         t.duration,
+        if t.pieces > 1 { format!(" in {} pieces", t.pieces) } else { String::new() },
         t.hold,
         t.period.map_or_else(String::new, |n| format!(", periodic with {n} samples")),
         t.signals.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use super::FINDINGS;
-use super::examined::finite;
+use super::examined::Part;
 use super::outputs;
 use super::say::say;
 use crate::examine::{Input, examine};
@@ -24,12 +24,8 @@ pub struct Args {
     /// The machine: its `[signals]` map the log's columns, its parameters are what units are checked against
     #[arg(long, value_name = "FILE")]
     axis: Option<PathBuf>,
-    /// First time looked at, s, as the file counts it
-    #[arg(long, allow_negative_numbers = true, value_name = "S", value_parser = finite)]
-    from: Option<f64>,
-    /// Last time looked at, s
-    #[arg(long, allow_negative_numbers = true, value_name = "S", value_parser = finite)]
-    to: Option<f64>,
+    #[command(flatten)]
+    part: Part,
     /// Write the findings as JSON (schema eixo.examination/1)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -49,7 +45,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(axis) => Machine::read(axis)?,
         None => Machine { name: "axis".to_owned(), ..Machine::default() },
     };
-    (machine.signals.from, machine.signals.to) = (args.from, args.to);
+    machine.signals = args.part.of(machine.signals);
     let file = args.trace.display().to_string();
     let loaded = load(&args.trace, &machine.signals)?;
     let input = Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, args.axis.is_some());

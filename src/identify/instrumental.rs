@@ -13,8 +13,7 @@ use super::output_error::{Free, OutputError};
 use super::parameters::Estimated;
 use super::record::{Record, Row};
 use super::regression::RegressionError;
-use crate::axis::{Parameters, Scheme, SimulateOptions, Structure, simulate};
-use crate::effects::Settings;
+use crate::axis::{Parameters, Scheme};
 
 /// Most rounds.
 const ROUNDS: usize = 30;
@@ -42,14 +41,11 @@ pub fn instrumental(
     }
     let diverged = || RegressionError::Diverged { what: "IV" };
     let mut p = *start;
-    let options =
-        SimulateOptions { start: record.start, dt: record.dt, hold: record.hold, scheme: Scheme::NEWMARK, substeps: 1 };
     for round in 1..=ROUNDS {
         // The initial state of the simulation is the one that fits the outputs with these parameters.
         let fit = outputs.fit(&p, Scheme::NEWMARK, Free { parameters: false, offset: false, bias: false });
-        let response = simulate(&p, Structure::TwoInertia, &Settings::default(), fit.initial, record.torque, &options);
-        let column =
-            |f: fn(&crate::effects::Reading<f64>) -> f64| response.readings.iter().map(f).collect::<Vec<f64>>();
+        let readings = outputs.simulated(&fit, &p);
+        let column = |f: fn(&crate::effects::Reading<f64>) -> f64| readings.iter().map(f).collect::<Vec<f64>>();
         let (theta1, omega1) = (column(|r| r.theta1), column(|r| r.omega1));
         let (theta2, omega2) = (column(|r| r.theta2), column(|r| r.omega2));
         let clean = Record {
@@ -57,6 +53,7 @@ pub fn instrumental(
             theta1: &theta1,
             theta2: theta2.as_slice().into(),
             omega: record.omega.map(|_| (omega1.as_slice(), omega2.as_slice())),
+            pieces: record.pieces.clone(),
             ..*record
         };
         let mut zx = Matrix4::zeros();

@@ -7,7 +7,7 @@ use super::result::{ExcitationEstimate, MethodResult, OutputFit, Series};
 use super::run::{Method, NOISE_FREE, torque_unit};
 use super::statistics::{deviation, rms, spectrum, whiteness};
 use crate::axis::{Parameters, Scheme, Structure};
-use crate::trace::{Motion, Signal, Trace};
+use crate::trace::{Motion, Signal};
 
 /// Least samples of a record of which a part is held out.
 const LEAST_PARTED: usize = 192;
@@ -41,7 +41,8 @@ impl Run<'_> {
         };
         let residuals = self.outputs.residuals(fit);
         for ((signal, measured), (_, residual)) in self.outputs.outputs().zip(residuals) {
-            result.outputs.push(output_fit(signal, measured, &residual, self.compared, self.machine.signals.motion));
+            let time = |k: usize| self.compared.time(k);
+            result.outputs.push(output_fit(signal, measured, &residual, time, self.machine.signals.motion));
         }
     }
 
@@ -58,13 +59,13 @@ impl Run<'_> {
             offset: self.record.zero_offset != 0.0,
             bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
         };
-        let (first, rest) = (self.compared.slice(0..2 * n / 3), self.compared.slice(2 * n / 3..n));
-        let fitted = OutputError::new(&first, rho, structure, effects).ok()?.fit(p, scheme, free);
+        let (first, rest) = (self.compared.part(0..2 * n / 3), self.compared.part(2 * n / 3..n));
+        let fitted = OutputError::of(&first, rho, structure, effects).ok()?.fit(p, scheme, free);
         let p = fitted.estimated.parameters(rho);
         if p.check(Structure::TwoInertia).is_err() {
             return Some(f64::NEG_INFINITY);
         }
-        let judge = OutputError::new(&rest, rho, structure, effects).ok()?;
+        let judge = OutputError::of(&rest, rho, structure, effects).ok()?;
         let residuals = judge.residuals(&judge.fit(&p, scheme, Free { parameters: false, ..free }));
         // Against the whole record's size: a part in which one output hardly moves says nothing of the fit.
         let fits = self.outputs.outputs().zip(residuals).map(|((_, measured), (_, r))| {
@@ -78,33 +79,35 @@ impl Run<'_> {
     /// between samples.
     fn excitation(&self, estimated: &Estimated) -> ExcitationEstimate {
         let v = &estimated.values;
-        let (start, dt) = (self.trace.start, self.trace.dt);
-        let accelerations = self.trace.get(Signal::Alpha1).zip(self.trace.get(Signal::Alpha2));
-        let (formulation, first, estimate, truth): (_, f64, Vec<f64>, Vec<f64>) = match accelerations {
+        let trace = self.joined.samples();
+        let accelerations = trace.get(Signal::Alpha1).zip(trace.get(Signal::Alpha2));
+        let of_samples = accelerations.is_some();
+        let (formulation, estimate, truth): (_, Vec<f64>, Vec<f64>) = match accelerations {
             Some((a1, a2)) => (
                 "I1*alpha1 + I2*alpha2",
-                start,
                 a1.iter().zip(a2).map(|(a1, a2)| v[0] * a1 + v[1] * a2).collect(),
-                self.trace.get(Signal::T).map_or_else(Vec::new, <[f64]>::to_vec),
+                trace.get(Signal::T).map_or_else(Vec::new, <[f64]>::to_vec),
             ),
             None => {
                 let rows: Vec<_> = (0..self.record.rows()).map(|k| self.record.row(k)).collect();
                 (
                     "I1*a1 + B*(w1 - w2) + K*(th1 - th2) between samples",
-                    self.record.time(0),
                     rows.iter().map(|r| v[0] * r.a1 + v[2] * r.rate + v[3] * r.twist).collect(),
                     rows.iter().map(|r| r.torque).collect(),
                 )
             }
         };
+        let time = |k: usize| if of_samples { self.joined.time(k) } else { self.record.time(k) };
         let error: Vec<f64> = estimate.iter().zip(&truth).map(|(a, b)| a - b).collect();
         let unit = torque_unit(self.machine.signals.motion);
+        // A spectrum across a gap would be one of the gap.
+        let longest = if of_samples { self.joined.longest() } else { self.record.longest_rows() };
         ExcitationEstimate {
             formulation,
             error_percent: 100.0 * rms(&error) / rms(&truth).max(f64::MIN_POSITIVE),
-            estimate: Series::over_time("estimated T", unit, first, dt, &estimate),
-            error: Series::over_time("error of T", unit, first, dt, &error),
-            spectrum: spectrum("estimated T", unit, dt, &estimate),
+            estimate: Series::over("estimated T", unit, time, &estimate),
+            error: Series::over("error of T", unit, time, &error),
+            spectrum: spectrum("estimated T", unit, trace.dt, &estimate[longest]),
         }
     }
 }
@@ -114,7 +117,7 @@ pub(super) fn output_fit(
     signal: Signal,
     measured: &[f64],
     residual: &[f64],
-    trace: &Trace,
+    time: impl Fn(usize) -> f64,
     motion: Motion,
 ) -> OutputFit {
     let size = deviation(measured);
@@ -125,12 +128,6 @@ pub(super) fn output_fit(
         rms_error: error,
         fit_percent: 100.0 * (1.0 - error / size.max(f64::MIN_POSITIVE)),
         whiteness: whiteness(residual),
-        residual: Series::over_time(
-            format!("{signal}: measured - simulated"),
-            signal.unit(motion),
-            trace.start,
-            trace.dt,
-            residual,
-        ),
+        residual: Series::over(format!("{signal}: measured - simulated"), signal.unit(motion), time, residual),
     }
 }

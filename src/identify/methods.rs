@@ -4,6 +4,7 @@ use nalgebra::Matrix4;
 
 use super::frequency::Measured;
 use super::instrumental::instrumental;
+use super::joined::Joined;
 use super::output_error::{Fit, Free, OutputError};
 use super::paper;
 use super::parameters::Estimated;
@@ -13,13 +14,13 @@ use super::result::{History, MethodResult};
 use super::run::{Method, Request, hold_name, torque_unit};
 use super::statistics::{rms, whiteness};
 use crate::axis::{Parameters, Scheme, Structure};
-use crate::trace::{Machine, Trace};
+use crate::trace::Machine;
 
 /// One record with what the methods share.
 pub(super) struct Run<'a> {
-    pub trace: &'a Trace,
+    pub joined: &'a Joined<'a>,
     /// What simulations are compared with.
-    pub compared: &'a Trace,
+    pub compared: &'a Joined<'a>,
     pub machine: &'a Machine,
     pub request: &'a Request,
     pub record: &'a Record<'a>,
@@ -42,6 +43,9 @@ impl Run<'_> {
             _ if self.request.paper && matches!(method, Method::Ls | Method::Rls | Method::Els | Method::ElsBatch) => {
                 result.formulation = "Euler 5x4 (paper, eq. 6)".to_owned();
                 result.notes.push(paper::EULER_NOTE.to_owned());
+                if self.joined.pieces().len() > 1 {
+                    result.notes.push("the paper's regression takes the longest piece of the record alone".to_owned());
+                }
                 self.euler(method)
             }
             Method::Ls => {
@@ -85,10 +89,18 @@ impl Run<'_> {
 
     fn euler(&self, method: Method) -> Result<Found, String> {
         let (lambda, p0) = (self.request.forgetting, self.request.p0);
+        let longest = self.joined.longest_trace();
+        let alone;
+        let record = if self.joined.pieces().len() > 1 {
+            alone = Record::new(&longest, self.machine.parameters.rho).map_err(|e| e.to_string())?;
+            &alone
+        } else {
+            self.record
+        };
         match method {
-            Method::Ls => paper::euler_least_squares(self.record).map(|e| (e, None)),
-            Method::Rls => paper::euler_recursive(self.record, lambda, p0, false).map(|(e, h)| (e, Some(h))),
-            Method::Els => paper::euler_recursive(self.record, lambda, p0, true).map(|(e, h)| (e, Some(h))),
+            Method::Ls => paper::euler_least_squares(record).map(|e| (e, None)),
+            Method::Rls => paper::euler_recursive(record, lambda, p0, false).map(|(e, h)| (e, Some(h))),
+            Method::Els => paper::euler_recursive(record, lambda, p0, true).map(|(e, h)| (e, Some(h))),
             _ => Err(RegressionError::Diverged { what: "batch ELS has no Euler form; it" }),
         }
         .map_err(|e| e.to_string())
@@ -167,7 +179,7 @@ impl Run<'_> {
             Scheme::Exact => "exact integration",
             Scheme::Newmark { .. } => "Newmark integration at the sampling interval",
         };
-        let hold = hold_name(self.trace.hold);
+        let hold = hold_name(self.joined.samples().hold);
         let channels: Vec<&str> = self.outputs.outputs().map(|(s, _)| s.name()).collect();
         result.formulation = format!("simulation of {} against the record; {integration}, {hold}", channels.join(", "));
         if best.bias != 0.0 {

@@ -6,31 +6,38 @@
 //!
 //! by Levenberg-Marquardt over `ln I1, ln I2, B, ln K` and the initial state, with the exact derivatives of the
 //! simulation (forward-mode dual numbers). The offset (of the encoders' zeros) and the bias (of the torque) join where
-//! they are asked for. The weights are the residuals' own levels, found by repeating the fit.
+//! they are asked for. The weights are the residuals' own levels, found by repeating the fit. A record in pieces is
+//! simulated piece by piece: each has an initial state and an offset of its own, the parameters and the bias are common.
 //!
 //! Source: L. Ljung, System Identification, 2nd ed., 7.4 (prediction error with an output-error model); paper eq. 2.
 
 mod coloured;
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use nalgebra::{DVector, Matrix4, Vector4};
 
+use super::joined::{Joined, noise_in_pieces};
 use super::levenberg::{self, Normal, Problem, Termination};
 use super::lsq::triangularise;
 use super::parameters::Estimated;
-use super::statistics::{noise_level, rms};
+use super::statistics::rms;
 use crate::axis::{Parameters, Response, Scheme, SimulateOptions, Structure, simulate, substeps};
 use crate::effects::{Reading, Settings};
 use crate::scalar::{Dual, Scalar};
 use crate::trace::{Signal, Trace, TraceError};
 
-/// Parameters and initial state: what the simulation is derived to.
+/// Parameters and initial state: what the simulation of a piece is derived to.
 const DERIVED: usize = 8;
-/// And the two that enter linearly: offset of theta2, bias of the torque.
-const ALL: usize = DERIVED + 2;
-const OFFSET: usize = 8;
-const BIAS: usize = 9;
+/// I1, I2, B, K.
+const PARAMETERS: usize = 4;
+/// The bias of the torque stands behind the parameters, then what each piece has of its own.
+const BIAS: usize = PARAMETERS;
+/// Initial state and offset of theta2.
+const OWN: usize = 5;
+/// Where the first piece's own unknowns begin.
+const FIRST: usize = BIAS + 1;
 /// Most steps of one fit.
 const ITERATIONS: usize = 60;
 /// Rounds of weighing.
@@ -42,6 +49,9 @@ pub struct OutputError<'a> {
     torque: &'a [f64],
     /// The measured outputs, each with its column of a reading (theta1, omega1, theta2, omega2).
     outputs: Vec<(Signal, usize, Cow<'a, [f64]>)>,
+    pieces: Vec<Range<usize>>,
+    /// Time of each piece's first sample, s.
+    starts: Vec<f64>,
     options: SimulateOptions,
     effects: Settings,
     structure: Structure,
@@ -49,9 +59,10 @@ pub struct OutputError<'a> {
     sigma: Vec<f64>,
     /// Unit of B, so that it may be zero or change sign on the way.
     damping_unit: f64,
-    free: [bool; ALL],
+    /// One an unknown: the parameters, the bias, then state and offset of each piece.
+    free: Vec<bool>,
     /// Fixed values of what is not free.
-    fixed: [f64; ALL],
+    fixed: Vec<f64>,
 }
 
 /// Which unknowns are fitted beside the initial state.
@@ -70,10 +81,10 @@ pub struct Free {
 pub struct Fit {
     /// I1, I2, B, K with their covariance.
     pub estimated: Estimated,
-    /// theta1, omega1, theta2, omega2 at the first sample.
-    pub initial: [f64; 4],
-    /// Offset of theta2, rad.
-    pub offset: f64,
+    /// theta1, omega1, theta2, omega2 at the first sample of each piece.
+    pub initial: Vec<[f64; 4]>,
+    /// Offset of theta2 in each piece, rad.
+    pub offset: Vec<f64>,
     /// Constant torque, N.m.
     pub bias: f64,
     /// Weighted sum of squares over its degrees of freedom, before the last re-weighting; its square root is in `sigma`.
@@ -104,6 +115,11 @@ fn pick<S: Scalar>(r: &Reading<S>, column: usize) -> S {
     [r.theta1, r.omega1, r.theta2, r.omega2][column]
 }
 
+/// The place of a piece's own unknown.
+const fn own(piece: usize, unknown: usize) -> usize {
+    FIRST + piece * OWN + unknown
+}
+
 impl<'a> OutputError<'a> {
     /// Takes the torque and every measured angle and speed of a trace; accelerations are left out, since a position
     /// says more. The weights begin at the measured noise.
@@ -111,6 +127,26 @@ impl<'a> OutputError<'a> {
     /// # Errors
     /// When the torque or any output is missing.
     pub fn new(trace: &'a Trace, rho: f64, structure: Structure, effects: Settings) -> Result<Self, TraceError> {
+        Self::in_pieces(trace, vec![0..trace.len()], vec![trace.start], rho, structure, effects)
+    }
+
+    /// Takes a record in pieces, see [`OutputError::new`].
+    ///
+    /// # Errors
+    /// As [`OutputError::new`].
+    pub fn of(joined: &'a Joined, rho: f64, structure: Structure, effects: Settings) -> Result<Self, TraceError> {
+        let (pieces, starts) = (joined.pieces().to_vec(), joined.starts().to_vec());
+        Self::in_pieces(joined.samples(), pieces, starts, rho, structure, effects)
+    }
+
+    fn in_pieces(
+        trace: &'a Trace,
+        pieces: Vec<Range<usize>>,
+        starts: Vec<f64>,
+        rho: f64,
+        structure: Structure,
+        effects: Settings,
+    ) -> Result<Self, TraceError> {
         let torque = trace.require(Signal::T)?;
         let mut outputs = Vec::new();
         for signal in [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2] {
@@ -127,20 +163,23 @@ impl<'a> OutputError<'a> {
         if outputs.is_empty() {
             trace.require(Signal::Theta1)?;
         }
-        let sigma = outputs.iter().map(|(_, _, v)| level(noise_level(v), v)).collect();
+        let sigma = outputs.iter().map(|(_, _, v)| level(noise_in_pieces(v, &pieces), v)).collect();
         let options =
             SimulateOptions { start: trace.start, dt: trace.dt, hold: trace.hold, scheme: Scheme::Exact, substeps: 1 };
+        let unknowns = own(pieces.len(), 0);
         Ok(Self {
             torque,
             outputs,
+            pieces,
+            starts,
             options,
             effects,
             structure,
             rho,
             sigma,
             damping_unit: 1.0,
-            free: [true; ALL],
-            fixed: [0.0; ALL],
+            free: vec![true; unknowns],
+            fixed: vec![0.0; unknowns],
         })
     }
 
@@ -154,20 +193,20 @@ impl<'a> OutputError<'a> {
         self.sigma = sigma.to_vec();
     }
 
-    /// Measured first sample as a starting point for the initial state.
-    fn first_state(&self) -> [f64; 4] {
+    /// Measured first sample of a piece as a starting point for its initial state.
+    fn first_state(&self, piece: &Range<usize>) -> [f64; 4] {
         let mut state = [0.0; 4];
         let mut known = [false; 4];
         for (_, c, v) in &self.outputs {
-            state[*c] = v[0];
+            state[*c] = v[piece.start];
             known[*c] = true;
         }
         for (position, speed) in [(0, 1), (2, 3)] {
             let values = self.outputs.iter().find(|(_, c, _)| *c == position).map(|(_, _, v)| v);
             if let (false, Some(v)) = (known[speed], values) {
                 // Over a few samples, so that noise does not make it large.
-                let span = 8.min(v.len() - 1);
-                state[speed] = (v[span] - v[0]) / (span as f64 * self.options.dt);
+                let span = 8.min(piece.len() - 1);
+                state[speed] = (v[piece.start + span] - v[piece.start]) / (span as f64 * self.options.dt);
             }
         }
         if !known[2] {
@@ -179,6 +218,24 @@ impl<'a> OutputError<'a> {
         state
     }
 
+    /// All unknowns at the start: the parameters, and each piece's measured first state.
+    fn unknowns(&self, parameters: [f64; PARAMETERS]) -> Vec<f64> {
+        let mut q = parameters.to_vec();
+        q.push(0.0);
+        for piece in &self.pieces {
+            q.extend(self.first_state(piece));
+            q.push(0.0);
+        }
+        q
+    }
+
+    /// Says of every piece whether its offset is free.
+    fn free_offsets(&mut self, free: bool) {
+        for piece in 0..self.pieces.len() {
+            self.free[own(piece, 4)] = free;
+        }
+    }
+
     /// Fits from `start` under one integration scheme; weights are re-found from the residuals.
     #[must_use]
     pub fn fit(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
@@ -188,26 +245,20 @@ impl<'a> OutputError<'a> {
         let mobility = 1.0 / start.i1 + 1.0 / start.i2;
         // Two per cent of critical damping as the unit where the start has none.
         problem.damping_unit = if start.b > 0.0 { start.b } else { 0.04 * (start.k / mobility).sqrt() };
-        for i in 0..4 {
-            problem.free[i] = free.parameters;
-        }
-        let rigid = self.structure == Structure::Rigid;
-        if rigid {
+        problem.free[..PARAMETERS].fill(free.parameters);
+        if self.structure == Structure::Rigid {
             // One inertia: nothing of the coupling, and no motion of the table of its own.
-            for i in [1, 2, 3, 6, 7] {
-                problem.free[i] = false;
+            problem.free[1..PARAMETERS].fill(false);
+            for piece in 0..self.pieces.len() {
+                problem.free[own(piece, 2)] = false;
+                problem.free[own(piece, 3)] = false;
             }
         }
-        problem.free[OFFSET] = free.offset;
+        problem.free_offsets(free.offset);
         problem.free[BIAS] = free.bias;
-        let x0 = self.first_state();
         let log = |v: f64| if v > 0.0 { v.ln() } else { -700.0 };
-        let p = [log(start.i1), log(start.i2), start.b / problem.damping_unit, log(start.k)];
-        let mut q: [f64; ALL] = [p[0], p[1], p[2], p[3], x0[0], x0[1], x0[2], x0[3], 0.0, 0.0];
-        let mut fixed = q;
-        fixed[OFFSET] = 0.0;
-        fixed[BIAS] = 0.0;
-        problem.fixed = fixed;
+        let mut q = self.unknowns([log(start.i1), log(start.i2), start.b / problem.damping_unit, log(start.k)]);
+        problem.fixed.clone_from(&q);
 
         // First what enters linearly, so that the parameters do not run off to mend a wrong initial state.
         let linear = self.effects.active().motion_is_linear();
@@ -233,9 +284,7 @@ impl<'a> OutputError<'a> {
             }
         } else if free.parameters {
             let mut state_only = problem.clone();
-            for i in 0..4 {
-                state_only.free[i] = false;
-            }
+            state_only.free[..PARAMETERS].fill(false);
             q = state_only.run(&q, 20).0;
         }
         let mut report = problem.run(&q, ITERATIONS);
@@ -259,11 +308,9 @@ impl<'a> OutputError<'a> {
         let mut problem = self.clone();
         problem.options.scheme = scheme;
         problem.damping_unit = if start.b > 0.0 { start.b } else { 1.0 };
-        problem.free[OFFSET] = free.offset;
+        problem.free_offsets(free.offset);
         problem.free[BIAS] = free.bias;
-        let x0 = self.first_state();
-        let p = [start.i1.ln(), start.i2.ln(), start.b / problem.damping_unit, start.k.ln()];
-        let mut q = [p[0], p[1], p[2], p[3], x0[0], x0[1], x0[2], x0[3], 0.0, 0.0];
+        let mut q = self.unknowns([start.i1.ln(), start.i2.ln(), start.b / problem.damping_unit, start.k.ln()]);
         // Speeds from positions alone are poor: the linear part first. A second start clears what damping the first
         // has gathered in the valley that I2, B and K share.
         problem.solve_state(&mut q);
@@ -274,57 +321,76 @@ impl<'a> OutputError<'a> {
         problem.finish(&report.0, &report.1, 1.0, scheme)
     }
 
-    /// The initial state, offset and bias that fit best with the parameters as they are: on a linear axis the outputs
+    /// The initial states, offsets and bias that fit best with the parameters as they are: on a linear axis the outputs
     /// are linear in them. Unknowns that the outputs do not determine keep their values.
-    fn solve_state(&self, q: &mut [f64; ALL]) {
-        let unknowns: Vec<usize> = (4..ALL).filter(|i| self.free[*i]).collect();
-        if unknowns.is_empty() {
-            return;
-        }
-        let p: Parameters = self.axis(&q[..DERIVED]);
-        let n = self.torque.len();
-        let run = |initial: [f64; 4], torque: &[f64]| {
-            simulate(&p, self.structure, &Settings::default(), initial, torque, &self.options)
-        };
-        let rest = vec![0.0; n];
-        let mut base = *q;
-        for i in &unknowns {
-            base[*i] = 0.0;
-        }
-        let bias = base[BIAS];
-        let torque: Vec<f64> = self.torque.iter().map(|t| t + bias).collect();
-        let forced = run([base[4], base[5], base[6], base[7]], &torque);
-        let columns: Vec<Option<Response>> = unknowns
-            .iter()
-            .map(|i| match *i {
-                OFFSET => None,
-                BIAS => Some(run([0.0; 4], &vec![1.0; n])),
-                i => {
-                    let mut unit = [0.0; 4];
-                    unit[i - 4] = 1.0;
-                    Some(run(unit, &rest))
-                }
-            })
-            .collect();
-        let width = unknowns.len();
-        let outputs = &self.outputs;
-        let triangle = triangularise(n * outputs.len(), width, 1, |row, out| {
-            let (channel, k) = (row % outputs.len(), row / outputs.len());
-            let (_, c, measured) = &outputs[channel];
-            let weight = 1.0 / self.sigma[channel];
-            for (out, column) in out.iter_mut().zip(&columns) {
-                *out = weight
-                    * match column {
-                        Some(response) => pick(&response.readings[k], *c),
-                        None => f64::from(u8::from(*c == 2)),
-                    };
+    ///
+    /// What a piece has of its own is eliminated before the bias, which is common to all (R. Frisch, F. V. Waugh,
+    /// Econometrica 1, 1933): the bias is found from what is left of its column and of the outputs in all pieces.
+    fn solve_state(&self, q: &mut [f64]) {
+        let p: Parameters = self.axis(&q[..PARAMETERS]);
+        let with_bias = self.free[BIAS];
+        let bias = if with_bias { 0.0 } else { q[BIAS] };
+        let mut solved: Vec<(usize, Vec<usize>, super::lsq::Solution)> = Vec::new();
+        let (mut projection, mut square) = (0.0, 0.0);
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let unknowns: Vec<usize> = (0..OWN).filter(|i| self.free[own(index, *i)]).collect();
+            if unknowns.is_empty() && !with_bias {
+                continue;
             }
-            let offset = if *c == 2 { base[OFFSET] } else { 0.0 };
-            out[width] = weight * (measured[k] - pick(&forced.readings[k], *c) - offset);
-        });
-        if let Ok(solution) = triangle.solve() {
+            let n = piece.len();
+            let options = SimulateOptions { start: self.starts[index], ..self.options };
+            let run = |initial: [f64; 4], torque: &[f64]| {
+                simulate(&p, self.structure, &Settings::default(), initial, torque, &options)
+            };
+            let fixed = |i: usize| if self.free[own(index, i)] { 0.0 } else { q[own(index, i)] };
+            let torque: Vec<f64> = self.torque[piece.clone()].iter().map(|t| t + bias).collect();
+            let forced = run([0, 1, 2, 3].map(fixed), &torque);
+            let offset = fixed(4);
+            let rest = vec![0.0; n];
+            let columns: Vec<Option<Response>> = unknowns
+                .iter()
+                .map(|i| {
+                    (*i < 4).then(|| {
+                        let mut unit = [0.0; 4];
+                        unit[*i] = 1.0;
+                        run(unit, &rest)
+                    })
+                })
+                .collect();
+            let pushed = with_bias.then(|| run([0.0; 4], &vec![1.0; n]));
+            let width = unknowns.len();
+            let outputs = &self.outputs;
+            let triangle = triangularise(n * outputs.len(), width, 1 + usize::from(with_bias), |row, out| {
+                let (channel, k) = (row % outputs.len(), row / outputs.len());
+                let (_, c, measured) = &outputs[channel];
+                let weight = 1.0 / self.sigma[channel];
+                for (out, column) in out.iter_mut().zip(&columns) {
+                    *out = weight
+                        * match column {
+                            Some(response) => pick(&response.readings[k], *c),
+                            None => f64::from(u8::from(*c == 2)),
+                        };
+                }
+                let offset = if *c == 2 { offset } else { 0.0 };
+                out[width] = weight * (measured[piece.start + k] - pick(&forced.readings[k], *c) - offset);
+                if let Some(pushed) = &pushed {
+                    out[width + 1] = weight * pick(&pushed.readings[k], *c);
+                }
+            });
+            let Ok(solution) = triangle.solve() else { continue };
+            if with_bias {
+                projection += solution.residual[(0, 1)];
+                square += solution.residual[(1, 1)];
+            }
+            solved.push((index, unknowns, solution));
+        }
+        if with_bias && square > 0.0 {
+            q[BIAS] = projection / square;
+        }
+        for (index, unknowns, solution) in solved {
             for (j, i) in unknowns.iter().enumerate() {
-                q[*i] = solution.phi[(j, 0)];
+                let pushed = if with_bias { q[BIAS] * solution.phi[(j, 1)] } else { 0.0 };
+                q[own(index, *i)] = solution.phi[(j, 0)] - pushed;
             }
         }
     }
@@ -334,8 +400,8 @@ impl<'a> OutputError<'a> {
         ((self.torque.len() * self.outputs.len()) as f64 - unknowns as f64).max(1.0)
     }
 
-    fn run(&self, q: &[f64; ALL], iterations: usize) -> ([f64; ALL], levenberg::Report) {
-        let free: Vec<usize> = (0..ALL).filter(|i| self.free[*i]).collect();
+    fn run(&self, q: &[f64], iterations: usize) -> (Vec<f64>, levenberg::Report) {
+        let free: Vec<usize> = (0..q.len()).filter(|i| self.free[*i]).collect();
         let start = DVector::from_iterator(free.len(), free.iter().map(|i| q[*i]));
         let mut lower = vec![f64::NEG_INFINITY; free.len()];
         for (bound, i) in lower.iter_mut().zip(&free) {
@@ -346,17 +412,17 @@ impl<'a> OutputError<'a> {
         // Parameters in logarithms: a step of more than a factor e^3 from the start is a fit gone astray.
         let options = levenberg::Options { iterations, lower, ..levenberg::Options::default() };
         let mut fixed = self.clone();
-        fixed.fixed = *q;
+        fixed.fixed = q.to_vec();
         let report = levenberg::minimise(&fixed, &start, &options);
         (fixed.expand(&report.parameters), report)
     }
 
     /// All unknowns from the free ones.
-    fn expand(&self, q: &DVector<f64>) -> [f64; ALL] {
-        let mut all = self.fixed;
+    fn expand(&self, q: &DVector<f64>) -> Vec<f64> {
+        let mut all = self.fixed.clone();
         let mut next = q.iter();
-        for (value, free) in all.iter_mut().zip(self.free) {
-            if free && let Some(v) = next.next() {
+        for (value, free) in all.iter_mut().zip(&self.free) {
+            if *free && let Some(v) = next.next() {
                 *value = *v;
             }
         }
@@ -373,14 +439,40 @@ impl<'a> OutputError<'a> {
         }
     }
 
-    fn respond<S: Scalar>(&self, q: &[S], bias: f64) -> Response<S> {
-        let torque: Cow<[f64]> = if bias == 0.0 {
-            Cow::Borrowed(self.torque)
-        } else {
-            Cow::Owned(self.torque.iter().map(|t| t + bias).collect())
-        };
-        let initial = [q[4], q[5], q[6], q[7]];
-        simulate(&self.axis(q), self.structure, &Settings::lift(&self.effects), initial, &torque, &self.options)
+    /// The simulation of one piece: parameters and state as given.
+    fn respond<S: Scalar>(&self, index: usize, parameters: &[S], initial: [S; 4], bias: f64) -> Response<S> {
+        let torque = &self.torque[self.pieces[index].clone()];
+        let torque: Cow<[f64]> =
+            if bias == 0.0 { Cow::Borrowed(torque) } else { Cow::Owned(torque.iter().map(|t| t + bias).collect()) };
+        let options = SimulateOptions { start: self.starts[index], ..self.options };
+        simulate(&self.axis(parameters), self.structure, &Settings::lift(&self.effects), initial, &torque, &options)
+    }
+
+    /// Measured minus simulated at unknowns `q`, one vector an output.
+    fn differences(&self, q: &[f64]) -> Vec<Vec<f64>> {
+        let mut out: Vec<Vec<f64>> = vec![Vec::with_capacity(self.torque.len()); self.outputs.len()];
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let state = [0, 1, 2, 3].map(|i| q[own(index, i)]);
+            let response = self.respond(index, &q[..PARAMETERS], state, q[BIAS]);
+            for ((_, c, measured), out) in self.outputs.iter().zip(&mut out) {
+                let offset = if *c == 2 { q[own(index, 4)] } else { 0.0 };
+                let measured = &measured[piece.clone()];
+                out.extend(measured.iter().zip(&response.readings).map(|(y, r)| y - pick(r, *c) - offset));
+            }
+        }
+        out
+    }
+
+    /// The unknowns of a fit, at this problem's unit of damping.
+    fn of_fit(&self, fit: &Fit) -> Vec<f64> {
+        let v = &fit.estimated.values;
+        let log = |v: f64| if v > 0.0 { v.ln() } else { -700.0 };
+        let mut q = vec![log(v[0]), log(v[1]), v[2] / self.damping_unit, log(v[3]), fit.bias];
+        for (initial, offset) in fit.initial.iter().zip(&fit.offset) {
+            q.extend(initial);
+            q.push(*offset);
+        }
+        q
     }
 
     /// Measured minus simulated, one vector an output.
@@ -390,49 +482,47 @@ impl<'a> OutputError<'a> {
         problem.options.scheme = fit.scheme;
         let p = fit.estimated.parameters(self.rho);
         problem.options.substeps = substeps(&p, self.structure, &self.effects, self.options.dt);
-        let torque: Vec<f64> = self.torque.iter().map(|t| t + fit.bias).collect();
-        let response = simulate(&p, self.structure, &self.effects, fit.initial, &torque, &problem.options);
-        self.outputs
-            .iter()
-            .map(|(signal, c, measured)| {
-                let offset = if *c == 2 { fit.offset } else { 0.0 };
-                let values = measured.iter().zip(&response.readings).map(|(y, r)| y - pick(r, *c) - offset).collect();
-                (*signal, values)
-            })
-            .collect()
+        let values = problem.differences(&problem.of_fit(fit));
+        self.outputs.iter().zip(values).map(|((signal, _, _), values)| (*signal, values)).collect()
     }
 
-    fn levels(&self, q: &[f64; ALL]) -> Vec<f64> {
-        let response = self.respond(&q[..DERIVED], q[BIAS]);
-        self.outputs
-            .iter()
-            .map(|(_, c, measured)| {
-                let offset = if *c == 2 { q[OFFSET] } else { 0.0 };
-                let r: Vec<f64> =
-                    measured.iter().zip(&response.readings).map(|(y, r)| y - pick(r, *c) - offset).collect();
-                level(rms(&r), measured)
-            })
-            .collect()
+    /// The readings of all pieces, one after the other, with parameters `p` from the initial states of a fit, without effects.
+    #[must_use]
+    pub fn simulated(&self, fit: &Fit, p: &Parameters) -> Vec<Reading<f64>> {
+        let mut readings = Vec::with_capacity(self.torque.len());
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let options = SimulateOptions { start: self.starts[index], scheme: fit.scheme, ..self.options };
+            let torque = &self.torque[piece.clone()];
+            readings.extend(
+                simulate(p, self.structure, &Settings::default(), fit.initial[index], torque, &options).readings,
+            );
+        }
+        readings
     }
 
-    fn finish(&self, q: &[f64; ALL], report: &levenberg::Report, chi2: f64, scheme: Scheme) -> Fit {
-        let p: Parameters = self.axis(&q[..DERIVED]);
+    fn levels(&self, q: &[f64]) -> Vec<f64> {
+        self.differences(q).iter().zip(&self.outputs).map(|(r, (_, _, measured))| level(rms(r), measured)).collect()
+    }
+
+    fn finish(&self, q: &[f64], report: &levenberg::Report, chi2: f64, scheme: Scheme) -> Fit {
+        let p: Parameters = self.axis(&q[..PARAMETERS]);
         let relative = report.covariance();
-        let free: Vec<usize> = (0..ALL).filter(|i| self.free[*i]).collect();
+        let free: Vec<usize> = (0..q.len()).filter(|i| self.free[*i]).collect();
         let unit = [p.i1, p.i2, self.damping_unit, p.k];
         let mut covariance = Matrix4::zeros();
-        for (a, i) in free.iter().enumerate().filter(|(_, i)| **i < 4) {
-            for (b, j) in free.iter().enumerate().filter(|(_, j)| **j < 4) {
+        for (a, i) in free.iter().enumerate().filter(|(_, i)| **i < PARAMETERS) {
+            for (b, j) in free.iter().enumerate().filter(|(_, j)| **j < PARAMETERS) {
                 covariance[(*i, *j)] = relative[(a, b)] * unit[*i] * unit[*j];
             }
         }
+        let pieces = 0..self.pieces.len();
         Fit {
             estimated: Estimated {
                 values: Vector4::new(p.i1, p.i2, p.b, p.k),
                 covariance: self.free[0].then_some(covariance),
             },
-            initial: [q[4], q[5], q[6], q[7]],
-            offset: q[OFFSET],
+            initial: pieces.clone().map(|k| [0, 1, 2, 3].map(|i| q[own(k, i)])).collect(),
+            offset: pieces.map(|k| q[own(k, 4)]).collect(),
             bias: q[BIAS],
             chi2,
             cost: report.cost,
@@ -440,6 +530,49 @@ impl<'a> OutputError<'a> {
             termination: report.termination,
             iterations: report.iterations,
             scheme,
+        }
+    }
+
+    /// Each sample's row of the Jacobian (of the simulated outputs, over their levels) and residual (over its level):
+    /// `take(sample, unknowns, derivatives, residual)`, the unknowns as numbers among the free ones.
+    fn rows(&self, q: &[f64], mut take: impl FnMut(usize, &[usize], &[f64], f64)) {
+        let free: Vec<usize> = (0..q.len()).filter(|i| self.free[*i]).collect();
+        let among = |unknown: usize| free.binary_search(&unknown).ok();
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let at = |i: usize| if i < PARAMETERS { q[i] } else { q[own(index, i - PARAMETERS)] };
+            let dual: [Dual<DERIVED>; DERIVED] = std::array::from_fn(|i| Dual::variable(at(i), i));
+            let initial = [dual[4], dual[5], dual[6], dual[7]];
+            let response = self.respond(index, &dual[..PARAMETERS], initial, q[BIAS]);
+            // The response to a constant torque: the derivative to the bias, exact for the linear axis.
+            let step = self.free[BIAS].then(|| {
+                let p: Parameters = self.axis(&q[..PARAMETERS]);
+                let ones = vec![1.0; piece.len()];
+                simulate(&p, self.structure, &Settings::default(), [0.0; 4], &ones, &self.options)
+            });
+            // What this piece's outputs hang on: the number among the free ones, and which derivative it is.
+            let mut unknowns: Vec<(usize, usize)> = (0..DERIVED)
+                .filter_map(|i| Some((among(if i < PARAMETERS { i } else { own(index, i - PARAMETERS) })?, i)))
+                .collect();
+            unknowns.extend(among(own(index, 4)).map(|k| (k, DERIVED)));
+            unknowns.extend(among(BIAS).map(|k| (k, DERIVED + 1)));
+            let numbers: Vec<usize> = unknowns.iter().map(|(k, _)| *k).collect();
+            let mut row = vec![0.0; unknowns.len()];
+            for ((_, c, measured), sigma) in self.outputs.iter().zip(&self.sigma) {
+                let is_table = f64::from(u8::from(*c == 2));
+                let offset = is_table * q[own(index, 4)];
+                for (k, (y, reading)) in measured[piece.clone()].iter().zip(&response.readings).enumerate() {
+                    let value = pick(reading, *c);
+                    for (out, (_, i)) in row.iter_mut().zip(&unknowns) {
+                        let derivative = match *i {
+                            DERIVED => is_table,
+                            i if i > DERIVED => step.as_ref().map_or(0.0, |s| pick(&s.readings[k], *c)),
+                            i => value.eps[i],
+                        };
+                        *out = derivative / sigma;
+                    }
+                    take(piece.start + k, &numbers, &row, (y - value.re - offset) / sigma);
+                }
+            }
         }
     }
 }
@@ -452,45 +585,25 @@ fn level(sigma: f64, values: &[f64]) -> f64 {
 impl Problem for OutputError<'_> {
     fn cost(&self, q: &DVector<f64>) -> Option<f64> {
         let q = self.expand(q);
-        let response = self.respond(&q[..DERIVED], q[BIAS]);
         let mut sum = 0.0;
-        for ((_, c, measured), sigma) in self.outputs.iter().zip(&self.sigma) {
-            let offset = if *c == 2 { q[OFFSET] } else { 0.0 };
-            for (y, r) in measured.iter().zip(&response.readings) {
-                sum += ((y - pick(r, *c) - offset) / sigma).powi(2);
-            }
+        for (values, sigma) in self.differences(&q).iter().zip(&self.sigma) {
+            sum += values.iter().map(|v| (v / sigma).powi(2)).sum::<f64>();
         }
         sum.is_finite().then_some(0.5 * sum)
     }
 
     fn linearise(&self, q: &DVector<f64>) -> Option<Normal> {
-        let q = self.expand(q);
-        let dual: [Dual<DERIVED>; DERIVED] = std::array::from_fn(|i| Dual::variable(q[i], i));
-        let response = self.respond(&dual, q[BIAS]);
-        // The response to a constant torque: the derivative to the bias, exact for the linear axis.
-        let step = self.free[BIAS].then(|| {
-            let p: Parameters = self.axis(&q[..DERIVED]);
-            let ones = vec![1.0; self.torque.len()];
-            simulate(&p, self.structure, &Settings::default(), [0.0; 4], &ones, &self.options)
-        });
-        let free: Vec<usize> = (0..ALL).filter(|i| self.free[*i]).collect();
-        let mut normal = Normal::zeros(free.len());
-        let mut row = vec![0.0; free.len()];
-        for ((_, c, measured), sigma) in self.outputs.iter().zip(&self.sigma) {
-            let offset = if *c == 2 { q[OFFSET] } else { 0.0 };
-            for (k, (y, reading)) in measured.iter().zip(&response.readings).enumerate() {
-                let value = pick(reading, *c);
-                for (out, i) in row.iter_mut().zip(&free) {
-                    let derivative = match *i {
-                        OFFSET => f64::from(u8::from(*c == 2)),
-                        BIAS => step.as_ref().map_or(0.0, |s| pick(&s.readings[k], *c)),
-                        i => value.eps[i],
-                    };
-                    *out = -derivative / sigma;
+        let mut normal = Normal::zeros(q.len());
+        self.rows(&self.expand(q), |_, numbers, row, residual| {
+            normal.cost += 0.5 * residual * residual;
+            // The residual falls as the output rises.
+            for (j, a) in numbers.iter().zip(row) {
+                normal.gradient[*j] -= a * residual;
+                for (i, b) in numbers.iter().zip(row) {
+                    normal.curvature[(*i, *j)] += a * b;
                 }
-                normal.add((y - value.re - offset) / sigma, &row);
             }
-        }
+        });
         Some(normal)
     }
 }

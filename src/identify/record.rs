@@ -1,7 +1,9 @@
 //! A trace made ready for identification: the torque, the motion of both sides, and what the regressions need of them.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
+use super::joined::Joined;
 use crate::axis::Hold;
 use crate::trace::{Signal, Trace, TraceError};
 
@@ -25,8 +27,10 @@ pub struct Record<'a> {
     pub start: f64,
     /// What the torque does between samples.
     pub hold: Hold,
-    /// What was added to theta2 to bring the encoders' zeros together, rad.
+    /// What was added to theta2 to bring the encoders' zeros together, rad: the largest of the pieces'.
     pub zero_offset: f64,
+    /// The pieces, each with the time of its first sample, s; none: the record has no gaps.
+    pub pieces: Cow<'a, [(Range<usize>, f64)]>,
 }
 
 impl<'a> Record<'a> {
@@ -35,6 +39,27 @@ impl<'a> Record<'a> {
     /// # Errors
     /// When T, theta1 or both of theta2 and x2 are missing.
     pub fn new(trace: &'a Trace, rho: f64) -> Result<Self, TraceError> {
+        Self::in_pieces(trace, &[0..trace.len()], Cow::Borrowed(&[]), rho)
+    }
+
+    /// Takes the signals of a record in pieces, see [`Record::new`].
+    ///
+    /// # Errors
+    /// As [`Record::new`].
+    pub fn of(joined: &'a Joined, rho: f64) -> Result<Self, TraceError> {
+        let pieces = match joined.pieces() {
+            [_] => Cow::Borrowed(&[][..]),
+            many => Cow::Owned(many.iter().cloned().zip(joined.starts().iter().copied()).collect()),
+        };
+        Self::in_pieces(joined.samples(), joined.pieces(), pieces, rho)
+    }
+
+    fn in_pieces(
+        trace: &'a Trace,
+        ranges: &[Range<usize>],
+        pieces: Cow<'a, [(Range<usize>, f64)]>,
+        rho: f64,
+    ) -> Result<Self, TraceError> {
         let torque = trace.require(Signal::T)?;
         let theta1 = trace.require(Signal::Theta1)?;
         let mut theta2 = match (trace.get(Signal::Theta2), trace.get(Signal::X2)) {
@@ -43,16 +68,32 @@ impl<'a> Record<'a> {
             _ => Cow::Borrowed(trace.require(Signal::Theta2)?),
         };
         let n = theta1.len() as f64;
-        let twist = || theta1.iter().zip(theta2.iter()).map(|(a, b)| a - b);
-        let mean = twist().sum::<f64>() / n;
-        let deviation = (twist().map(|d| (d - mean).powi(2)).sum::<f64>() / n).sqrt();
-        let mut zero_offset = 0.0;
-        if mean.abs() > DIFFERENT_ZEROS * deviation && deviation > 0.0 {
-            zero_offset = mean;
-            theta2 = Cow::Owned(theta2.iter().map(|v| v + mean).collect());
+        // A counter that was set between two pieces has another zero in each; how much the twist moves is one for all.
+        let means: Vec<f64> = ranges
+            .iter()
+            .map(|r| {
+                theta1[r.clone()].iter().zip(&theta2[r.clone()]).map(|(a, b)| a - b).sum::<f64>() / r.len().max(1) as f64
+            })
+            .collect();
+        let squares: f64 = ranges
+            .iter()
+            .zip(&means)
+            .map(|(r, mean)| {
+                theta1[r.clone()].iter().zip(&theta2[r.clone()]).map(|(a, b)| (a - b - mean).powi(2)).sum::<f64>()
+            })
+            .sum();
+        let deviation = (squares / n).sqrt();
+        let mut zero_offset = 0.0_f64;
+        for (range, mean) in ranges.iter().zip(&means) {
+            if mean.abs() > DIFFERENT_ZEROS * deviation && deviation > 0.0 {
+                theta2.to_mut()[range.clone()].iter_mut().for_each(|v| *v += mean);
+                if mean.abs() > zero_offset.abs() {
+                    zero_offset = *mean;
+                }
+            }
         }
         let omega = trace.get(Signal::Omega1).zip(trace.get(Signal::Omega2));
-        Ok(Self { torque, theta1, theta2, omega, dt: trace.dt, start: trace.start, hold: trace.hold, zero_offset })
+        Ok(Self { torque, theta1, theta2, omega, dt: trace.dt, start: trace.start, hold: trace.hold, zero_offset, pieces })
     }
 
     /// Number of samples.
@@ -67,16 +108,55 @@ impl<'a> Record<'a> {
         self.torque.is_empty()
     }
 
-    /// The regression's rows.
+    /// Samples that a row spans beyond its first.
+    const fn span(&self) -> usize {
+        if self.omega.is_some() { 1 } else { 2 }
+    }
+
+    /// The regression's rows: none reaches from one piece into the next.
     #[must_use]
     pub fn rows(&self) -> usize {
-        self.len().saturating_sub(if self.omega.is_some() { 1 } else { 2 })
+        match &*self.pieces {
+            [] => self.len().saturating_sub(self.span()),
+            pieces => pieces.iter().map(|(range, _)| range.len().saturating_sub(self.span())).sum(),
+        }
+    }
+
+    /// The piece of a row, and the row's number in it.
+    #[inline]
+    #[must_use]
+    pub fn place(&self, row: usize) -> (usize, usize) {
+        if self.pieces.is_empty() {
+            return (0, row);
+        }
+        // Each piece has lost as many rows as a row spans.
+        let piece = self.pieces.iter().enumerate();
+        let piece = piece.take_while(|(k, (range, _))| range.end.saturating_sub((k + 1) * self.span()) <= row).count();
+        let piece = piece.min(self.pieces.len() - 1);
+        (piece, row + piece * self.span() - self.pieces[piece].0.start)
+    }
+
+    /// The rows of the longest piece.
+    #[must_use]
+    pub fn longest_rows(&self) -> Range<usize> {
+        let mut first = 0;
+        let mut best = 0..0;
+        for (range, _) in self.pieces.iter() {
+            let rows = range.len().saturating_sub(self.span());
+            if rows > best.len() {
+                best = first..first + rows;
+            }
+            first += rows;
+        }
+        if self.pieces.is_empty() { 0..self.rows() } else { best }
     }
 
     /// Time of a regression's row, s.
     #[must_use]
     pub fn time(&self, row: usize) -> f64 {
-        self.start + (row as f64 + if self.omega.is_some() { 0.5 } else { 1.0 }) * self.dt
+        let (piece, row) = self.place(row);
+        let start = self.pieces.get(piece).map_or(self.start, |(_, start)| *start);
+        start + (row as f64 + if self.omega.is_some() { 0.5 } else { 1.0 }) * self.dt
     }
 
     /// One row of the motion equations, exact for the trapezoidal rule: see [`Row`].
@@ -86,6 +166,7 @@ impl<'a> Record<'a> {
         let (t, x1, x2) = (self.torque, self.theta1, &*self.theta2);
         let d = |k: usize| x1[k] - x2[k];
         let h = self.dt;
+        let k = k + self.place(k).0 * self.span();
         if let Some((w1, w2)) = self.omega {
             Row {
                 a1: (w1[k + 1] - w1[k]) / h,
@@ -198,6 +279,32 @@ mod tests {
         let three: Vec<f64> = one.iter().cycle().take(1730).copied().collect();
         assert_eq!(period(&three), Some(500));
         assert_eq!(period(&one), None);
+    }
+
+    #[test]
+    fn no_row_reaches_from_one_piece_into_the_next() {
+        // A ramp in every piece: any difference across a gap would show as an acceleration.
+        let piece = |start: f64, n: u32, zero: f64| {
+            let ramp: Vec<f64> = (0..n).map(|k| zero + f64::from(k)).collect();
+            let twisted: Vec<f64> = ramp.iter().enumerate().map(|(k, v)| v - zero + 1e-3 * (k as f64).cos()).collect();
+            Trace::new(start, 1.0, Hold::Zoh)
+                .with(Signal::T, ramp.iter().map(|_| start).collect())
+                .and_then(|t| t.with(Signal::Theta1, ramp))
+                .and_then(|t| t.with(Signal::Theta2, twisted))
+                .unwrap()
+        };
+        let pieces = [piece(0.0, 20, 5.0), piece(100.0, 3, -700.0), piece(200.0, 30, 0.0)];
+        let joined = Joined::of(&pieces).unwrap();
+        let record = Record::of(&joined, 1.0).unwrap();
+        assert_eq!(record.rows(), 18 + 1 + 28);
+        assert_eq!([0, 17, 18, 19, 46].map(|k| record.place(k)), [(0, 0), (0, 17), (1, 0), (2, 0), (2, 27)]);
+        assert_eq!([0, 17, 18, 19].map(|k| record.time(k)), [1.0, 18.0, 101.0, 201.0]);
+        for k in 0..record.rows() {
+            let r = record.row(k);
+            assert!(r.a1.abs() < 1e-9 && r.a2.abs() < 5e-3 && r.twist.abs() < 5e-3, "{k}: {r:?}");
+            assert_eq!(r.torque, [0.0, 100.0, 200.0][record.place(k).0]);
+        }
+        assert_eq!(record.zero_offset, record.theta2[20] - pieces[1].get(Signal::Theta2).unwrap()[0]);
     }
 
     #[test]

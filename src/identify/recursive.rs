@@ -70,6 +70,11 @@ impl<const P: usize> Els<P> {
         Self { rls: Rls::new(lambda, p0), regressors, past: [0.0; P], scale }
     }
 
+    /// Begins behind a gap: the past residuals are not those before the next sample.
+    pub fn forget_noise(&mut self) {
+        self.past = [0.0; P];
+    }
+
     /// Takes one sample and gives the a-posteriori residual.
     pub fn update(&mut self, x: &[f64], y: f64) -> f64 {
         let order = P - self.regressors;

@@ -351,6 +351,11 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
     let mut last = None;
     for k in 0..n {
         let r = record.row(k);
+        if record.place(k).1 == 0 {
+            // The noise before a gap says nothing of the noise behind it.
+            motor.forget_noise();
+            table.forget_noise();
+        }
         let s = &scales.motor;
         let e = motor.update(&[-r.twist / s[0], -r.rate / s[1], r.torque / s[2]], r.a1 / s[3]);
         vm.add(lambda, e * e);
@@ -388,8 +393,9 @@ pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
         let r = record.row(k);
         ([r.twist, r.rate], r.a2)
     };
-    let motor = batch::<3>(n, plain.motor, plain.motor_covariance, motor_row)?;
-    let table = batch::<2>(n, plain.table, plain.table_covariance, table_row)?;
+    let place = |k: usize| record.place(k).1;
+    let motor = batch::<3>(n, plain.motor, plain.motor_covariance, motor_row, place)?;
+    let table = batch::<2>(n, plain.table, plain.table_covariance, table_row, place)?;
     Ok(Rows { motor: motor.0, motor_covariance: motor.1, table: table.0, table_covariance: table.1 }.reconcile())
 }
 
@@ -400,6 +406,7 @@ fn batch<const P: usize>(
     plain: SVector<f64, P>,
     plain_covariance: SMatrix<f64, P, P>,
     row: impl Fn(usize) -> ([f64; P], f64) + Sync,
+    place: impl Fn(usize) -> usize + Sync,
 ) -> Result<Fitted<P>, RegressionError> {
     let mut residual: Vec<f64> = (0..n)
         .map(|k| {
@@ -414,7 +421,7 @@ fn batch<const P: usize>(
         if super::statistics::rms(&residual) <= 1e-11 * left {
             return Ok((phi, covariance));
         }
-        let past = |k: usize, lag: usize| if k >= lag { residual[k - lag] } else { 0.0 };
+        let past = |k: usize, lag: usize| if place(k) >= lag { residual[k - lag] } else { 0.0 };
         let triangle = triangularise(n, P + NOISE_ORDER, 1, |k, out| {
             let (x, y) = row(k);
             out[..P].copy_from_slice(&x);

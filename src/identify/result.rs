@@ -67,6 +67,8 @@ pub struct TraceSummary {
     pub signals: Vec<Signal>,
     /// Samples of a period, where the record is periodic.
     pub period: Option<usize>,
+    /// Pieces that the record is used in: gaps, standstill and stretches without drive lie between them.
+    pub pieces: usize,
 }
 
 /// A parameter as estimated.
@@ -301,12 +303,22 @@ impl Series {
     /// A curve over time `start + k*dt`, thinned so that every bucket keeps its extremes.
     #[must_use]
     pub fn over_time(name: impl Into<String>, y_unit: &'static str, start: f64, dt: f64, values: &[f64]) -> Self {
+        Self::over(name, y_unit, |k| start + k as f64 * dt, values)
+    }
+
+    /// A curve over the times of a record that need not be even, thinned in the same way.
+    pub(super) fn over(
+        name: impl Into<String>,
+        y_unit: &'static str,
+        time: impl Fn(usize) -> f64,
+        values: &[f64],
+    ) -> Self {
         let kept = thin(values);
         Self {
             name: name.into(),
             x_unit: "s",
             y_unit,
-            x: kept.iter().map(|k| start + *k as f64 * dt).collect(),
+            x: kept.iter().map(|k| time(*k)).collect(),
             y: kept.iter().map(|k| values[*k]).collect(),
         }
     }

@@ -15,9 +15,12 @@
 //! Sources: A. Janot, M. Gautier, M. Brunot, EMPS benchmark, 2019 (model and friction terms); D. A. Messenger,
 //! D. M. Bortz, Weak SINDy, Multiscale Model. Simul. 19 (2021) (test functions).
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Vector4};
 
 use super::earned::{Earned, Evidence, SMALL_TORQUE};
+use super::joined::Joined;
 use super::judge::output_fit;
 use super::lsq::triangularise;
 use super::result::{
@@ -25,7 +28,7 @@ use super::result::{
 };
 use super::run::{Request, summary};
 use super::statistics::{rms, spectrum};
-use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
+use crate::trace::{Machine, Motion, Signal, TraceError};
 
 /// Least samples of half a window.
 const LEAST_HALF: usize = 12;
@@ -68,6 +71,8 @@ pub struct Rigid {
     pub fit: (Vec<f64>, Vec<f64>, Vec<f64>),
     /// The regression's rows: regressors of I, D, F, L, then the mean torque.
     rows: Vec<[f64; 5]>,
+    /// The piece of the record that each row lies in.
+    of_piece: Vec<usize>,
 }
 
 /// Why a rigid axis could not be identified.
@@ -92,7 +97,42 @@ pub enum RigidError {
 /// # Errors
 /// [`RigidError`].
 pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) -> Result<Rigid, RigidError> {
-    let n = theta.len();
+    let whole = std::iter::once(0..theta.len()).collect::<Vec<_>>();
+    weak_in_pieces(&Motions { torque, theta, dt, pieces: &whole, starts: &[start] })
+}
+
+/// Torque and angle of a record in pieces.
+#[derive(Clone, Copy)]
+struct Motions<'a> {
+    torque: &'a [f64],
+    theta: &'a [f64],
+    dt: f64,
+    pieces: &'a [Range<usize>],
+    /// Time of each piece's first sample, s.
+    starts: &'a [f64],
+}
+
+impl<'a> Motions<'a> {
+    fn of(joined: &'a Joined) -> Result<Self, TraceError> {
+        let trace = joined.samples();
+        Ok(Self {
+            torque: trace.require(Signal::T)?,
+            theta: trace.require(Signal::Theta1)?,
+            dt: trace.dt,
+            pieces: joined.pieces(),
+            starts: joined.starts(),
+        })
+    }
+
+    /// Samples of the longest piece: windows must fit into it.
+    fn longest(&self) -> usize {
+        self.pieces.iter().map(ExactSizeIterator::len).max().unwrap_or(0)
+    }
+}
+
+/// The same of a record in pieces: no window reaches from one into the next.
+fn weak_in_pieces(motions: &Motions) -> Result<Rigid, RigidError> {
+    let n = motions.longest();
     if 8 * LEAST_HALF + 2 > n {
         return Err(RigidError::TooShort { samples: n, window: 2 * LEAST_HALF + 1 });
     }
@@ -102,7 +142,7 @@ pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) ->
     let mut half = LEAST_HALF;
     let mut failure = None;
     while 8 * half + 2 <= n {
-        match in_windows(torque, theta, dt, start, half) {
+        match in_windows(motions, half) {
             Ok(found) => {
                 let share = |r: &Rigid| r.std[0] / r.values[0].abs();
                 if best.as_ref().is_none_or(|b| share(&found) < share(b)) {
@@ -117,22 +157,34 @@ pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) ->
 }
 
 /// The regression in windows of `2*half + 1` samples.
-fn in_windows(torque: &[f64], theta: &[f64], dt: f64, start: f64, half: usize) -> Result<Rigid, RigidError> {
-    let n = theta.len();
+fn in_windows(motions: &Motions, half: usize) -> Result<Rigid, RigidError> {
+    let Motions { torque, theta, dt, .. } = *motions;
     let w = Window::new(half);
     let span = 2 * half + 1;
     let total: f64 = w.psi.iter().sum();
     // Speed smoothed by the same test function, for the sign of the dry friction.
-    let speed: Vec<f64> = (0..n)
-        .map(|k| {
-            let first = k.saturating_sub(half).min(n - span);
-            -Window::apply(&w.first, &theta[first..first + span]) / (total * dt)
-        })
-        .collect();
+    let mut speed = vec![0.0; theta.len()];
+    for piece in motions.pieces.iter().filter(|p| p.len() >= span) {
+        for k in piece.clone() {
+            let first = k.saturating_sub(half).clamp(piece.start, piece.end - span);
+            speed[k] = -Window::apply(&w.first, &theta[first..first + span]) / (total * dt);
+        }
+    }
     let still = 1e-3 * rms(&speed);
     let sign: Vec<f64> = speed.iter().map(|v| if v.abs() <= still { 0.0 } else { v.signum() }).collect();
     let step = (half / 2).max(1);
-    let centres: Vec<usize> = (half..n - half).step_by(step).collect();
+    let mut centres = Vec::new();
+    let (mut times, mut of_piece) = (Vec::new(), Vec::new());
+    let pieces = motions.pieces.iter().zip(motions.starts).enumerate();
+    for (number, (piece, start)) in pieces.filter(|(_, (p, _))| p.len() >= span) {
+        let own = (piece.start + half..piece.end - half).step_by(step);
+        times.extend(own.clone().map(|k| start + (k - piece.start) as f64 * dt));
+        of_piece.extend(own.clone().map(|_| number));
+        centres.extend(own);
+    }
+    if centres.len() < 8 {
+        return Err(RigidError::TooShort { samples: theta.len(), window: span });
+    }
     let row = |i: usize| {
         let range = centres[i] - half..centres[i] + half + 1;
         let angle = &theta[range.clone()];
@@ -153,26 +205,37 @@ fn in_windows(torque: &[f64], theta: &[f64], dt: f64, start: f64, half: usize) -
     let rows: Vec<[f64; 5]> = (0..centres.len()).map(row).collect();
     let modelled: Vec<f64> = rows.iter().map(|r| (0..4).map(|j| r[j] * values[j]).sum()).collect();
     let residual: Vec<f64> = rows.iter().zip(&modelled).map(|(r, m)| r[4] - m).collect();
-    let std = robust(&rows, &residual, &solution.inverse);
+    let std = robust(&rows, &residual, &of_piece, &solution.inverse);
     Ok(Rigid {
         values,
         std,
         half,
-        fit: (centres.iter().map(|k| start + *k as f64 * dt).collect(), rows.iter().map(|r| r[4]).collect(), modelled),
+        fit: (times, rows.iter().map(|r| r[4]).collect(), modelled),
         rows,
+        of_piece,
     })
+}
+
+/// The rows of the piece that has most.
+fn longest_run(of_piece: &[usize]) -> Range<usize> {
+    let mut first = 0;
+    let runs = of_piece.chunk_by(|a, b| a == b).map(|run| {
+        first += run.len();
+        first - run.len()..first
+    });
+    runs.max_by_key(ExactSizeIterator::len).unwrap_or(0..0)
 }
 
 /// Standard errors that allow for windows that overlap and residuals that last: Newey-West with a lag of eight windows
 /// (W. K. Newey, K. D. West, Econometrica 55, 1987).
-fn robust(rows: &[[f64; 5]], residual: &[f64], inverse: &DMatrix<f64>) -> Vector4<f64> {
+fn robust(rows: &[[f64; 5]], residual: &[f64], of_piece: &[usize], inverse: &DMatrix<f64>) -> Vector4<f64> {
     const LAGS: usize = 8;
     let score = |k: usize| DVector::from_iterator(4, (0..4).map(|j| rows[k][j] * residual[k]));
     let scores: Vec<DVector<f64>> = (0..rows.len()).map(score).collect();
     let mut middle = DMatrix::<f64>::zeros(4, 4);
     for lag in 0..=LAGS.min(rows.len() - 1) {
         let weight = 1.0 - lag as f64 / (LAGS + 1) as f64;
-        for k in lag..rows.len() {
+        for k in (lag..rows.len()).filter(|k| of_piece[*k] == of_piece[k - lag]) {
             let product = &scores[k] * scores[k - lag].transpose();
             if lag == 0 {
                 middle += product;
@@ -193,10 +256,11 @@ fn units(motion: Motion) -> [&'static str; 4] {
 }
 
 /// Torques at one unit of viscous friction, dry friction and load, as shares of the torque's size.
-fn shares(torque: &[f64], theta: &[f64], dt: f64) -> [f64; 3] {
-    let size = rms(torque).max(f64::MIN_POSITIVE);
-    let span = 8.min(theta.len() - 1).max(1);
-    let speed: Vec<f64> = theta.windows(span + 1).map(|w| (w[span] - w[0]) / (span as f64 * dt)).collect();
+fn shares(motions: &Motions) -> [f64; 3] {
+    let size = rms(motions.torque).max(f64::MIN_POSITIVE);
+    let span = 8.min(motions.longest().saturating_sub(1)).max(1);
+    let windows = motions.pieces.iter().flat_map(|p| motions.theta[p.clone()].windows(span + 1));
+    let speed: Vec<f64> = windows.map(|w| (w[span] - w[0]) / (span as f64 * motions.dt)).collect();
     [rms(&speed) / size, 1.0 / size, 1.0 / size]
 }
 
@@ -225,12 +289,12 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
 }
 
 /// How well a fit to the first two thirds makes the torque of the last third, per cent.
-fn held_out(torque: &[f64], theta: &[f64], dt: f64) -> Option<f64> {
-    let n = theta.len();
-    let cut = 2 * n / 3;
-    let first = weak_least_squares(&torque[..cut], &theta[..cut], dt, 0.0).ok()?;
+fn held_out(joined: &Joined) -> Option<f64> {
+    let n = joined.len();
+    let (first, rest) = (joined.part(0..2 * n / 3), joined.part(2 * n / 3..n));
+    let first = weak_in_pieces(&Motions::of(&first).ok()?).ok()?;
     // The same windows on the rest: the regression's rows there, with the first part's estimates.
-    let rest = in_windows(&torque[cut..], &theta[cut..], dt, 0.0, first.half).ok()?;
+    let rest = in_windows(&Motions::of(&rest).ok()?, first.half).ok()?;
     let error: Vec<f64> =
         rest.rows.iter().map(|r| r[4] - (0..4).map(|j| r[j] * first.values[j]).sum::<f64>()).collect();
     let size = rms(&rest.fit.1);
@@ -239,14 +303,14 @@ fn held_out(torque: &[f64], theta: &[f64], dt: f64) -> Option<f64> {
 
 /// `eixo identify` for a rigid axis.
 pub(super) fn identify(
-    trace: &Trace,
+    joined: &Joined,
     machine: &Machine,
     request: &Request,
     file: &str,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Identification, TraceError> {
-    let torque = trace.require(Signal::T)?;
-    let theta = trace.require(Signal::Theta1)?;
+    let trace = joined.samples();
+    let motions = Motions::of(joined)?;
     let motion = machine.signals.motion;
     progress("weak-form least squares");
     let mut result = MethodResult::empty("ls", "Least squares, weak form");
@@ -254,8 +318,8 @@ pub(super) fn identify(
     let unit = Signal::T.unit(motion);
     let mut recommended = None;
     let mut evidence = Evidence::default();
-    let found = weak_least_squares(torque, theta, trace.dt, trace.start).map_err(|e| e.to_string());
-    match found.and_then(|f| physical(f, &shares(torque, theta, trace.dt))) {
+    let found = weak_in_pieces(&motions).map_err(|e| e.to_string());
+    match found.and_then(|f| physical(f, &shares(&motions))) {
         Ok(found) => {
             let window = (2 * found.half + 1) as f64 * trace.dt;
             result.formulation =
@@ -263,8 +327,8 @@ pub(super) fn identify(
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
             evidence = Evidence {
-                held_out: held_out(torque, theta, trace.dt),
-                shares: Some(shares(torque, theta, trace.dt)),
+                held_out: held_out(joined),
+                shares: Some(shares(&motions)),
                 explained: None,
             };
             for (i, name) in names.into_iter().enumerate() {
@@ -273,18 +337,18 @@ pub(super) fn identify(
             }
             let (time, measured, modelled) = found.fit;
             let error: Vec<f64> = modelled.iter().zip(&measured).map(|(a, b)| a - b).collect();
-            let dt = time.get(1).map_or(trace.dt, |t| t - time[0]);
+            let dt = (found.half / 2).max(1) as f64 * trace.dt;
+            let longest = longest_run(&found.of_piece);
             let percent = 100.0 * rms(&error) / rms(&measured).max(f64::MIN_POSITIVE);
-            result.outputs.push(OutputFit {
-                signal: Signal::T,
-                ..output_fit(Signal::T, &measured, &error.iter().map(|e| -e).collect::<Vec<_>>(), trace, motion)
-            });
+            let at = |k: usize| time[k];
+            let residual: Vec<f64> = error.iter().map(|e| -e).collect();
+            result.outputs.push(OutputFit { signal: Signal::T, ..output_fit(Signal::T, &measured, &residual, at, motion) });
             result.excitation = Some(ExcitationEstimate {
                 formulation: "I*a + D*w + F*sign(w) + L, means over the windows",
                 error_percent: percent,
-                estimate: Series::over_time("estimated T", unit, time[0], dt, &modelled),
-                error: Series::over_time("error of T", unit, time[0], dt, &error),
-                spectrum: spectrum("estimated T", unit, dt, &modelled),
+                estimate: Series::over("estimated T", unit, at, &modelled),
+                error: Series::over("error of T", unit, at, &error),
+                spectrum: spectrum("estimated T", unit, dt, &modelled[longest]),
             });
             recommended = Some(Recommendation {
                 method: 0,
@@ -299,12 +363,12 @@ pub(super) fn identify(
         schema: SCHEMA,
         machine: machine.name.clone(),
         structure: "rigid",
-        trace: summary(trace, file, None),
+        trace: summary(joined, file, None),
         methods: vec![result],
         recommended,
         earned,
-        torque: Series::over_time("T", unit, trace.start, trace.dt, torque),
-        torque_spectrum: spectrum("T", unit, trace.dt, torque),
+        torque: Series::over("T", unit, |k| joined.time(k), motions.torque),
+        torque_spectrum: spectrum("T", unit, trace.dt, &motions.torque[joined.longest()]),
         frequency_response: None,
         warnings: Vec::new(),
     })

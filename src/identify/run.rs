@@ -2,12 +2,13 @@
 
 use super::earned::{Earned, Evidence};
 use super::frequency;
+use super::joined::{Joined, noise_in_pieces};
 use super::methods::Run;
 use super::output_error::OutputError;
 use super::record::{Record, period};
 use super::result::{Identification, MethodResult, Recommendation, SCHEMA, Series, TraceSummary};
 use super::rigid;
-use super::statistics::{noise_level, rms, spectrum};
+use super::statistics::{rms, spectrum};
 use crate::axis::{Hold, Scheme, Structure};
 use crate::effects::EFFECTS;
 use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
@@ -125,20 +126,33 @@ pub fn identify(
     file: &str,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Identification, TraceError> {
+    identify_joined(Joined::one(trace), machine, request, file, progress)
+}
+
+/// Identifies the machine from the pieces of a record, used together: see [`identify`].
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_joined(
+    mut joined: Joined<'_>,
+    machine: &Machine,
+    request: &Request,
+    file: &str,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Identification, TraceError> {
     if machine.structure == Structure::Rigid {
-        return rigid::identify(trace, machine, request, file, progress);
+        return rigid::identify(&joined, machine, request, file, progress);
     }
     let mut warnings = Vec::new();
-    let mut consistent = trace.clone();
     for (angle, speed) in [(Signal::Theta1, Signal::Omega1), (Signal::Theta2, Signal::Omega2)] {
-        let off = speed_error(trace, angle, speed);
+        let off = speed_error(&joined, angle, speed);
         if off > DIFFERENT_SPEED {
-            consistent.remove(speed);
+            joined.remove(speed);
             warnings.push(different_speed(speed, angle, off));
         }
     }
-    let trace = &consistent;
-    let record = Record::new(trace, machine.parameters.rho)?;
+    let joined = &joined;
+    let record = Record::of(joined, machine.parameters.rho)?;
     let known: Vec<&str> = EFFECTS.iter().filter(|e| machine.effects.is_on(**e)).map(|e| e.info().id).collect();
     if !known.is_empty() {
         warnings.push(format!(
@@ -154,27 +168,39 @@ pub fn identify(
             Signal::Theta2.unit(machine.signals.motion)
         ));
     }
-    let samples = request.period.or_else(|| period(record.torque));
-    let measured = samples.and_then(|n| frequency::measure(trace, n));
+    // Only within a piece are the periods known to follow each other.
+    let longest = joined.longest_trace();
+    let pieces = joined.pieces().len();
+    let samples = request.period.or_else(|| period(longest.get(Signal::T)?));
+    let measured = samples.and_then(|n| frequency::measure(&longest, n));
     // On a measured record of several periods the regressions work on the average of the periods: drift, most of the
     // noise and what lies between the excited lines would rule them otherwise.
-    let noisy = || noise_level(record.theta1) > NOISE_FREE * rms(record.theta1);
+    let noisy = || noise_in_pieces(record.theta1, joined.pieces()) > NOISE_FREE * rms(record.theta1);
     let averaged = match &measured {
-        Some(m) if m.periods >= 3 && noisy() => Some(frequency::average(trace, m)?),
+        Some(m) if m.periods >= 3 && noisy() => Some(frequency::average(&longest, m)?),
         _ => None,
     };
-    let whole = Record::new(trace, machine.parameters.rho)?;
-    let record = match &averaged {
-        Some(average) => {
+    let whole = Record::of(joined, machine.parameters.rho)?;
+    let averaged_joined = averaged.as_ref().map(Joined::one);
+    let record = match (&averaged, &averaged_joined) {
+        (Some(average), _) => {
             warnings.push(format!(
-                "the record is periodic: what is identified is the average of {} periods, excited lines only, speeds \
+                "the record is periodic: what is identified is the average of {} periods{}, excited lines only, speeds \
                  derived from the angles line by line",
-                measured.as_ref().map_or(0, |m| m.periods)
+                measured.as_ref().map_or(0, |m| m.periods),
+                if pieces > 1 { " of its longest piece, the other pieces have no part in it" } else { "" }
             ));
             Record::new(average, machine.parameters.rho)?
         }
-        None => record,
+        _ => record,
     };
+    if averaged.is_none() && measured.is_some() && pieces > 1 && request.methods.contains(&Method::Frequency) {
+        warnings.push(
+            "the frequency response is that of the longest piece of the record alone: which phase the period has in the \
+             others is not known"
+                .to_owned(),
+        );
+    }
     if record.omega.is_none() {
         warnings.push(
             "speeds are not measured on both sides: the regressions work on differences of positions and are easily \
@@ -189,10 +215,11 @@ pub fn identify(
         angles.remove(Signal::Omega2);
         angles
     });
-    let compared = angles.as_ref().unwrap_or(trace);
-    let outputs = OutputError::new(compared, machine.parameters.rho, machine.structure, machine.effects)?;
+    let angles = angles.as_ref().map(Joined::one);
+    let compared = angles.as_ref().unwrap_or(joined);
+    let outputs = OutputError::of(compared, machine.parameters.rho, machine.structure, machine.effects)?;
     let mut run = Run {
-        trace,
+        joined,
         compared,
         machine,
         request,
@@ -236,12 +263,12 @@ pub fn identify(
         schema: SCHEMA,
         machine: machine.name.clone(),
         structure: "two_inertia",
-        trace: summary(trace, file, samples.filter(|_| measured.is_some())),
+        trace: summary(joined, file, samples.filter(|_| measured.is_some())),
         methods,
         recommended,
         earned,
-        torque: Series::over_time("T", unit, trace.start, trace.dt, whole.torque),
-        torque_spectrum: spectrum("T", unit, trace.dt, whole.torque),
+        torque: Series::over("T", unit, |k| joined.time(k), whole.torque),
+        torque_spectrum: spectrum("T", unit, whole.dt, longest.require(Signal::T)?),
         frequency_response,
         warnings,
     })
@@ -258,21 +285,25 @@ pub(super) fn different_speed(speed: Signal, angle: Signal, off: f64) -> String 
 
 /// How far a logged speed is from the derivative of its angle, relative root mean square: the angle's way over eight
 /// samples against the integral of the speed. Zero where one of them is not logged.
-fn speed_error(trace: &Trace, angle: Signal, speed: Signal) -> f64 {
+fn speed_error(joined: &Joined, angle: Signal, speed: Signal) -> f64 {
     const SPAN: usize = 8;
+    let trace = joined.samples();
     let (Some(x), Some(v)) = (trace.get(angle), trace.get(speed)) else { return 0.0 };
     let (mut difference, mut size) = (0.0, 0.0);
-    for k in (0..x.len().saturating_sub(SPAN)).step_by(SPAN) {
-        let way = x[k + SPAN] - x[k];
-        let integral = trace.dt * (v[k..k + SPAN].iter().sum::<f64>() + 0.5 * (v[k + SPAN] - v[k]));
-        difference += (way - integral).powi(2);
-        size += way * way;
+    for piece in joined.pieces() {
+        for k in (piece.start..piece.end.saturating_sub(SPAN)).step_by(SPAN) {
+            let way = x[k + SPAN] - x[k];
+            let integral = trace.dt * (v[k..k + SPAN].iter().sum::<f64>() + 0.5 * (v[k + SPAN] - v[k]));
+            difference += (way - integral).powi(2);
+            size += way * way;
+        }
     }
     if size > 0.0 { (difference / size).sqrt() } else { 0.0 }
 }
 
 /// What the record was.
-pub(super) fn summary(trace: &Trace, file: &str, period: Option<usize>) -> TraceSummary {
+pub(super) fn summary(joined: &Joined, file: &str, period: Option<usize>) -> TraceSummary {
+    let trace = joined.samples();
     TraceSummary {
         file: file.to_owned(),
         samples: trace.len(),
@@ -282,6 +313,7 @@ pub(super) fn summary(trace: &Trace, file: &str, period: Option<usize>) -> Trace
         hold: hold_name(trace.hold),
         signals: trace.signals().collect(),
         period,
+        pieces: joined.pieces().len(),
     }
 }
 

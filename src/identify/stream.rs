@@ -92,6 +92,7 @@ impl Frame<'_> {
             start: frame.start,
             hold: frame.hold,
             zero_offset: self.zero_offset,
+            pieces: Cow::Borrowed(&[]),
         }
     }
 }
@@ -196,6 +197,7 @@ pub fn identify(
             hold: hold_name(at.hold),
             signals: stream.signals().collect(),
             period: None,
+            pieces: 1,
         },
         methods,
         recommended: best.map(|method| Recommendation {

@@ -3,6 +3,7 @@
 
 use super::identify;
 use super::{Block, Cell, Report, Section, Table, Tone, Verdict};
+use crate::identify::joined::Joined;
 use crate::identify::result::{Identification, MethodResult};
 use crate::identify::tables::PaperTables;
 use crate::trace::Trace;
@@ -81,7 +82,7 @@ pub fn report(f: &Findings, diagnosis: &Report, circle: &Report) -> Report {
 
 /// The paper's experiment.
 fn paper(f: &Findings) -> Report {
-    let mut report = identify::report(&f.consistent, Some(&f.record));
+    let mut report = identify::report(&f.consistent, Some(&Joined::one(&f.record)));
     report.title = "The XY table's axis, from FMU to parameters".to_owned();
     let mut sections = vec![Section::new("", vec![Block::Verdict(verdict(f)), Block::KeyValues(experiment(f))])];
     // The identification's own head becomes a section like the others.

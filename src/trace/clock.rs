@@ -16,7 +16,7 @@ pub(super) enum Resampling {
     None,
     /// Each sample is moved by less than half an interval.
     Near,
-    /// The grid has its own samples: stamps that a computer took, some samples lost.
+    /// The grid has its own samples: stamps that a computer took, some samples lost, or an interval that was asked for.
     Far { samples: usize },
 }
 
@@ -30,6 +30,16 @@ pub(super) struct Clock {
     pub stamps: Option<Vec<f64>>,
     /// How the columns are brought to it.
     pub resampling: Resampling,
+}
+
+/// The clocks of a record: the longest piece without gaps, and the others.
+pub(super) struct Clocks {
+    /// Of the longest piece.
+    pub longest: Clock,
+    /// Of the others, in the order of the file.
+    pub others: Vec<Clock>,
+    /// What is to be said of the gaps, where there are any: the pieces, without what becomes of them.
+    pub gaps: Option<String>,
 }
 
 /// Stamps that count from a calendar's beginning, in a unit that only their size tells, brought to seconds from the first.
@@ -62,10 +72,11 @@ const BRIDGED: f64 = 6.0;
 const MISSING: f64 = 0.05;
 
 /// The grid: cut by `from` and `to`, at gaps, and brought to even steps where the stamps are not.
-pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Result<Clock, TraceError> {
+pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Result<Clocks, TraceError> {
     let file = || table.file.clone();
     let count = table.rows();
     let short = |found: usize| TraceError::Cut { file: file(), found, rows: count, needed: SHORTEST };
+    let alone = |longest: Clock| Clocks { longest, others: Vec::new(), gaps: None };
     let Some(column) = time_column(table, mapping)? else {
         let dt = mapping.dt.unwrap_or(1.0);
         let index = |t: f64| (t / dt).round().clamp(0.0, count as f64) as usize;
@@ -75,7 +86,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         }
         let start = rows.start as f64 * dt;
         let grid = Grid { start, dt, sampling: Sampling::Uniform };
-        return Ok(Clock { grid, rows, stamps: None, resampling: Resampling::None });
+        return Ok(alone(Clock { grid, rows, stamps: None, resampling: Resampling::None }));
     };
     let mut time = values(table, &column, "time", Quantity::Time, &(0..count))?;
     epoch(&mut time, table, &column, warnings)?;
@@ -92,73 +103,93 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         }
         time = time[rows.clone()].to_vec();
     }
-    let line = |rows: &Range<usize>, k: usize| table.line(rows.start + k);
-    let mut found = grid(&time);
-    if let Err(NoGrid::Gap { row, gap, dt: middle }) = found {
-        // Stamps that a computer took come in clusters: the mean of the steps without lost samples is the rate.
-        let steps = || time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= 2.5 * middle);
-        let usual = (steps().sum::<f64>() / steps().count().max(1) as f64).max(middle);
-        let dt = usual;
-        let wide = |k: usize| time[k] - time[k - 1] > BRIDGED * usual;
-        let missing: f64 =
-            (1..time.len()).map(|k| ((time[k] - time[k - 1]) / usual).round() - 1.0).filter(|m| *m > 0.0).sum();
-        let (mut best, mut start) = (0..0, 0);
-        for k in 1..=time.len() {
-            if k == time.len() || wide(k) {
-                if k - start > best.len() {
-                    best = start..k;
-                }
-                start = k;
-            }
-        }
-        let refused = TraceError::Gap {
-            file: file(),
-            line: line(&rows, row),
-            gap,
-            missing: ((gap / dt).round() as usize).saturating_sub(1).max(1),
-            dt,
-        };
-        let bridges = missing <= MISSING * time.len() as f64;
-        if best.len() < SHORTEST || (best.len() == time.len() && !bridges) {
-            return Err(refused);
-        }
-        if best.len() < time.len() {
-            let pieces = 1 + (1..time.len()).filter(|k| wide(*k)).count();
-            warnings.push(format!(
-                "{}: the record has gaps and is {pieces} pieces (the first ends before row {}); the longest is used, {} of {} \
-                 samples, {:.6} s to {:.6} s. Another is taken with --from and --to",
-                table.file,
-                line(&rows, (1..time.len()).find(|k| wide(*k)).unwrap_or(row)),
-                best.len(),
-                time.len(),
-                time[best.start],
-                time[best.end - 1]
-            ));
-            rows = rows.start + best.start..rows.start + best.end;
-            time = time[best].to_vec();
-            found = grid(&time);
+    let line = |k: usize| table.line(rows.start + k);
+    let Err(NoGrid::Gap { row, gap, dt: middle }) = grid(&time) else {
+        return even(table, rows, time, mapping, warnings).map(alone);
+    };
+    // Stamps that a computer took come in clusters: the mean of the steps without lost samples is the rate.
+    let steps = || time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= 2.5 * middle);
+    let usual = (steps().sum::<f64>() / steps().count().max(1) as f64).max(middle);
+    let wide = |k: usize| time[k] - time[k - 1] > BRIDGED * usual;
+    let missing: f64 =
+        (1..time.len()).map(|k| ((time[k] - time[k - 1]) / usual).round() - 1.0).filter(|m| *m > 0.0).sum();
+    let (mut pieces, mut start) = (Vec::new(), 0);
+    for k in 1..=time.len() {
+        if k == time.len() || wide(k) {
+            pieces.push(start..k);
+            start = k;
         }
     }
+    // Of pieces of one length the first.
+    let best = pieces.iter().fold(0..0, |best: Range<usize>, p| if p.len() > best.len() { p.clone() } else { best });
+    let bridges = missing <= MISSING * time.len() as f64;
+    if best.len() < SHORTEST || (best.len() == time.len() && !bridges) {
+        let missing = ((gap / usual).round() as usize).saturating_sub(1).max(1);
+        return Err(TraceError::Gap { file: file(), line: line(row), gap, missing, dt: usual });
+    }
+    if pieces.len() == 1 {
+        return even(table, rows, time, mapping, warnings).map(alone);
+    }
+    let gaps = format!(
+        "{}: the record has gaps and is {} pieces (the first ends before row {})",
+        table.file,
+        pieces.len(),
+        line(pieces[1].start)
+    );
+    let of = |piece: &Range<usize>, warnings: &mut Vec<String>| {
+        let part = rows.start + piece.start..rows.start + piece.end;
+        even(table, part, time[piece.clone()].to_vec(), mapping, warnings)
+    };
+    let longest = of(&best, warnings)?;
+    // What holds for the longest piece is said of it; another that cannot be used is left out.
+    let mut others: Vec<Clock> = pieces
+        .iter()
+        .filter(|p| **p != best && p.len() >= LEAST_PIECE)
+        .filter_map(|p| of(p, &mut Vec::new()).ok())
+        .collect();
+    others.retain(|o| (o.grid.dt / longest.grid.dt - 1.0).abs() < SAME_RATE);
+    Ok(Clocks { longest, others, gaps: Some(gaps) })
+}
+
+/// Least samples of a piece beside the longest.
+const LEAST_PIECE: usize = 64;
+/// Relative difference of the sampling intervals of pieces of one record.
+const SAME_RATE: f64 = 1e-3;
+
+/// The grid of rows without gaps; their stamps are `time`.
+fn even(
+    table: &Table,
+    rows: Range<usize>,
+    time: Vec<f64>,
+    mapping: &Mapping,
+    warnings: &mut Vec<String>,
+) -> Result<Clock, TraceError> {
+    let file = || table.file.clone();
+    let line = |k: usize| table.line(rows.start + k);
+    let found = grid(&time);
     let named = |e: NoGrid| match e {
         NoGrid::TooShort => TraceError::TooShort { file: file(), found: time.len(), needed: SHORTEST },
         NoGrid::NotIncreasing { row } => {
-            TraceError::NotIncreasing { file: file(), line: line(&rows, row), before: time[row - 1], after: time[row] }
+            TraceError::NotIncreasing { file: file(), line: line(row), before: time[row - 1], after: time[row] }
         }
         NoGrid::Gap { row, gap, dt } => TraceError::Gap {
             file: file(),
-            line: line(&rows, row),
+            line: line(row),
             gap,
             missing: ((gap / dt).round() as usize).saturating_sub(1).max(1),
             dt,
         },
         NoGrid::Jitter { row, jitter, dt } => TraceError::Jitter {
             file: file(),
-            line: line(&rows, row),
+            line: line(row),
             jitter: 100.0 * jitter,
             limit: 100.0 * Sampling::RESAMPLED,
             dt,
         },
     };
+    if let (Some(dt), Ok(_) | Err(NoGrid::Gap { .. } | NoGrid::Jitter { .. })) = (mapping.resample, &found) {
+        return resampled(table, rows, time, dt, warnings);
+    }
     let (grid, resampling) = match found {
         Ok(grid) => match grid.sampling {
             Sampling::Uniform => (grid, Resampling::None),
@@ -196,3 +227,38 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
     };
     Ok(Clock { grid, rows, stamps: Some(time), resampling })
 }
+
+/// The grid that is asked for, whatever the stamps.
+fn resampled(
+    table: &Table,
+    rows: Range<usize>,
+    time: Vec<f64>,
+    dt: f64,
+    warnings: &mut Vec<String>,
+) -> Result<Clock, TraceError> {
+    let (start, length) = (time[0], time[time.len() - 1] - time[0]);
+    let samples = length / dt * (1.0 + 1e-9) + 1.0;
+    if samples < SHORTEST as f64 || samples > MOST_SAMPLES {
+        return Err(TraceError::Resample { file: table.file.clone(), dt, length });
+    }
+    let samples = samples as usize;
+    let logged = length / (time.len() - 1) as f64;
+    // Both the stamps and the new grid bound what is left of the motion.
+    let band = 0.1 / logged.max(dt);
+    let folded = if dt > 1.5 * logged {
+        format!("; what moves faster than {:.4} Hz is folded into slower motion, as no filter is applied", 0.5 / dt)
+    } else {
+        String::new()
+    };
+    warnings.push(format!(
+        "{}: resampled to dt = {dt:.9e} s as asked for, {samples} samples from {} stamps; the motion is kept up to about \
+         {band:.4} Hz (97 % of an amplitude), what moves faster is smeared{folded}",
+        table.file,
+        time.len()
+    ));
+    let grid = Grid { start, dt, sampling: Sampling::Jittered { jitter: 0.5 } };
+    Ok(Clock { grid, rows, stamps: Some(time), resampling: Resampling::Far { samples } })
+}
+
+/// Most samples that a record is resampled to.
+const MOST_SAMPLES: f64 = 1e8;

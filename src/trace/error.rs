@@ -199,6 +199,20 @@ pub enum TraceError {
         /// The usual interval, s.
         dt: f64,
     },
+    /// A resampling that leaves too little, or needs too much.
+    #[error(
+        "{file}: resampled to dt = {dt:e} s, {length:.6} s of record are {:.3e} samples; give --resample another interval \
+         (s): a record has at least 16 samples and at most 1e8",
+        length / dt + 1.0
+    )]
+    Resample {
+        /// The file.
+        file: String,
+        /// The interval asked for, s.
+        dt: f64,
+        /// Length of the record, s.
+        length: f64,
+    },
     /// Fewer samples than any use needs.
     #[error("{file}: {found} samples, at least {needed} are needed; record longer or sample faster")]
     TooShort {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::clock::{Clock, Resampling, clock};
+use super::clock::{Clock, Clocks, Resampling, clock};
 use super::error::{TraceError, nearest};
 use super::sampling::{resample, resample_far};
 use super::signal::{Motion, Quantity, Signal};
@@ -57,6 +57,8 @@ pub struct Mapping {
     pub from: Option<f64>,
     /// Last time used, s.
     pub to: Option<f64>,
+    /// Interval that the record is resampled to, s, whatever its stamps.
+    pub resample: Option<f64>,
 }
 
 impl Default for Mapping {
@@ -69,6 +71,7 @@ impl Default for Mapping {
             motion: Motion::Rotary,
             from: None,
             to: None,
+            resample: None,
         }
     }
 }
@@ -84,6 +87,15 @@ pub struct Loaded {
     pub warnings: Vec<String>,
 }
 
+/// A record as its gaps have left it.
+#[derive(Debug, Clone)]
+pub struct LoadedPieces {
+    /// The longest piece, and what the user should know about the whole.
+    pub longest: Loaded,
+    /// The other pieces, in the order of the file: trace and stamps.
+    pub others: Vec<(Trace, Option<Vec<f64>>)>,
+}
+
 /// Reads a trace file.
 ///
 /// # Errors
@@ -92,39 +104,88 @@ pub fn load(path: &Path, mapping: &Mapping) -> Result<Loaded, TraceError> {
     from_table(&Table::read(path)?, mapping)
 }
 
-/// Makes the trace of a table.
+/// Reads a trace file with all its pieces.
+///
+/// # Errors
+/// [`TraceError`], naming file, row and column.
+pub fn load_pieces(path: &Path, mapping: &Mapping) -> Result<LoadedPieces, TraceError> {
+    pieces(&Table::read(path)?, mapping, true)
+}
+
+/// Makes the trace of a table: of one with gaps the longest piece.
 ///
 /// # Errors
 /// [`TraceError`], naming file, row and column.
 pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError> {
+    pieces(table, mapping, false).map(|p| p.longest)
+}
+
+/// Makes the traces of a table: the longest piece, and the others where they are `wanted`.
+fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPieces, TraceError> {
     let mut warnings = Vec::new();
     let wanted = wanted(table, mapping, &mut warnings)?;
     if table.rows() < SHORTEST {
         return Err(TraceError::TooShort { file: table.file.clone(), found: table.rows(), needed: SHORTEST });
     }
-    let Clock { grid, rows, stamps, resampling } = clock(table, mapping, &mut warnings)?;
+    let Clocks { longest: clock, others, gaps } = clock(table, mapping, &mut warnings)?;
+    let others = if together { others } else { Vec::new() };
+    let longest = trace(table, mapping, &wanted, &clock, &mut warnings)?;
+    let others: Vec<(Trace, Option<Vec<f64>>)> = others
+        .into_iter()
+        .filter_map(|mut other| {
+            let mut piece = trace(table, mapping, &wanted, &other, &mut Vec::new()).ok()?;
+            // The rate is the same but for the rounding of the stamps.
+            piece.dt = longest.dt;
+            Some((piece, other.stamps.take()))
+        })
+        .collect();
+    if let Some(gaps) = gaps {
+        let used = longest.len() + others.iter().map(|(t, _)| t.len()).sum::<usize>();
+        let end = longest.time(longest.len() - 1);
+        warnings.push(if others.is_empty() {
+            format!(
+                "{gaps}; the longest is used, {used} samples, {:.6} s to {end:.6} s. Another is taken with --from and --to",
+                longest.start
+            )
+        } else {
+            format!("{gaps}; {} of them are used together, {used} samples", others.len() + 1)
+        });
+    }
+    let longest = Loaded { trace: longest, stamps: clock.stamps, warnings };
+    Ok(LoadedPieces { longest, others })
+}
+
+/// The signals on a clock.
+fn trace(
+    table: &Table,
+    mapping: &Mapping,
+    wanted: &[(Signal, Column)],
+    clock: &Clock,
+    warnings: &mut Vec<String>,
+) -> Result<Trace, TraceError> {
+    let Clock { grid, rows, stamps, resampling } = clock;
     let mut trace = Trace::new(grid.start, grid.dt, mapping.hold);
     for (signal, column) in wanted {
-        let mut values = values(table, &column, signal.name(), signal.quantity(mapping.motion), &rows)?;
-        if let Some(word) = unwrap(&mut values, table, &column, signal, mapping.motion)? {
+        let mut values = values(table, column, signal.name(), signal.quantity(mapping.motion), rows)?;
+        if let Some(word) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
             warnings.push(word);
         }
         let held = matches!(signal, Signal::T | Signal::Command) && mapping.hold == Hold::Zoh;
-        if let Some(time) = &stamps {
-            values = match resampling {
+        if let Some(time) = stamps {
+            values = match *resampling {
                 Resampling::None => values,
                 // The torque belongs to its sample under either hold: only the motion is read off at the grid's times.
                 Resampling::Near if matches!(signal, Signal::T | Signal::Command) => values,
-                Resampling::Near => resample(time, &values, &grid),
-                Resampling::Far { samples } => resample_far(time, &values, &grid, samples, held),
+                Resampling::Near => resample(time, &values, grid),
+                Resampling::Far { samples } => resample_far(time, &values, grid, samples, held),
             };
         }
-        trace.set(signal, values)?;
+        trace.set(*signal, values)?;
     }
     if trace.is_empty() {
         return Err(no_signal(table));
     }
-    Ok(Loaded { trace, stamps, warnings })
+    Ok(trace)
 }
 
 /// The signals that the file has, and where.

@@ -29,7 +29,7 @@ use std::ops::Range;
 pub use crate::axis::Hold;
 pub use error::TraceError;
 pub(crate) use error::nearest;
-pub use load::{Column, Loaded, Mapping, from_table, load};
+pub use load::{Column, Loaded, LoadedPieces, Mapping, from_table, load, load_pieces};
 pub(crate) use lost::bridge;
 pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};

@@ -144,11 +144,16 @@ impl Decimals {
 }
 
 /// Values at the `samples` times of a grid that the stamps lie anyhow to. A smooth signal by the cubic through the four
-/// samples around each time (Lagrange); a held one keeps the value of the last stamp.
+/// samples around each time (Lagrange); a held one keeps the value of the last stamp, or where an interval of the grid is
+/// wider than those of the stamps its mean over it, so that the impulse of a torque stays.
 #[must_use]
 pub fn resample_far(time: &[f64], values: &[f64], grid: &Grid, samples: usize, held: bool) -> Vec<f64> {
     let n = time.len();
     let mut below = 0;
+    let logged = (time[n - 1] - time[0]) / (n - 1).max(1) as f64;
+    if held && grid.dt > 1.5 * logged {
+        return (0..samples).map(|k| mean_of_held(time, values, grid.start + k as f64 * grid.dt, grid.dt, &mut below)).collect();
+    }
     (0..samples)
         .map(|k| {
             let t = grid.start + k as f64 * grid.dt;
@@ -162,6 +167,21 @@ pub fn resample_far(time: &[f64], values: &[f64], grid: &Grid, samples: usize, h
             lagrange(time, values, first..(first + 4).min(n), t)
         })
         .collect()
+}
+
+/// Mean over `t..t + dt` of a signal that keeps the value of its last stamp; `below` is where the last call ended.
+fn mean_of_held(time: &[f64], values: &[f64], t: f64, dt: f64, below: &mut usize) -> f64 {
+    let (mut from, end) = (t, t + dt);
+    let mut sum = 0.0;
+    while from < end {
+        while *below + 1 < time.len() && time[*below + 1] <= from {
+            *below += 1;
+        }
+        let until = time.get(*below + 1).map_or(end, |next| next.min(end));
+        sum += values[*below] * (until - from);
+        from = until;
+    }
+    sum / dt
 }
 
 /// The polynomial through the points of a range, at time `t`.
@@ -224,6 +244,16 @@ mod tests {
     #[test]
     fn time_that_stands_still_is_refused() {
         assert_eq!(grid(&[0.0, 1.0, 1.0, 2.0]), Err(NoGrid::NotIncreasing { row: 2 }));
+    }
+
+    #[test]
+    fn a_held_signal_on_a_wider_grid_keeps_its_impulse() {
+        let time: Vec<f64> = (0..41).map(|k| 0.25 * f64::from(k)).collect();
+        let values: Vec<f64> = (0..41).map(|k| f64::from(k * k % 7)).collect();
+        let grid = Grid { start: 0.0, dt: 1.0, sampling: Sampling::Jittered { jitter: 0.5 } };
+        for (k, mean) in resample_far(&time, &values, &grid, 10, true).into_iter().enumerate() {
+            assert!((mean - values[4 * k..4 * k + 4].iter().sum::<f64>() / 4.0).abs() < 1e-12, "{k}");
+        }
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! How well a simulation with the estimates follows the record.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::{line, recommended};
 use crate::identify::frequency;
+use crate::identify::joined::Joined;
 use crate::identify::result::{Identification, MethodResult, OutputFit};
 use crate::report::chart::{Axis, Chart, Colour, Dash, Series};
 use crate::report::format::{self, Medium};
@@ -94,11 +94,14 @@ pub fn fit(found: &Identification) -> Vec<Block> {
 const DRAWN: usize = 2;
 
 /// Measured against simulated, of the method to trust.
-pub fn follows(found: &Identification, record: Option<&Trace>) -> Option<Block> {
+pub fn follows(found: &Identification, record: Option<&Joined>) -> Option<Block> {
     let best = recommended(found)?;
     let record = compared(found, record?, best);
     let figure = |o: &OutputFit| {
-        let (time, measured, simulated) = pair(o, best, &record)?;
+        let (time, measured, simulated) = match &record {
+            Compared::Record(record) => pair(o, best, record),
+            Compared::Average(average) => pair(o, best, &Joined::one(average)),
+        }?;
         let time: Arc<[f64]> = time.into();
         let chart = Chart::new(
             format!("{}, measured and simulated", o.signal.name()),
@@ -118,35 +121,39 @@ pub fn follows(found: &Identification, record: Option<&Trace>) -> Option<Block> 
     }
 }
 
-/// What the simulation was compared with: the record, or the average of its periods.
-fn compared<'a>(found: &Identification, record: &'a Trace, best: &MethodResult) -> Cow<'a, Trace> {
+/// What the simulation was compared with: the record, or the average of the periods of its longest piece.
+enum Compared<'a> {
+    Record(&'a Joined<'a>),
+    Average(Trace),
+}
+
+fn compared<'a>(found: &Identification, record: &'a Joined<'a>, best: &MethodResult) -> Compared<'a> {
     let end = best.outputs.iter().filter_map(|o| o.residual.x.last()).fold(f64::NEG_INFINITY, |m, t| m.max(*t));
-    let short = record.len() > 1 && end < record.time(record.len() - 1) - 0.5 * record.dt;
-    let average = || frequency::average(record, &frequency::measure(record, found.trace.period?)?).ok();
+    let last = record.len().saturating_sub(1);
+    let short = record.len() > 1 && end < record.time(last) - 0.5 * record.samples().dt;
+    let longest = record.longest_trace();
+    let average = || frequency::average(&longest, &frequency::measure(&longest, found.trace.period?)?).ok();
     match short.then(average).flatten() {
-        Some(average) => Cow::Owned(average),
-        None => Cow::Borrowed(record),
+        Some(average) => Compared::Average(average),
+        None => Compared::Record(record),
     }
 }
 
 /// Time, measured and simulated values of an output; none where the values are not those that were compared.
-fn pair(o: &OutputFit, m: &MethodResult, record: &Trace) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
+fn pair(o: &OutputFit, m: &MethodResult, record: &Joined) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
     if o.signal == Signal::T {
         // A rigid axis is compared in torque, in means over windows: the record itself is not what was compared.
         let e = m.excitation.as_ref().filter(|e| e.estimate.x == e.error.x)?;
         let measured = e.estimate.y.iter().zip(&e.error.y).map(|(estimate, error)| estimate - error).collect();
         return Some((e.estimate.x.clone(), measured, e.estimate.y.clone()));
     }
-    let values = record.get(o.signal)?;
+    let values = record.samples().get(o.signal)?;
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let rms = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt();
     if (rms - o.rms).abs() > 1e-6 * o.rms {
         return None;
     }
-    let at = |t: f64| {
-        let k = ((t - record.start) / record.dt).round();
-        (k >= 0.0).then_some(k as usize).and_then(|k| values.get(k)).copied()
-    };
+    let at = |t: f64| values.get(record.at(t)?).copied();
     let measured = o.residual.x.iter().map(|t| at(*t)).collect::<Option<Vec<f64>>>()?;
     let simulated = measured.iter().zip(&o.residual.y).map(|(y, e)| y - e).collect();
     Some((o.residual.x.clone(), measured, simulated))

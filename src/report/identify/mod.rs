@@ -11,7 +11,7 @@ use super::chart::{Dash, Series};
 use super::format::{self, Medium};
 use super::{Block, Report, Section};
 use crate::identify::result::{Identification, MethodResult, Series as Curve};
-use crate::trace::Trace;
+use crate::identify::joined::Joined;
 pub(super) use estimates::{compare, errors};
 use estimates::{estimates, side_by_side};
 use excitation::excitation;
@@ -26,7 +26,7 @@ const DASHES: [Dash; 3] = [Dash::Solid, Dash::Dashed, Dash::Dotted];
 
 /// The whole report; with the record it opens with what was measured and what the estimates make of it.
 #[must_use]
-pub fn report(found: &Identification, record: Option<&Trace>) -> Report {
+pub fn report(found: &Identification, record: Option<&Joined>) -> Report {
     let mut top = vec![Block::Verdict(verdict(found))];
     top.extend(found.warnings.iter().cloned().map(Block::Warning));
     top.extend(follows(found, record));
