@@ -5,12 +5,15 @@
 //! ```
 //!
 //! X holds the measured rows, Z the same rows of a noise-free simulation with the parameters so far: the noise of X
-//! does not correlate with Z, so that the estimate has no bias (L. Ljung, System Identification, 2nd ed., 7.6).
+//! does not correlate with Z, so that the estimate has no bias (L. Ljung, System Identification, 2nd ed., 7.6). Its
+//! covariance is `inv(Z'X)*Omega*inv(Z'X)'`, Omega from the scores `z*e` ([`super::long_run`]), and no smaller than that of
+//! white residuals.
 
 use nalgebra::{Matrix4, Vector4};
 
 use super::output_error::{Free, OutputError};
-use super::parameters::Estimated;
+use super::long_run::Scores;
+use super::parameters::{Estimated, wider};
 use super::record::{Record, Row};
 use super::regression::RegressionError;
 use crate::axis::{Parameters, Scheme};
@@ -86,12 +89,18 @@ pub fn instrumental(
                 return Err(diverged());
             }
             let mut sum = 0.0;
+            let mut scores = Scores::new(n, 4);
             for k in 0..n {
-                let x = record.row(k);
-                sum += (x.torque - motor(&x).dot(&values)).powi(2) + table(&x).dot(&values).powi(2);
+                let (x, z) = (record.row(k), clean.row(k));
+                let (em, et) = (x.torque - motor(&x).dot(&values), -table(&x).dot(&values));
+                sum += em.powi(2) + et.powi(2);
+                let score = motor(&z) * em + table(&z) * et;
+                score.iter().enumerate().for_each(|(i, s)| scores.add(k, i, *s));
             }
             let variance = sum / (2 * n - 4) as f64;
-            estimated.covariance = Some(inverse * zz * inverse.transpose() * variance);
+            let plain = inverse * zz * inverse.transpose() * variance;
+            let coloured = inverse * scores.omega_of::<4>() * inverse.transpose();
+            estimated.covariance = Some(wider(&plain, &coloured));
             return Ok((estimated, round));
         }
     }

@@ -9,7 +9,7 @@
 //! B = 0.4*n^(2/3)). Of a long record the scores are summed over short blocks first: the fastest of the cosines hardly
 //! changes over one.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SMatrix};
 
 /// Most cosine transforms.
 const MOST: usize = 64;
@@ -33,7 +33,11 @@ pub(super) fn block(samples: usize) -> usize {
 impl Scores {
     /// Of `samples` samples and `width` unknowns, zero so far.
     pub fn new(samples: usize, width: usize) -> Self {
-        let block = block(samples);
+        Self::in_blocks(samples, width, block(samples))
+    }
+
+    /// The same in blocks of so many samples.
+    pub fn in_blocks(samples: usize, width: usize, block: usize) -> Self {
         Self { sums: vec![0.0; samples.div_ceil(block) * width], width, samples, block }
     }
 
@@ -46,6 +50,12 @@ impl Scores {
     /// Adds to the score of an unknown what a whole block of samples has.
     pub fn add_block(&mut self, block: usize, unknown: usize, value: f64) {
         self.sums[block * self.width + unknown] += value;
+    }
+
+    /// Omega of `N` unknowns.
+    pub fn omega_of<const N: usize>(&self) -> SMatrix<f64, N, N> {
+        let omega = self.omega();
+        SMatrix::from_fn(|i, j| omega[(i, j)])
     }
 
     /// Omega, width x width.

@@ -1,13 +1,11 @@
 //! Each method on a record: what it starts from, what it is called, how it ended.
 
-use nalgebra::Matrix4;
-
 use super::frequency::Measured;
 use super::instrumental::instrumental;
 use super::joined::Joined;
 use super::output_error::{Fit, Free, OutputError};
 use super::paper;
-use super::parameters::Estimated;
+use super::parameters::{Estimated, wider};
 use super::record::Record;
 use super::regression::{NOISE_ORDER, RegressionError, extended_batch, extended_recursive, least_squares, recursive};
 use super::result::{History, MethodResult};
@@ -168,8 +166,7 @@ impl Run<'_> {
             && !white()
             && let (Some(plain), Some(coloured)) = (best.estimated.covariance, self.outputs.coloured(&best))
         {
-            let factor = |i: usize| (plain[(i, i)] / coloured[(i, i)]).max(1.0).sqrt();
-            let wide = Matrix4::from_fn(|i, j| coloured[(i, j)] * factor(i) * factor(j));
+            let wide = wider(&plain, &coloured);
             if wide.iter().all(|v| v.is_finite()) {
                 best.estimated.covariance = Some(wide);
                 result.notes.push("the residual is not white: the standard errors allow for its colour".to_owned());

@@ -99,11 +99,14 @@ pub struct Rows {
     pub table: SVector<f64, 2>,
     /// Their covariance.
     pub table_covariance: SMatrix<f64, 2, 2>,
+    /// Covariance of all five where the residuals may be coloured and go together; None where it is not known.
+    pub coloured: Option<SMatrix<f64, 5, 5>>,
 }
 
 impl Rows {
     /// The four parameters that the five ratios agree on best, weighted by their covariances (the rows are five
-    /// equations in four unknowns: `I2` follows from stiffness and from damping).
+    /// equations in four unknowns: `I2` follows from stiffness and from damping). The weights are those of white
+    /// residuals; the covariance is that of coloured ones where it is known, and never below that of white ones.
     #[must_use]
     pub fn reconcile(&self) -> Estimated {
         let (m, t) = (&self.motor, &self.table);
@@ -122,10 +125,24 @@ impl Rows {
         }
         let relative = report.covariance();
         let unit = DVector::from_column_slice(direct.as_slice());
-        let covariance = Matrix4::from_fn(|i, j| relative[(i, j)] * unit[i] * unit[j]);
+        let mut covariance = Matrix4::from_fn(|i, j| relative[(i, j)] * unit[i] * unit[j]);
+        if let Some(coloured) = self.coloured.and_then(|five| problem.carried(&report.parameters, &relative, &five)) {
+            let coloured = Matrix4::from_fn(|i, j| coloured[(i, j)] * unit[i] * unit[j]);
+            covariance = wider(&covariance, &coloured);
+        }
         let values = Vector4::from_fn(|i, _| report.parameters[i] * unit[i]);
         Estimated { values, covariance: Some(covariance) }
     }
+}
+
+/// The coloured covariance, with no standard error below the plain one's.
+pub(super) fn wider(plain: &Matrix4<f64>, coloured: &Matrix4<f64>) -> Matrix4<f64> {
+    let factor = |i: usize| {
+        let ratio = plain[(i, i)] / coloured[(i, i)];
+        if ratio.is_finite() { ratio.max(1.0).sqrt() } else { 1.0 }
+    };
+    let wide = Matrix4::from_fn(|i, j| coloured[(i, j)] * factor(i) * factor(j));
+    if wide.iter().all(|v| v.is_finite()) && (0..4).all(|i| wide[(i, i)] > 0.0) { wide } else { *plain }
 }
 
 /// `W` with `W'W = inv(covariance)`, the covariance scaled to unit diagonal on the way.
@@ -145,6 +162,26 @@ struct Reconciliation<'a> {
 }
 
 impl Reconciliation<'_> {
+    /// The covariance of the five ratios carried to the four parameters (over their units): `A*five*A'` with
+    /// `A = inv(J'J)*J'*W`, which is how the parameters move with the ratios.
+    fn carried(
+        &self,
+        q: &DVector<f64>,
+        relative: &DMatrix<f64>,
+        five: &SMatrix<f64, 5, 5>,
+    ) -> Option<DMatrix<f64>> {
+        let jacobian = DMatrix::from_fn(5, 4, {
+            let residual = self.residual(q);
+            move |i, j| residual[i].eps[j]
+        });
+        let mut weights = DMatrix::zeros(5, 5);
+        weights.view_mut((0, 0), (3, 3)).copy_from(&self.wm);
+        weights.view_mut((3, 3), (2, 2)).copy_from(&self.wt);
+        let moved = relative * jacobian.transpose() * weights;
+        let covariance = &moved * DMatrix::from_fn(5, 5, |i, j| five[(i, j)]) * moved.transpose();
+        covariance.iter().all(|v| v.is_finite()).then_some(covariance)
+    }
+
     fn residual(&self, q: &DVector<f64>) -> [Dual<4>; 5] {
         let p: [Dual<4>; 4] = std::array::from_fn(|i| Dual::variable(q[i], i) * self.unit[i]);
         let [i1, i2, b, k] = p;
@@ -191,6 +228,7 @@ mod tests {
             motor_covariance: SMatrix::identity() * 1e-8,
             table: [p.k / p.i2, p.b / p.i2].into(),
             table_covariance: SMatrix::identity() * 1e-8,
+            coloured: None,
         };
         let found = rows.reconcile();
         for (value, expected) in found.values.iter().zip([p.i1, p.i2, p.b, p.k]) {

@@ -7,9 +7,14 @@
 //!
 //! The accelerations, which noise hurts most, stand on the left; the unknowns are reconciled to I1, I2, B, K by
 //! [`Rows::reconcile`].
+//!
+//! Standard errors allow for residuals that are not white ([`super::long_run`]): the covariance of the least-squares
+//! estimate is `inv(X'X)*Omega*inv(X'X)` with the long-run covariance of the scores `x*e`, over both equations, whose
+//! residuals may go together. They are never smaller than those of white residuals.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 
+use super::long_run::{self, Scores};
 use super::lsq::{Deficient, Solution, Triangle, triangularise};
 use super::parameters::{Estimated, Rows};
 use super::record::{Record, Row};
@@ -92,9 +97,94 @@ pub fn least_squares(record: &Record) -> Result<Estimated, RegressionError> {
 
 /// Least squares for both rows.
 pub(super) fn rows(record: &Record) -> Result<Rows, RegressionError> {
-    let mut squares = LeastSquares::new();
+    let mut squares = LeastSquares::new(record.rows());
     squares.extend(record, record.rows());
     squares.rows()
+}
+
+/// The motor's row: regressors and left side.
+const fn motor_row(r: &Row) -> [f64; 4] {
+    [-r.twist, -r.rate, r.torque, r.a1]
+}
+
+/// The table's row.
+const fn table_row(r: &Row) -> [f64; 3] {
+    [r.twist, r.rate, r.a2]
+}
+
+/// Products of the regressors with themselves and with the left side over blocks of rows: from them the scores follow
+/// for any estimate, without a second pass.
+pub(super) struct Moments {
+    block: usize,
+    rows: usize,
+    taken: usize,
+    /// Motor: 3 x 4; table: 2 x 3; one pair a block.
+    sums: Vec<([[f64; 4]; 3], [[f64; 3]; 2])>,
+}
+
+impl Moments {
+    /// Of a record of so many rows.
+    pub fn new(rows: usize) -> Self {
+        Self { block: long_run::block(rows), rows, taken: 0, sums: Vec::new() }
+    }
+
+    fn take(&mut self, r: &Row) {
+        if self.taken.is_multiple_of(self.block) {
+            self.sums.push(Default::default());
+        }
+        self.taken += 1;
+        let Some((motor, table)) = self.sums.last_mut() else { return };
+        let (m, t) = (motor_row(r), table_row(r));
+        for i in 0..3 {
+            for j in 0..4 {
+                motor[i][j] += m[i] * m[j];
+            }
+        }
+        for i in 0..2 {
+            for j in 0..3 {
+                table[i][j] += t[i] * t[j];
+            }
+        }
+    }
+
+    /// Covariance of K/I1, B/I1, 1/I1, K/I2, B/I2 at an estimate by least squares that forgets with `lambda`.
+    ///
+    /// The sums of squares are over the rows that the estimate remembers, `3/(1 - lambda)` of them; its weights fall as
+    /// `lambda^k`, so that `Omega = sum(lambda^2k)*long-run covariance` and `X'X = sum(lambda^k)*mean(x*x')`.
+    pub fn covariance(&self, motor: &SVector<f64, 3>, table: &SVector<f64, 2>, lambda: f64) -> Option<SMatrix<f64, 5, 5>> {
+        let remembered = if lambda < 1.0 { (3.0 / (1.0 - lambda)).ceil() as usize } else { self.rows };
+        let blocks = remembered.div_ceil(self.block).clamp(1, self.sums.len().max(1));
+        let skipped = self.sums.len() - blocks.min(self.sums.len());
+        let part = &self.sums[skipped..];
+        let rows = self.taken - skipped * self.block;
+        let mut scores = Scores::in_blocks(rows, 5, self.block);
+        let mut information = SMatrix::<f64, 5, 5>::zeros();
+        for (b, (m, t)) in part.iter().enumerate() {
+            for i in 0..3 {
+                scores.add_block(b, i, m[i][3] - (0..3).map(|j| m[i][j] * motor[j]).sum::<f64>());
+                (0..3).for_each(|j| information[(i, j)] += m[i][j]);
+            }
+            for i in 0..2 {
+                scores.add_block(b, 3 + i, t[i][2] - (0..2).map(|j| t[i][j] * table[j]).sum::<f64>());
+                (0..2).for_each(|j| information[(3 + i, 3 + j)] += t[i][j]);
+            }
+        }
+        let n = rows as f64;
+        // Sums of the weights and of their squares, over n rows.
+        let sums = |l: f64| if l < 1.0 { (1.0 - l.powf(n)) / (1.0 - l) } else { n };
+        let (first, second) = (sums(lambda), sums(lambda * lambda));
+        sandwich(&(information * (first / n)), &(scores.omega_of::<5>() * (second / n)))
+    }
+}
+
+/// `inv(information)*omega*inv(information)`; None where a direction is not determined.
+fn sandwich<const N: usize>(information: &SMatrix<f64, N, N>, omega: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+    let scale = SVector::<f64, N>::from_fn(|i, _| 1.0 / information[(i, i)].sqrt());
+    let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.try_inverse()?;
+    let inverse = SMatrix::<f64, N, N>::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    let covariance = inverse * omega * inverse.transpose();
+    covariance.iter().all(|v| v.is_finite()).then_some(covariance)
 }
 
 /// Least squares that takes the rows part by part.
@@ -102,24 +192,26 @@ pub(super) struct LeastSquares {
     motor: Triangle,
     table: Triangle,
     count: usize,
+    moments: Moments,
 }
 
 impl LeastSquares {
-    pub fn new() -> Self {
-        Self { motor: Triangle::empty(3, 1), table: Triangle::empty(2, 1), count: 0 }
+    /// For a record of so many rows.
+    pub fn new(rows: usize) -> Self {
+        Self { motor: Triangle::empty(3, 1), table: Triangle::empty(2, 1), count: 0, moments: Moments::new(rows) }
     }
 
     /// Takes the first `count` rows of a record, a multiple of [`super::lsq::BLOCK`] in every part but the last.
     pub fn extend(&mut self, record: &Record, count: usize) {
-        self.motor.extend(count, |k, out| {
-            let r = record.row(k);
-            out.copy_from_slice(&[-r.twist, -r.rate, r.torque, r.a1]);
-        });
-        self.table.extend(count, |k, out| {
-            let r = record.row(k);
-            out.copy_from_slice(&[r.twist, r.rate, r.a2]);
-        });
+        self.motor.extend(count, |k, out| out.copy_from_slice(&motor_row(&record.row(k))));
+        self.table.extend(count, |k, out| out.copy_from_slice(&table_row(&record.row(k))));
+        (0..count).for_each(|k| self.moments.take(&record.row(k)));
         self.count += count;
+    }
+
+    /// What the standard errors are made of.
+    pub const fn moments(&self) -> &Moments {
+        &self.moments
     }
 
     /// Share of the accelerations' squares that the equations explain, motor and table; zero where they cannot be solved.
@@ -141,11 +233,14 @@ impl LeastSquares {
             return Err(RegressionError::Unexcited { side: "table", parameters: "I2".to_owned(), why });
         }
         let (vm, vt) = (variance(&m, self.motor.rms(3)), variance(&t, self.table.rms(2)));
+        let motor = SVector::from_fn(|i, _| m.phi[(i, 0)]);
+        let table = SVector::from_fn(|i, _| t.phi[(i, 0)]);
         Ok(Rows {
-            motor: SVector::from_fn(|i, _| m.phi[(i, 0)]),
+            motor,
             motor_covariance: SMatrix::from_fn(|i, j| m.inverse[(i, j)] * vm),
-            table: SVector::from_fn(|i, _| t.phi[(i, 0)]),
+            table,
             table_covariance: SMatrix::from_fn(|i, j| t.inverse[(i, j)] * vt),
+            coloured: self.moments.covariance(&motor, &table, 1.0),
         })
     }
 }
@@ -174,6 +269,12 @@ impl Sums {
 }
 
 impl Scales {
+    /// A covariance of the five scaled unknowns, brought to their units.
+    fn covariance(&self, scaled: &SMatrix<f64, 5, 5>) -> SMatrix<f64, 5, 5> {
+        let unit = |i: usize| if i < 3 { self.motor[3] / self.motor[i] } else { self.table[2] / self.table[i - 3] };
+        SMatrix::from_fn(|i, j| scaled[(i, j)] * unit(i) * unit(j))
+    }
+
     fn new(record: &Record) -> Result<Self, RegressionError> {
         let mut sums = Sums::default();
         (0..record.rows()).for_each(|k| sums.take(&record.row(k)));
@@ -205,6 +306,7 @@ impl Scales {
             motor_covariance: SMatrix::from_fn(|i, j| motor_covariance[(i, j)] * m(i) * m(j)),
             table: SVector::from_fn(|i, _| table[i] * t(i)),
             table_covariance: SMatrix::from_fn(|i, j| table_covariance[(i, j)] * t(i) * t(j)),
+            coloured: None,
         }
     }
 }
@@ -260,10 +362,13 @@ impl Recorder {
 pub fn recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
     let n = record.rows();
     let mut recursion = Recursion::new(Scales::new(record)?, n, lambda, p0);
+    let mut moments = Moments::new(n);
     for k in 0..n {
-        recursion.take(&record.row(k), k, record.time(k));
+        let row = record.row(k);
+        recursion.take(&row, k, record.time(k));
+        moments.take(&row);
     }
-    recursion.finish()
+    recursion.finish(&moments)
 }
 
 /// Recursive least squares that takes the rows one by one.
@@ -275,7 +380,7 @@ pub(super) struct Recursion {
     table: Rls<2, 1>,
     variances: (Variance, Variance),
     recorder: Recorder,
-    last: Option<Estimated>,
+    last: Option<Rows>,
 }
 
 impl Recursion {
@@ -307,22 +412,20 @@ impl Recursion {
         self.variances.1.add(lambda, (y - self.table.theta.column(0).dot(&f)).powi(2));
         if self.recorder.wants(k, self.rows) {
             let (motor, table) = (&self.motor, &self.table);
-            let estimated = self
-                .scales
-                .rows(
-                    (motor.theta.column(0).into(), motor.covariance * self.variances.0.value()),
-                    (table.theta.column(0).into(), table.covariance * self.variances.1.value()),
-                )
-                .reconcile();
-            self.recorder.take(time, &estimated);
-            self.last = Some(estimated);
+            let rows = self.scales.rows(
+                (motor.theta.column(0).into(), motor.covariance * self.variances.0.value()),
+                (table.theta.column(0).into(), table.covariance * self.variances.1.value()),
+            );
+            self.recorder.take(time, &rows.reconcile());
+            self.last = Some(rows);
         }
     }
 
-    /// The estimate at the end and its history.
-    pub fn finish(self) -> Result<(Estimated, History), RegressionError> {
-        let history = self.recorder.history;
-        self.last.map(|e| (e, history)).ok_or(RegressionError::Diverged { what: "RLS" })
+    /// The estimate at the end and its history; the moments of the same rows give its standard errors.
+    pub fn finish(self, moments: &Moments) -> Result<(Estimated, History), RegressionError> {
+        let rows = self.last.ok_or(RegressionError::Diverged { what: "RLS" })?;
+        let coloured = moments.covariance(&rows.motor, &rows.table, self.lambda);
+        Ok((Rows { coloured, ..rows }.reconcile(), self.recorder.history))
     }
 }
 
@@ -349,6 +452,8 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
     let (mut vm, mut vt) = (Variance::default(), Variance::default());
     let mut recorder = Recorder::new(n);
     let mut last = None;
+    // Behind the record's start, where the estimates still move, the scores are those of the estimates so far.
+    let mut coloured = Remembered::new(n, lambda);
     for k in 0..n {
         let r = record.row(k);
         if record.place(k).1 == 0 {
@@ -357,24 +462,64 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
             table.forget_noise();
         }
         let s = &scales.motor;
-        let e = motor.update(&[-r.twist / s[0], -r.rate / s[1], r.torque / s[2]], r.a1 / s[3]);
+        let (fm, e) = motor.update(&[-r.twist / s[0], -r.rate / s[1], r.torque / s[2]], r.a1 / s[3]);
         vm.add(lambda, e * e);
         let s = &scales.table;
-        let e = table.update(&[r.twist / s[0], r.rate / s[1]], r.a2 / s[2]);
-        vt.add(lambda, e * e);
+        let (ft, d) = table.update(&[r.twist / s[0], r.rate / s[1]], r.a2 / s[2]);
+        vt.add(lambda, d * d);
+        coloured.take(k, &fm, e, &ft, d);
         if recorder.wants(k, n) {
             let (m, t) = (&motor.rls, &table.rls);
-            let estimated = scales
-                .rows(
-                    (m.theta.fixed_view::<3, 1>(0, 0).into(), m.covariance.fixed_view::<3, 3>(0, 0) * vm.value()),
-                    (t.theta.fixed_view::<2, 1>(0, 0).into(), t.covariance.fixed_view::<2, 2>(0, 0) * vt.value()),
-                )
-                .reconcile();
-            recorder.take(record.time(k), &estimated);
-            last = Some(estimated);
+            let rows = scales.rows(
+                (m.theta.fixed_view::<3, 1>(0, 0).into(), m.covariance.fixed_view::<3, 3>(0, 0) * vm.value()),
+                (t.theta.fixed_view::<2, 1>(0, 0).into(), t.covariance.fixed_view::<2, 2>(0, 0) * vt.value()),
+            );
+            recorder.take(record.time(k), &rows.reconcile());
+            last = Some(rows);
         }
     }
-    last.map(|e| (e, recorder.history)).ok_or(RegressionError::Diverged { what: "ELS" })
+    let rows = last.ok_or(RegressionError::Diverged { what: "ELS" })?;
+    let coloured = coloured.covariance(&motor.rls.covariance, &table.rls.covariance).map(|c| scales.covariance(&c));
+    Ok((Rows { coloured, ..rows }.reconcile(), recorder.history))
+}
+
+/// Scores of extended least squares over the rows that it remembers.
+struct Remembered {
+    first: usize,
+    squares: f64,
+    scores: Scores,
+}
+
+impl Remembered {
+    fn new(rows: usize, lambda: f64) -> Self {
+        let remembered = if lambda < 1.0 { ((3.0 / (1.0 - lambda)).ceil() as usize).min(rows) } else { rows };
+        let n = remembered as f64;
+        // Sum of the squared weights over the rows.
+        let squares = if lambda < 1.0 { (1.0 - lambda.powf(2.0 * n)) / (1.0 - lambda * lambda) / n } else { 1.0 };
+        Self { first: rows - remembered, squares, scores: Scores::new(remembered, MOTOR_ELS + TABLE_ELS) }
+    }
+
+    fn take(&mut self, k: usize, motor: &SVector<f64, MOTOR_ELS>, e: f64, table: &SVector<f64, TABLE_ELS>, d: f64) {
+        let Some(k) = k.checked_sub(self.first) else { return };
+        motor.iter().enumerate().for_each(|(i, f)| self.scores.add(k, i, f * e));
+        table.iter().enumerate().for_each(|(i, f)| self.scores.add(k, MOTOR_ELS + i, f * d));
+    }
+
+    /// Covariance of the five of both rows, the noise models' coefficients left out.
+    fn covariance(
+        &self,
+        motor: &SMatrix<f64, MOTOR_ELS, MOTOR_ELS>,
+        table: &SMatrix<f64, TABLE_ELS, TABLE_ELS>,
+    ) -> Option<SMatrix<f64, 5, 5>> {
+        const ALL: usize = MOTOR_ELS + TABLE_ELS;
+        let mut inverse = SMatrix::<f64, ALL, ALL>::zeros();
+        inverse.fixed_view_mut::<MOTOR_ELS, MOTOR_ELS>(0, 0).copy_from(motor);
+        inverse.fixed_view_mut::<TABLE_ELS, TABLE_ELS>(MOTOR_ELS, MOTOR_ELS).copy_from(table);
+        let covariance = inverse * self.scores.omega_of::<ALL>() * inverse.transpose() * self.squares;
+        let kept = [0, 1, 2, MOTOR_ELS, MOTOR_ELS + 1];
+        let five = SMatrix::<f64, 5, 5>::from_fn(|i, j| covariance[(kept[i], kept[j])]);
+        five.iter().all(|v| v.is_finite()).then_some(five)
+    }
 }
 
 /// Extended least squares in batches: LS, its residuals, LS with the past residuals as regressors, repeated until the
@@ -385,21 +530,67 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
 pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
     let n = long_enough(record.rows(), MOTOR_ELS)?;
     let plain = rows(record)?;
-    let motor_row = |k: usize| {
-        let r = record.row(k);
-        ([-r.twist, -r.rate, r.torque], r.a1)
+    let motor_of = |k: usize| {
+        let [a, b, c, y] = motor_row(&record.row(k));
+        ([a, b, c], y)
     };
-    let table_row = |k: usize| {
-        let r = record.row(k);
-        ([r.twist, r.rate], r.a2)
+    let table_of = |k: usize| {
+        let [a, b, y] = table_row(&record.row(k));
+        ([a, b], y)
     };
     let place = |k: usize| record.place(k).1;
-    let motor = batch::<3>(n, plain.motor, plain.motor_covariance, motor_row, place)?;
-    let table = batch::<2>(n, plain.table, plain.table_covariance, table_row, place)?;
-    Ok(Rows { motor: motor.0, motor_covariance: motor.1, table: table.0, table_covariance: table.1 }.reconcile())
+    let motor = batch::<3>(n, plain.motor, plain.motor_covariance, motor_of, place)?;
+    let table = batch::<2>(n, plain.table, plain.table_covariance, table_of, place)?;
+    // What each estimate owes to each row, over both equations.
+    let mut influence = Scores::new(n, 5);
+    for k in 0..n {
+        motor.influence(k, motor_of, place).iter().enumerate().for_each(|(i, v)| influence.add(k, i, *v));
+        table.influence(k, table_of, place).iter().enumerate().for_each(|(i, v)| influence.add(k, 3 + i, *v));
+    }
+    let coloured = Some(influence.omega_of::<5>()).filter(|c| c.iter().all(|v| v.is_finite()));
+    let rows = Rows {
+        motor: motor.phi,
+        motor_covariance: motor.covariance,
+        table: table.phi,
+        table_covariance: table.covariance,
+        coloured,
+    };
+    Ok(rows.reconcile())
 }
 
-type Fitted<const P: usize> = (SVector<f64, P>, SMatrix<f64, P, P>);
+/// What the rounds of batch ELS came to.
+struct Fitted<const P: usize> {
+    phi: SVector<f64, P>,
+    covariance: SMatrix<f64, P, P>,
+    /// Of the noise model.
+    coefficients: Vec<f64>,
+    /// Past residuals that the last round had as regressors.
+    residual: Vec<f64>,
+    /// First rows of the inverse of the information of all regressors, P x (P + NOISE_ORDER).
+    inverse: DMatrix<f64>,
+}
+
+impl<const P: usize> Fitted<P> {
+    /// Row `k`'s part in the deviation of the estimates: `inv(X'X)*x*e`.
+    fn influence(
+        &self,
+        k: usize,
+        row: impl Fn(usize) -> ([f64; P], f64),
+        place: impl Fn(usize) -> usize,
+    ) -> SVector<f64, P> {
+        let (x, y) = row(k);
+        let mut e = y - self.phi.dot(&SVector::from(x));
+        let past: Vec<f64> = (1..=self.coefficients.len())
+            .map(|lag| if place(k) >= lag { self.residual[k - lag] } else { 0.0 })
+            .collect();
+        e -= past.iter().zip(&self.coefficients).map(|(r, c)| r * c).sum::<f64>();
+        SVector::from_fn(|i, _| {
+            let own: f64 = (0..P).map(|j| self.inverse[(i, j)] * x[j]).sum();
+            let noise: f64 = past.iter().enumerate().map(|(l, r)| self.inverse[(i, P + l)] * r).sum();
+            (own + noise) * e
+        })
+    }
+}
 
 fn batch<const P: usize>(
     n: usize,
@@ -414,12 +605,18 @@ fn batch<const P: usize>(
             y - plain.dot(&SVector::from(x))
         })
         .collect();
-    let (mut phi, mut covariance) = (plain, plain_covariance);
+    let mut fitted = Fitted {
+        phi: plain,
+        covariance: plain_covariance,
+        coefficients: Vec::new(),
+        residual: Vec::new(),
+        inverse: DMatrix::zeros(P, P + NOISE_ORDER),
+    };
     let left = super::statistics::rms(&(0..n).map(|k| row(k).1).collect::<Vec<_>>());
     for round in 1..=ROUNDS {
         // Without a residual beyond rounding there is no noise to model.
         if super::statistics::rms(&residual) <= 1e-11 * left {
-            return Ok((phi, covariance));
+            return Ok(fitted);
         }
         let past = |k: usize, lag: usize| if place(k) >= lag { residual[k - lag] } else { 0.0 };
         let triangle = triangularise(n, P + NOISE_ORDER, 1, |k, out| {
@@ -433,25 +630,28 @@ fn batch<const P: usize>(
         let solution = triangle.solve().map_err(|_| RegressionError::Diverged { what: "batch ELS" })?;
         let next = SVector::<f64, P>::from_fn(|i, _| solution.phi[(i, 0)]);
         let v = variance(&solution, triangle.rms(P + NOISE_ORDER));
-        let moved = (0..P).map(|i| ((next[i] - phi[i]).powi(2) / covariance[(i, i)]).sqrt()).fold(0.0, f64::max);
-        phi = next;
-        covariance = SMatrix::from_fn(|i, j| solution.inverse[(i, j)] * v);
-        let coefficients: Vec<f64> = (0..NOISE_ORDER).map(|l| solution.phi[(P + l, 0)]).collect();
+        let moved = (0..P)
+            .map(|i| ((next[i] - fitted.phi[i]).powi(2) / fitted.covariance[(i, i)]).sqrt())
+            .fold(0.0, f64::max);
+        fitted.phi = next;
+        fitted.covariance = SMatrix::from_fn(|i, j| solution.inverse[(i, j)] * v);
+        fitted.inverse = solution.inverse.rows(0, P).into_owned();
+        fitted.coefficients = (0..NOISE_ORDER).map(|l| solution.phi[(P + l, 0)]).collect();
         let mut fresh = vec![0.0; n];
         for (k, fresh) in fresh.iter_mut().enumerate() {
             let (x, y) = row(k);
-            let mut e = y - phi.dot(&SVector::from(x));
-            for (l, c) in coefficients.iter().enumerate() {
+            let mut e = y - fitted.phi.dot(&SVector::from(x));
+            for (l, c) in fitted.coefficients.iter().enumerate() {
                 // The residuals of the round before, so that a noise model at the edge of stability cannot run away.
                 e -= c * past(k, l + 1);
             }
             *fresh = e;
         }
-        residual = fresh;
+        fitted.residual = std::mem::replace(&mut residual, fresh);
         // Noise at the edge of invertibility (differences of white noise) makes the rounds hover instead of settle: what
         // stays within half a standard error is no different estimate.
         if moved < if round == ROUNDS { 0.5 } else { 1e-3 } {
-            return Ok((phi, covariance));
+            return Ok(fitted);
         }
     }
     Err(RegressionError::Diverged { what: "batch ELS" })

@@ -14,7 +14,7 @@ use super::earned::{Earned, Evidence};
 use super::lsq::BLOCK;
 use super::parameters::Estimated;
 use super::record::{DIFFERENT_ZEROS, Record};
-use super::regression::{LeastSquares, Recursion, RegressionError, Scales, Sums};
+use super::regression::{LeastSquares, Moments, Recursion, RegressionError, Scales, Sums};
 use super::result::{History, Identification, MethodResult, Recommendation, SCHEMA, Series, Thinned, TraceSummary};
 use super::run::{DIFFERENT_SPEED, Method, Request, different_speed, hold_name};
 use crate::trace::stream::Stream;
@@ -157,7 +157,7 @@ pub fn identify(
     let n = frame.rows();
 
     progress(Method::Ls.title());
-    let mut squares = LeastSquares::new();
+    let mut squares = LeastSquares::new(n);
     let mut sums = Sums::default();
     let mut torque = Thinned::new(stream.len());
     let mut plotted = 0;
@@ -175,7 +175,7 @@ pub fn identify(
         let found = if method == Method::Ls {
             squares.rows().map(|rows| (rows.reconcile(), None))
         } else {
-            recursive(&frame, &sums, request)?.map(|(e, h)| (e, Some(h)))
+            recursive(&frame, &sums, squares.moments(), request)?.map(|(e, h)| (e, Some(h)))
         };
         methods.push(judged(method, found, machine, request, &frame));
     }
@@ -275,7 +275,7 @@ fn survey<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<S
 
 type Found = Result<(Estimated, History), RegressionError>;
 
-fn recursive(frame: &Frame, sums: &Sums, request: &Request) -> Result<Found, TraceError> {
+fn recursive(frame: &Frame, sums: &Sums, moments: &Moments, request: &Request) -> Result<Found, TraceError> {
     let scales = match Scales::of(sums) {
         Ok(scales) => scales,
         Err(error) => return Ok(Err(error)),
@@ -286,7 +286,7 @@ fn recursive(frame: &Frame, sums: &Sums, request: &Request) -> Result<Found, Tra
             recursion.take(&record.row(k), first + k, record.time(first + k));
         }
     })?;
-    Ok(recursion.finish())
+    Ok(recursion.finish(moments))
 }
 
 fn judged(

@@ -148,7 +148,7 @@ fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPiec
                 longest.start
             )
         } else {
-            format!("{gaps}; {} of them are used together, {used} samples", others.len() + 1)
+            gaps
         });
     }
     let longest = Loaded { trace: longest, stamps: clock.stamps, warnings };
