@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 
+use super::examined::Part;
 use crate::diagnose::{Model, Record as Logged, UnderControl};
 use crate::fmu::simulate::{Column, Record, Setting};
 use crate::report::Block;
@@ -96,9 +97,9 @@ pub(super) fn simulate(machine: &Machine, input: &Path, settings: &[Setting]) ->
 ///
 /// # Errors
 /// When the trace cannot be read again.
-pub(super) fn identified(trace: &Path, given: &Machine, found: &Machine) -> anyhow::Result<Vec<Block>> {
+pub(super) fn identified(trace: &Path, part: Part, given: &Machine, found: &Machine) -> anyhow::Result<Vec<Block>> {
     let Some(controller) = &given.controller else { return Ok(Vec::new()) };
-    let trace = load(trace, &given.signals)?.trace;
+    let trace = load(trace, &part.of(given.signals.clone()))?.trace;
     let (Some(reference), Some(torque)) = (trace.get(Signal::Reference), trace.get(Signal::T)) else {
         return Ok(Vec::new());
     };

@@ -190,7 +190,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             effects: outcome.improved.effects,
             ..diagnosed.machine.clone()
         };
-        Package::of(&improved).with_context(|| path.display().to_string())?.write(path)?;
+        let bytes = Package::of(&improved).with_context(|| path.display().to_string())?.archive()?;
+        super::export::read_back(&bytes, "modelDescription.xml").with_context(|| path.display().to_string())?;
+        write_text(path, &bytes)?;
         say_line!("{}", replayed(path, &outcome.replay)?)?;
     }
     Ok(ExitCode::SUCCESS)

@@ -106,7 +106,7 @@ fn check(fmu: &Path) -> anyhow::Result<ExitCode> {
 }
 
 /// Reads an archive back before it has its name: every part whole, the description one that a tool can read.
-fn read_back(bytes: &[u8], description: &str) -> anyhow::Result<()> {
+pub(super) fn read_back(bytes: &[u8], description: &str) -> anyhow::Result<()> {
     let read = || -> anyhow::Result<()> {
         let mut archive = Archive::from_bytes(bytes.to_vec(), Limits::default())?;
         archive.test()?;

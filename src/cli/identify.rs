@@ -165,7 +165,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (machine, result, record) = done?;
     let mut said = blocks(&result);
     if machine.controller.is_some() && result.recommended.is_some() {
-        said.extend(super::controlled::identified(path, &machine, &improved(&machine, &result)?)?);
+        said.extend(super::controlled::identified(path, args.believed.part, &machine, &improved(&machine, &result)?)?);
     }
     say!("{}", terminal::blocks(&said, terminal::Layout::default()))?;
     if let Some(path) = &args.json {

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::examined::Part;
 use super::outputs;
 use super::say::{say, say_line};
 use crate::axis::Structure;
@@ -37,6 +38,8 @@ pub struct Args {
     /// Write over files that are there
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    part: Part,
 }
 
 /// What was made of a log.
@@ -80,7 +83,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let made = make(&table, &mut asker)?;
     let text = write(&made, &table, None, &file);
     let machine = Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
-    let loaded = from_table(&table, &machine.signals)?;
+    let loaded = from_table(&table, &args.part.of(machine.signals.clone()))?;
     // A first idea of the parameters, from the log itself: it says whether units and signs are right.
     let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
     let rough = rough(&loaded.trace, &machine, &examination);

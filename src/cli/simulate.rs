@@ -9,6 +9,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::examined::Part;
 use super::limits;
 use super::outputs;
 use super::say::say_line;
@@ -69,6 +70,8 @@ pub struct Args {
     /// FMI 3.0: let steps return early at events, and go on from there to the next row
     #[arg(long)]
     pub early_return: bool,
+    #[command(flatten)]
+    pub part: Part,
     /// Run the FMU in a sandbox: no network, no new processes, no files but its own (as `validate` does)
     #[arg(long)]
     pub sandbox: bool,
@@ -192,12 +195,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (None, _) => Inputs::default(),
         // The axis file says how its own log's columns are named.
         (Some(path), Some(machine)) => {
-            let loaded = load(path, &machine.signals)?;
+            let loaded = load(path, &args.part.of(machine.signals.clone()))?;
             loaded.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
             hold = hold.or(Some(loaded.trace.hold));
             Inputs::of(&loaded.trace)?
         }
-        (Some(path), None) => Inputs::from_table(&Table::read(path)?, &description)?,
+        (Some(path), None) => {
+            let inputs = Inputs::from_table(&Table::read(path)?, &description)?;
+            inputs.part(args.part.from, args.part.to, args.part.resample)?
+        }
     };
     let options = Options {
         start: args.start,
@@ -236,7 +242,7 @@ fn controlled(args: Args) -> anyhow::Result<ExitCode> {
     );
     let machine = Machine::read(&args.model)?;
     let input = args.input.as_deref().context("--controlled needs --input: the trace of the reference")?;
-    let mut record = super::controlled::simulate(&machine, input, &args.set)?;
+    let mut record = super::controlled::simulate(&Machine { signals: args.part.of(machine.signals.clone()), ..machine }, input, &args.set)?;
     if let Some(name) = args.outputs.iter().find(|name| !record.columns.iter().any(|c| c.name == **name)) {
         let names: Vec<&str> = record.columns.iter().map(|c| c.name.as_str()).collect();
         bail!("--outputs {name}: in the loop there are {}", names.join(", "));

@@ -6,6 +6,7 @@ pub mod frequency;
 pub mod instrumental;
 pub mod joined;
 mod judge;
+mod known;
 pub mod levenberg;
 mod long_run;
 pub mod lsq;

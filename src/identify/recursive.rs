@@ -75,8 +75,8 @@ impl<const P: usize> Els<P> {
         self.past = [0.0; P];
     }
 
-    /// Takes one sample and gives the whole regressor and the a-posteriori residual.
-    pub fn update(&mut self, x: &[f64], y: f64) -> (SVector<f64, P>, f64) {
+    /// Takes one sample and gives the a-posteriori residual.
+    pub fn update(&mut self, x: &[f64], y: f64) -> f64 {
         let order = P - self.regressors;
         let mut f = SVector::<f64, P>::zeros();
         f.as_mut_slice()[..self.regressors].copy_from_slice(x);
@@ -86,7 +86,7 @@ impl<const P: usize> Els<P> {
         self.past[..order].rotate_right(1);
         // A diverging noise model must not feed on itself.
         self.past[0] = (residual * self.scale).clamp(-1e6, 1e6);
-        (f, residual)
+        residual
     }
 }
 

@@ -269,12 +269,6 @@ impl Sums {
 }
 
 impl Scales {
-    /// A covariance of the five scaled unknowns, brought to their units.
-    fn covariance(&self, scaled: &SMatrix<f64, 5, 5>) -> SMatrix<f64, 5, 5> {
-        let unit = |i: usize| if i < 3 { self.motor[3] / self.motor[i] } else { self.table[2] / self.table[i - 3] };
-        SMatrix::from_fn(|i, j| scaled[(i, j)] * unit(i) * unit(j))
-    }
-
     fn new(record: &Record) -> Result<Self, RegressionError> {
         let mut sums = Sums::default();
         (0..record.rows()).for_each(|k| sums.take(&record.row(k)));
@@ -452,8 +446,6 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
     let (mut vm, mut vt) = (Variance::default(), Variance::default());
     let mut recorder = Recorder::new(n);
     let mut last = None;
-    // Behind the record's start, where the estimates still move, the scores are those of the estimates so far.
-    let mut coloured = Remembered::new(n, lambda);
     for k in 0..n {
         let r = record.row(k);
         if record.place(k).1 == 0 {
@@ -462,12 +454,11 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
             table.forget_noise();
         }
         let s = &scales.motor;
-        let (fm, e) = motor.update(&[-r.twist / s[0], -r.rate / s[1], r.torque / s[2]], r.a1 / s[3]);
+        let e = motor.update(&[-r.twist / s[0], -r.rate / s[1], r.torque / s[2]], r.a1 / s[3]);
         vm.add(lambda, e * e);
         let s = &scales.table;
-        let (ft, d) = table.update(&[r.twist / s[0], r.rate / s[1]], r.a2 / s[2]);
-        vt.add(lambda, d * d);
-        coloured.take(k, &fm, e, &ft, d);
+        let e = table.update(&[r.twist / s[0], r.rate / s[1]], r.a2 / s[2]);
+        vt.add(lambda, e * e);
         if recorder.wants(k, n) {
             let (m, t) = (&motor.rls, &table.rls);
             let rows = scales.rows(
@@ -479,46 +470,94 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
         }
     }
     let rows = last.ok_or(RegressionError::Diverged { what: "ELS" })?;
-    let coloured = coloured.covariance(&motor.rls.covariance, &table.rls.covariance).map(|c| scales.covariance(&c));
+    // The noise models on residuals as they are, not brought to unit size.
+    let cm: Vec<f64> = (0..NOISE_ORDER).map(|l| motor.rls.theta[3 + l] * level(sm)).collect();
+    let ct: Vec<f64> = (0..NOISE_ORDER).map(|l| table.rls.theta[2 + l] * level(st)).collect();
+    let coloured = pseudolinear(record, (&rows.motor, &cm), (&rows.table, &ct), lambda);
     Ok((Rows { coloured, ..rows }.reconcile(), recorder.history))
 }
 
-/// Scores of extended least squares over the rows that it remembers.
-struct Remembered {
-    first: usize,
-    squares: f64,
-    scores: Scores,
+/// Covariance of the five unknowns of both rows by extended least squares, `inv(H)*Omega*inv(H)'`:
+///
+/// ```text
+/// e(k) = y - f'*th, f = [x ; e(k-1) .. e(k-nc)];  H = sum f*psi', psi(k) = f(k) - c1*psi(k-1) - ... - cnc*psi(k-nc)
+/// ```
+///
+/// since the past residuals move with the estimates (L. Ljung, System Identification, 2nd ed., 10.3 and 9.4; pseudolinear
+/// regression as an instrumental variable of its own gradient). None where the noise model is at the edge of stability.
+fn pseudolinear(
+    record: &Record,
+    (motor, cm): (&SVector<f64, 3>, &[f64]),
+    (table, ct): (&SVector<f64, 2>, &[f64]),
+    lambda: f64,
+) -> Option<SMatrix<f64, 5, 5>> {
+    const ALL: usize = MOTOR_ELS + TABLE_ELS;
+    let n = record.rows();
+    let remembered = if lambda < 1.0 { ((3.0 / (1.0 - lambda)).ceil() as usize).min(n) } else { n };
+    let mut scores = Scores::new(remembered, ALL);
+    let mut gradient = SMatrix::<f64, ALL, ALL>::zeros();
+    let mut sizes = SVector::<f64, ALL>::zeros();
+    let mut rows = (Filter::<MOTOR_ELS>::default(), Filter::<TABLE_ELS>::default());
+    for k in 0..n {
+        let r = record.row(k);
+        if record.place(k).1 == 0 {
+            rows = Default::default();
+        }
+        let ([a, b, c, y], [d, f, z]) = (motor_row(&r), table_row(&r));
+        let (fm, pm, em) = rows.0.step(&[a, b, c], y, motor.as_slice(), cm);
+        let (ft, pt, et) = rows.1.step(&[d, f], z, table.as_slice(), ct);
+        let Some(k) = (k + remembered).checked_sub(n) else { continue };
+        for i in 0..MOTOR_ELS {
+            scores.add(k, i, fm[i] * em);
+            sizes[i] += fm[i] * fm[i];
+            (0..MOTOR_ELS).for_each(|j| gradient[(i, j)] += fm[i] * pm[j]);
+        }
+        for i in 0..TABLE_ELS {
+            let at = MOTOR_ELS + i;
+            scores.add(k, at, ft[i] * et);
+            sizes[at] += ft[i] * ft[i];
+            (0..TABLE_ELS).for_each(|j| gradient[(at, MOTOR_ELS + j)] += ft[i] * pt[j]);
+        }
+    }
+    let count = remembered as f64;
+    let sums = |l: f64| if l < 1.0 { (1.0 - l.powf(count)) / (1.0 - l) } else { count };
+    let scale = sizes.map(|s| 1.0 / s.sqrt());
+    let scaled = DMatrix::from_fn(ALL, ALL, |i, j| gradient[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.try_inverse()?;
+    let inverse = SMatrix::<f64, ALL, ALL>::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    let weight = sums(lambda * lambda) * count / sums(lambda).powi(2);
+    let covariance = inverse * scores.omega_of::<ALL>() * inverse.transpose() * weight;
+    let kept = [0, 1, 2, MOTOR_ELS, MOTOR_ELS + 1];
+    let five = SMatrix::<f64, 5, 5>::from_fn(|i, j| covariance[(kept[i], kept[j])]);
+    five.iter().all(|v| v.is_finite()).then_some(five)
 }
 
-impl Remembered {
-    fn new(rows: usize, lambda: f64) -> Self {
-        let remembered = if lambda < 1.0 { ((3.0 / (1.0 - lambda)).ceil() as usize).min(rows) } else { rows };
-        let n = remembered as f64;
-        // Sum of the squared weights over the rows.
-        let squares = if lambda < 1.0 { (1.0 - lambda.powf(2.0 * n)) / (1.0 - lambda * lambda) / n } else { 1.0 };
-        Self { first: rows - remembered, squares, scores: Scores::new(remembered, MOTOR_ELS + TABLE_ELS) }
-    }
+/// Past residuals and gradients of one row with a noise model.
+struct Filter<const P: usize> {
+    residuals: [f64; NOISE_ORDER],
+    gradients: [SVector<f64, P>; NOISE_ORDER],
+}
 
-    fn take(&mut self, k: usize, motor: &SVector<f64, MOTOR_ELS>, e: f64, table: &SVector<f64, TABLE_ELS>, d: f64) {
-        let Some(k) = k.checked_sub(self.first) else { return };
-        motor.iter().enumerate().for_each(|(i, f)| self.scores.add(k, i, f * e));
-        table.iter().enumerate().for_each(|(i, f)| self.scores.add(k, MOTOR_ELS + i, f * d));
+impl<const P: usize> Default for Filter<P> {
+    fn default() -> Self {
+        Self { residuals: [0.0; NOISE_ORDER], gradients: [SVector::zeros(); NOISE_ORDER] }
     }
+}
 
-    /// Covariance of the five of both rows, the noise models' coefficients left out.
-    fn covariance(
-        &self,
-        motor: &SMatrix<f64, MOTOR_ELS, MOTOR_ELS>,
-        table: &SMatrix<f64, TABLE_ELS, TABLE_ELS>,
-    ) -> Option<SMatrix<f64, 5, 5>> {
-        const ALL: usize = MOTOR_ELS + TABLE_ELS;
-        let mut inverse = SMatrix::<f64, ALL, ALL>::zeros();
-        inverse.fixed_view_mut::<MOTOR_ELS, MOTOR_ELS>(0, 0).copy_from(motor);
-        inverse.fixed_view_mut::<TABLE_ELS, TABLE_ELS>(MOTOR_ELS, MOTOR_ELS).copy_from(table);
-        let covariance = inverse * self.scores.omega_of::<ALL>() * inverse.transpose() * self.squares;
-        let kept = [0, 1, 2, MOTOR_ELS, MOTOR_ELS + 1];
-        let five = SMatrix::<f64, 5, 5>::from_fn(|i, j| covariance[(kept[i], kept[j])]);
-        five.iter().all(|v| v.is_finite()).then_some(five)
+impl<const P: usize> Filter<P> {
+    /// Regressor, gradient and residual of the next row.
+    fn step(&mut self, x: &[f64], y: f64, theta: &[f64], noise: &[f64]) -> (SVector<f64, P>, SVector<f64, P>, f64) {
+        let regressor = SVector::from_fn(|i, _| x.get(i).copied().unwrap_or_else(|| self.residuals[i - x.len()]));
+        let mut gradient = regressor;
+        let mut residual = y - x.iter().zip(theta).map(|(a, b)| a * b).sum::<f64>();
+        for (l, c) in noise.iter().enumerate() {
+            residual -= c * self.residuals[l];
+            gradient -= self.gradients[l] * *c;
+        }
+        self.residuals.rotate_right(1);
+        self.gradients.rotate_right(1);
+        (self.residuals[0], self.gradients[0]) = (residual, gradient);
+        (regressor, gradient, residual)
     }
 }
 
@@ -541,13 +580,11 @@ pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
     let place = |k: usize| record.place(k).1;
     let motor = batch::<3>(n, plain.motor, plain.motor_covariance, motor_of, place)?;
     let table = batch::<2>(n, plain.table, plain.table_covariance, table_of, place)?;
-    // What each estimate owes to each row, over both equations.
-    let mut influence = Scores::new(n, 5);
-    for k in 0..n {
-        motor.influence(k, motor_of, place).iter().enumerate().for_each(|(i, v)| influence.add(k, i, *v));
-        table.influence(k, table_of, place).iter().enumerate().for_each(|(i, v)| influence.add(k, 3 + i, *v));
-    }
-    let coloured = Some(influence.omega_of::<5>()).filter(|c| c.iter().all(|v| v.is_finite()));
+    let coloured = match (&motor.coefficients[..], &table.coefficients[..]) {
+        // Without noise there is no noise model.
+        ([], _) | (_, []) => plain.coloured,
+        (cm, ct) => pseudolinear(record, (&motor.phi, cm), (&table.phi, ct), 1.0),
+    };
     let rows = Rows {
         motor: motor.phi,
         motor_covariance: motor.covariance,
@@ -564,32 +601,6 @@ struct Fitted<const P: usize> {
     covariance: SMatrix<f64, P, P>,
     /// Of the noise model.
     coefficients: Vec<f64>,
-    /// Past residuals that the last round had as regressors.
-    residual: Vec<f64>,
-    /// First rows of the inverse of the information of all regressors, P x (P + NOISE_ORDER).
-    inverse: DMatrix<f64>,
-}
-
-impl<const P: usize> Fitted<P> {
-    /// Row `k`'s part in the deviation of the estimates: `inv(X'X)*x*e`.
-    fn influence(
-        &self,
-        k: usize,
-        row: impl Fn(usize) -> ([f64; P], f64),
-        place: impl Fn(usize) -> usize,
-    ) -> SVector<f64, P> {
-        let (x, y) = row(k);
-        let mut e = y - self.phi.dot(&SVector::from(x));
-        let past: Vec<f64> = (1..=self.coefficients.len())
-            .map(|lag| if place(k) >= lag { self.residual[k - lag] } else { 0.0 })
-            .collect();
-        e -= past.iter().zip(&self.coefficients).map(|(r, c)| r * c).sum::<f64>();
-        SVector::from_fn(|i, _| {
-            let own: f64 = (0..P).map(|j| self.inverse[(i, j)] * x[j]).sum();
-            let noise: f64 = past.iter().enumerate().map(|(l, r)| self.inverse[(i, P + l)] * r).sum();
-            (own + noise) * e
-        })
-    }
 }
 
 fn batch<const P: usize>(
@@ -609,8 +620,6 @@ fn batch<const P: usize>(
         phi: plain,
         covariance: plain_covariance,
         coefficients: Vec::new(),
-        residual: Vec::new(),
-        inverse: DMatrix::zeros(P, P + NOISE_ORDER),
     };
     let left = super::statistics::rms(&(0..n).map(|k| row(k).1).collect::<Vec<_>>());
     for round in 1..=ROUNDS {
@@ -635,7 +644,6 @@ fn batch<const P: usize>(
             .fold(0.0, f64::max);
         fitted.phi = next;
         fitted.covariance = SMatrix::from_fn(|i, j| solution.inverse[(i, j)] * v);
-        fitted.inverse = solution.inverse.rows(0, P).into_owned();
         fitted.coefficients = (0..NOISE_ORDER).map(|l| solution.phi[(P + l, 0)]).collect();
         let mut fresh = vec![0.0; n];
         for (k, fresh) in fresh.iter_mut().enumerate() {
@@ -647,7 +655,7 @@ fn batch<const P: usize>(
             }
             *fresh = e;
         }
-        fitted.residual = std::mem::replace(&mut residual, fresh);
+        residual = fresh;
         // Noise at the edge of invertibility (differences of white noise) makes the rounds hover instead of settle: what
         // stays within half a standard error is no different estimate.
         if moved < if round == ROUNDS { 0.5 } else { 1e-3 } {

@@ -22,6 +22,7 @@ use nalgebra::{DMatrix, DVector, Vector4};
 use super::earned::{Earned, Evidence, SMALL_TORQUE};
 use super::joined::Joined;
 use super::judge::output_fit;
+use super::known::Known;
 use super::lsq::triangularise;
 use super::result::{
     Estimate, ExcitationEstimate, Identification, MethodResult, OutputFit, Recommendation, SCHEMA, Series,
@@ -309,8 +310,11 @@ pub(super) fn identify(
     file: &str,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Identification, TraceError> {
+    let known = Known::of(machine);
+    let taken_off = known.taken_off(joined, machine)?;
+    let regressed = taken_off.as_ref().unwrap_or(joined);
     let trace = joined.samples();
-    let motions = Motions::of(joined)?;
+    let motions = Motions::of(regressed)?;
     let motion = machine.signals.motion;
     progress("weak-form least squares");
     let mut result = MethodResult::empty("ls", "Least squares, weak form");
@@ -327,7 +331,7 @@ pub(super) fn identify(
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
             evidence = Evidence {
-                held_out: held_out(joined),
+                held_out: held_out(regressed),
                 shares: Some(shares(&motions)),
                 explained: None,
             };
@@ -359,6 +363,7 @@ pub(super) fn identify(
         Err(why) => result.failure = Some(why),
     }
     let earned = Earned::of(recommended.as_ref().map(|_| &result), evidence);
+    let torque = trace.require(Signal::T)?;
     Ok(Identification {
         schema: SCHEMA,
         machine: machine.name.clone(),
@@ -367,10 +372,10 @@ pub(super) fn identify(
         methods: vec![result],
         recommended,
         earned,
-        torque: Series::over("T", unit, |k| joined.time(k), motions.torque),
-        torque_spectrum: spectrum("T", unit, trace.dt, &motions.torque[joined.longest()]),
+        torque: Series::over("T", unit, |k| joined.time(k), torque),
+        torque_spectrum: spectrum("T", unit, trace.dt, &torque[joined.longest()]),
         frequency_response: None,
-        warnings: Vec::new(),
+        warnings: known.words(machine.structure),
     })
 }
 

@@ -3,6 +3,7 @@
 use super::earned::{Earned, Evidence};
 use super::frequency;
 use super::joined::{Joined, noise_in_pieces};
+use super::known::Known;
 use super::methods::Run;
 use super::output_error::OutputError;
 use super::record::{Record, period};
@@ -10,7 +11,6 @@ use super::result::{Identification, MethodResult, Recommendation, SCHEMA, Series
 use super::rigid;
 use super::statistics::{rms, spectrum};
 use crate::axis::{Hold, Scheme, Structure};
-use crate::effects::EFFECTS;
 use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
 
 /// An estimator.
@@ -152,14 +152,12 @@ pub fn identify_joined(
         }
     }
     let joined = &joined;
-    let record = Record::of(joined, machine.parameters.rho)?;
-    let known: Vec<&str> = EFFECTS.iter().filter(|e| machine.effects.is_on(**e)).map(|e| e.info().id).collect();
-    if !known.is_empty() {
-        warnings.push(format!(
-            "the effects of the axis file ({}) are part of the output-error model alone; the regressions leave them out",
-            known.join(", ")
-        ));
-    }
+    // The regressions have no term for what the axis file knows beside the parameters.
+    let known = Known::of(machine);
+    warnings.extend(known.words(machine.structure));
+    let taken_off = known.taken_off(joined, machine)?;
+    let regressed = taken_off.as_ref().unwrap_or(joined);
+    let record = Record::of(regressed, machine.parameters.rho)?;
     if record.zero_offset != 0.0 {
         warnings.push(format!(
             "the zeros of the two encoders differ by {:.6} {}: the mean twist was taken off, and output error fits the \
@@ -169,7 +167,7 @@ pub fn identify_joined(
         ));
     }
     // Only within a piece are the periods known to follow each other.
-    let longest = joined.longest_trace();
+    let longest = regressed.longest_trace();
     let pieces = joined.pieces().len();
     let samples = request.period.or_else(|| period(longest.get(Signal::T)?));
     let measured = samples.and_then(|n| frequency::measure(&longest, n));
@@ -177,10 +175,10 @@ pub fn identify_joined(
     // noise and what lies between the excited lines would rule them otherwise.
     let noisy = || noise_in_pieces(record.theta1, joined.pieces()) > NOISE_FREE * rms(record.theta1);
     let averaged = match &measured {
-        Some(m) if m.periods >= 3 && noisy() => Some(frequency::average(&longest, m)?),
+        Some(m) if m.periods >= 3 && noisy() && taken_off.is_none() => Some(frequency::average(&longest, m)?),
         _ => None,
     };
-    let whole = Record::of(joined, machine.parameters.rho)?;
+    let torque = joined.samples().require(Signal::T)?;
     let averaged_joined = averaged.as_ref().map(Joined::one);
     let record = match (&averaged, &averaged_joined) {
         (Some(average), _) => {
@@ -267,8 +265,8 @@ pub fn identify_joined(
         methods,
         recommended,
         earned,
-        torque: Series::over("T", unit, |k| joined.time(k), whole.torque),
-        torque_spectrum: spectrum("T", unit, whole.dt, longest.require(Signal::T)?),
+        torque: Series::over("T", unit, |k| joined.time(k), torque),
+        torque_spectrum: spectrum("T", unit, joined.samples().dt, &torque[joined.longest()]),
         frequency_response,
         warnings,
     })

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table};
+use super::vendors;
 
 /// What the text of a file is.
 pub(super) enum Form {
@@ -35,6 +36,12 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
     {
         return json(text, file).map(Form::Table);
     }
+    if vendors::is_xml(text) {
+        return vendors::sinumerik(text, file).map(Form::Table);
+    }
+    if vendors::is_tncscope(text) {
+        return vendors::tncscope(text, file).map(Form::Table);
+    }
     if first.starts_with(b"Sampling period is") {
         return halscope(text, file).map(Form::Table);
     }
@@ -56,7 +63,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16, file: &str) -> Result<Form, Tra
 
 /// Columns that are filled row by row, each by its name.
 #[derive(Default)]
-struct Filled {
+pub(super) struct Filled {
     headers: Vec<Header>,
     columns: Vec<Vec<f64>>,
     faults: Vec<Option<Fault>>,
@@ -65,7 +72,7 @@ struct Filled {
 
 impl Filled {
     /// Ends a row: what it did not have is missing.
-    fn end(&mut self, line: usize) {
+    pub fn end(&mut self, line: usize) {
         self.rows += 1;
         for (column, fault) in self.columns.iter_mut().zip(&mut self.faults) {
             if column.len() < self.rows {
@@ -75,7 +82,8 @@ impl Filled {
         }
     }
 
-    fn put(
+    /// Puts a value into the row that is being filled; `text` is what stands there, for a fault.
+    pub fn put(
         &mut self,
         name: &str,
         value: Option<f64>,
@@ -113,7 +121,13 @@ impl Filled {
         Ok(())
     }
 
-    fn table(self, file: &str, first_line: usize) -> Table {
+    /// Rows that were ended.
+    pub const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The table.
+    pub fn table(self, file: &str, first_line: usize) -> Table {
         Table {
             file: file.to_owned(),
             headers: self.headers,

@@ -1,5 +1,5 @@
 //! Traces of the axis: sampled signals in memory, their files (CSV, Excel, Parquet, MATLAB 5, NumPy,
-//! JSON, logs of LinuxCNC and TwinCAT), and the machine description `axis.toml`.
+//! JSON, logs of LinuxCNC, TwinCAT, Sinumerik and TNCscope), and the machine description `axis.toml`.
 //!
 //! A [`Trace`] is one uniformly sampled record: `time(k) = start + k*dt`, never accumulated. Everything is SI: T in N.m
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
@@ -21,6 +21,7 @@ mod signal;
 pub mod stream;
 mod table;
 mod units;
+mod vendors;
 mod wrap;
 mod write;
 

@@ -18,6 +18,9 @@ pub struct Inputs {
     pub notes: Vec<String>,
 }
 
+/// Most samples that inputs are resampled to.
+const MOST: f64 = 1e8;
+
 impl Inputs {
     /// The torque of a trace.
     ///
@@ -88,6 +91,50 @@ impl Inputs {
             inputs.time = (0..inputs.time.len()).map(|k| found.start + k as f64 * found.dt).collect();
         }
         Ok(inputs)
+    }
+
+    /// The samples from one time to another, s, and at even steps where those are asked for: each takes the value that was
+    /// logged last, as a held input has it.
+    ///
+    /// # Errors
+    /// When fewer than two samples are left.
+    pub fn part(mut self, from: Option<f64>, to: Option<f64>, resample: Option<f64>) -> Result<Self, SimulateError> {
+        if from.is_none() && to.is_none() && resample.is_none() {
+            return Ok(self);
+        }
+        let (Some(first), Some(last)) = (self.time.first().copied(), self.time.last().copied()) else { return Ok(self) };
+        let (from, to) = (from.unwrap_or(first), to.unwrap_or(last));
+        let slack = 1e-6 * (last - first) / (self.time.len() as f64);
+        let rows: Vec<usize> = match resample {
+            None => (0..self.time.len()).filter(|k| (from - slack..=to + slack).contains(&self.time[*k])).collect(),
+            Some(dt) => {
+                let (start, end) = (from.max(first), to.min(last));
+                let count = ((end - start) / dt + 1.0 + 1e-9).max(0.0);
+                if count > MOST {
+                    return Err(SimulateError::Part { from, to, left: count });
+                }
+                let at = |k: usize| self.time.partition_point(|t| *t <= start + k as f64 * dt + slack).saturating_sub(1);
+                let rows = (0..count as usize).map(at).collect();
+                self.notes.push(format!(
+                    "the inputs were resampled to dt = {dt:e} s, each with the value logged last: what moves faster than {:.4} Hz \
+                     is lost",
+                    0.1 / dt
+                ));
+                rows
+            }
+        };
+        if rows.len() < 2 {
+            return Err(SimulateError::Part { from, to, left: rows.len() as f64 });
+        }
+        self.time = match resample {
+            None => rows.iter().map(|k| self.time[*k]).collect(),
+            Some(dt) => (0..rows.len()).map(|k| from.max(first) + k as f64 * dt).collect(),
+        };
+        self.dt = resample.or(self.dt);
+        for (_, values) in &mut self.signals {
+            *values = rows.iter().map(|k| values[*k]).collect();
+        }
+        Ok(self)
     }
 
     /// Value of signal `index` at `time`, and its mean slope over the `step` s after it (zero where it is held).

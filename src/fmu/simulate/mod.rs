@@ -47,6 +47,16 @@ pub enum SimulateError {
         /// A near miss.
         near: String,
     },
+    /// A part of the inputs that is none.
+    #[error("{left:.0} samples of the input lie from {from} s to {to} s at the steps asked for; give other --from, --to or --resample")]
+    Part {
+        /// From when, s.
+        from: f64,
+        /// Until when, s.
+        to: f64,
+        /// Samples there.
+        left: f64,
+    },
     /// No column of the reference results is a variable of the FMU.
     #[error("{file}: no column is a variable of the FMU; the columns are: {present}; the outputs are: {wanted}")]
     NoReference {
