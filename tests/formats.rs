@@ -209,6 +209,8 @@ fn logs_of_machines_and_programs_hold_the_same_motion_in_every_form() {
         ("halscope.log", &mapped("pid.0.output", "joint.0.pos-fb")),
         ("halsampler.txt", &sampler),
         ("twincat.csv", &mapped("Torque", "ActPos")),
+        ("sinumerik.xml", &mapped("Torque X1", "Position X1")),
+        ("tncscope.sco", &mapped("i ist X", "s actual X")),
     ] {
         let trace = log(name, mapping).trace;
         assert_eq!(trace.len(), 200, "{name}");
@@ -218,6 +220,28 @@ fn logs_of_machines_and_programs_hold_the_same_motion_in_every_form() {
             assert!(near(trace.get(Signal::T).unwrap()[k], row(k)[1]), "{name}, T, row {k}");
             assert!(near(trace.get(Signal::Theta1).unwrap()[k], row(k)[2]), "{name}, theta1, row {k}");
         }
+    }
+}
+
+#[test]
+fn what_a_controls_trace_does_not_hold_is_named() {
+    // A signal that is sampled more slowly is missing in most records: it is a fault where it is used, and there alone.
+    let table = Table::read(&data("logs/sinumerik.xml")).unwrap();
+    assert_eq!(table.names(), "time, Torque X1, Position X1, Temperature X1");
+    assert!(refusal(&table, "Temperature X1").contains("sinumerik.xml"), "{}", refusal(&table, "Temperature X1"));
+    let sco = std::fs::read_to_string(data("logs/tncscope.sco")).unwrap();
+    assert_eq!(Table::read(&data("logs/tncscope.sco")).unwrap().headers[1].unit.as_deref(), Some("A"));
+    for (text, says) in [
+        ("<traceDataRoot><other/></traceDataRoot>".to_owned(), "traceData/dataFrame"),
+        ("<?xml version=\"1.0\"?><traceDataRoot><traceData>".to_owned(), "not well-formed"),
+        ("<traceDataRoot><traceData><dataFrame/></traceData></traceDataRoot>".to_owned(), "no dataSignal"),
+        (sco.replace("%CYCLETIME=1000", "%CYCLETIME=fast"), "number of microseconds"),
+        (sco.replace("%[DATA]", "%[END]"), "without %[DATA]"),
+        (sco.split("%[DATA]").next().unwrap().to_owned() + "%[DATA]\r\n", "no sample"),
+        (sco.clone() + "1;2;3;4;5;\r\n", "5 cells where the time and 2 curves are expected"),
+    ] {
+        let error = Table::parse(text.as_bytes(), "log").unwrap_err().to_string();
+        assert!(error.contains(says), "{says}: {error}");
     }
 }
 

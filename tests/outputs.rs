@@ -89,6 +89,18 @@ fn a_summary_that_is_a_trace_is_refused() {
 }
 
 #[test]
+fn a_named_pipe_gives_its_reader_everything() {
+    let folder = prepared();
+    let pipe = folder.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let reader = std::thread::spawn(move || std::fs::read_to_string(pipe).unwrap());
+    let done = eixo_in(folder.path(), &["identify", "log.csv", "--method", "ls", "--json", "pipe"]);
+    assert!(matches!(done.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&done.stderr));
+    let found: serde_json::Value = serde_json::from_str(&reader.join().unwrap()).unwrap();
+    assert_eq!(found["schema"], "eixo.identification/1");
+}
+
+#[test]
 fn devices_are_written_through_links_followed_and_modes_kept() {
     let folder = prepared();
     let at = |name: &str| folder.path().join(name);

@@ -25,12 +25,16 @@ struct Log(Vec<Vec<f64>>);
 impl Log {
     /// The paper's axis with a little Coulomb friction under a multisine, noise on its encoders.
     fn new(seed: u64) -> Self {
+        Self::with_friction(seed, 0.001)
+    }
+
+    fn with_friction(seed: u64, level: f64) -> Self {
         let dt = 1e-3;
         let torque = Multisine::new(Kind::RandomPhase, 3000, 1, 200, 0.03, 0.0, seed).unwrap().period().repeat(2);
         let options = SimulateOptions { start: 0.0, dt, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 4 };
         let mut settings = Settings::default();
         let friction = Effect::from_id("coulomb_motor").unwrap();
-        settings.of_mut(friction)[friction.parameter("level").unwrap()] = 0.001;
+        settings.of_mut(friction)[friction.parameter("level").unwrap()] = level;
         let run = simulate(&Parameters::PAPER, Structure::TwoInertia, &settings, [0.0; 4], &torque, &options);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let mut e = |size: f64| -> f64 {
@@ -196,4 +200,104 @@ fn white_noise_identifies_nothing_in_memory_or_streamed() {
         assert_eq!(done.status.code(), Some(1), "{extra:?}: {said} {}", String::from_utf8_lossy(&done.stderr));
         assert!(!said.contains("identifies the axis"), "{extra:?}: {said}");
     }
+}
+
+#[test]
+fn the_pieces_between_gaps_are_identified_together_and_no_counter_needs_to_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("axis.toml"), AXIS).unwrap();
+    let mut log = Log::with_friction(1, 0.0);
+    // The table's counter was set anew in the second gap.
+    log.0[4][4900..].iter_mut().for_each(|v| *v += 30.0);
+    for column in &mut log.0 {
+        column.drain(4000..4900);
+        column.drain(2000..2100);
+    }
+    for (keep, methods) in [(ALL, "ls,rls,els,iv,oe"), (POSITIONS, "oe")] {
+        log.write(&folder.path().join("log.csv"), keep);
+        let typed = [
+            "identify",
+            "log.csv",
+            "--axis",
+            "axis.toml",
+            "--method",
+            methods,
+            "--json",
+            "out.json",
+            "--report",
+            "out.html",
+        ];
+        let done = run::eixo_in(folder.path(), &typed);
+        let said = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert_eq!(done.status.code(), Some(0), "{said} {}", String::from_utf8_lossy(&done.stderr));
+        assert!(said.contains("3 pieces"), "{said}");
+        let json: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.path().join("out.json")).unwrap()).unwrap();
+        assert_eq!((json["trace"]["pieces"].as_u64(), json["trace"]["samples"].as_u64()), (Some(3), Some(5000)));
+        let of = |name: &str| json["methods"].as_array().unwrap().iter().find(|m| m["method"] == name).unwrap().clone();
+        for p in of("oe")["parameters"].as_array().unwrap() {
+            let number = |key: &str| p[key].as_f64().unwrap();
+            let off = (number("value") - number("reference")) / number("std");
+            assert!(off.abs() < 4.0 && number("std") < 0.05 * number("value"), "{p}");
+        }
+        if keep.len() == ALL.len() {
+            for name in ["ls", "rls", "els", "iv"] {
+                let found = of(name);
+                assert!(found["failure"].is_null(), "{found}");
+                // A difference across a gap would be an acceleration of thousands of rad/s2, and the inertia nothing.
+                let i1 = found["parameters"][0]["value"].as_f64().unwrap();
+                assert!((i1 / 2.37e-4 - 1.0).abs() < 0.1, "{name}: {i1}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_part_of_a_record_is_taken_and_resampled_by_every_command_that_reads_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("axis.toml"), AXIS).unwrap();
+    let mut log = Log::with_friction(1, 0.0);
+    log.write(&at("log.csv"), ALL);
+    let said = |typed: &[&str]| {
+        let done = run::eixo_in(folder.path(), typed);
+        assert!(matches!(done.status.code(), Some(0 | 1)), "{typed:?}: {}", String::from_utf8_lossy(&done.stderr));
+        format!("{}{}", String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr))
+    };
+    let part = ["--from", "1", "--to", "3"];
+    let times = || {
+        let text = std::fs::read_to_string(at("out.csv")).unwrap();
+        let time = |line: &str| line.split(',').next().unwrap().parse::<f64>().unwrap();
+        let rows: Vec<f64> = text.lines().skip(1).map(time).collect();
+        (rows.len(), rows[0], rows[rows.len() - 1])
+    };
+    run::fine(&["export", at("axis.fmu").to_str().unwrap()]);
+    for model in ["axis.toml", "axis.fmu"] {
+        said(&[&["simulate", model, "--input", "log.csv", "-o", "out.csv"][..], &part].concat());
+        let (rows, first, last) = times();
+        assert!(
+            rows == 2001 && (first - 1.0).abs() < 1e-9 && (last - 3.0).abs() < 1e-6,
+            "{model}: {rows} {first} {last}"
+        );
+        let words = said(
+            &[&["simulate", model, "--input", "log.csv", "-o", "out.csv", "--resample", "0.002"][..], &part].concat(),
+        );
+        assert!(words.contains("resampled to dt") && times().0 == 1001, "{model}: {words}");
+    }
+    let words = said(&[&["init", "log.csv", "--yes", "-o", "made.toml", "--resample", "2e-3"][..], &part].concat());
+    assert!(words.contains("1001 samples"), "{words}");
+    // Stamps as a computer takes them.
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+    log.0[0].iter_mut().for_each(|t| {
+        let e: f64 = StandardNormal.sample(&mut rng);
+        *t += 2e-4 * e.clamp(-2.0, 2.0);
+    });
+    log.write(&at("log.csv"), ALL);
+    for command in ["identify", "inspect"] {
+        let words = said(&[command, "log.csv", "--axis", "axis.toml", "--resample", "0.002"]);
+        assert!(words.contains("the motion is kept up to about") && words.contains("Hz"), "{command}: {words}");
+    }
+    let done = run::eixo_in(folder.path(), &["inspect", "log.csv", "--resample", "5"]);
+    let error = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.code() == Some(2) && error.contains("--resample another interval"), "{error}");
 }

@@ -195,7 +195,10 @@ pub fn judged_pieces(
         let other = seen(trace, stamps.as_deref(), machine, known)?;
         if other.examination.refuses() && !trust {
             let refused = Refused { file: file.to_string(), examination: other.examination };
-            warnings.push(format!("{file}: the piece from {start:.6} s to {end:.6} s is left out: {}", words(&refused.examination)));
+            warnings.push(format!(
+                "{file}: the piece from {start:.6} s to {end:.6} s is left out: {}",
+                words(&refused.examination)
+            ));
             continue;
         }
         let new = other.examination.findings.iter().filter(|f| first.examination.find(f.id).is_none());
@@ -209,7 +212,8 @@ pub fn judged_pieces(
     if pieces.len() > MOST_PIECES {
         pieces.sort_by_key(|p| std::cmp::Reverse(p.len()));
         pieces.truncate(MOST_PIECES);
-        warnings.push(format!("{file}: only the {MOST_PIECES} longest pieces are used; take a part with --from and --to"));
+        warnings
+            .push(format!("{file}: only the {MOST_PIECES} longest pieces are used; take a part with --from and --to"));
     }
     pieces.sort_by(|a, b| a.start.total_cmp(&b.start));
     let used: usize = pieces.iter().map(Trace::len).sum();
@@ -233,11 +237,8 @@ pub fn judged_pieces(
 /// When the pieces are, in words; of many the first ones.
 fn spans(pieces: &[Trace]) -> String {
     const TOLD: usize = 4;
-    let mut told: Vec<String> = pieces
-        .iter()
-        .take(TOLD)
-        .map(|p| format!("{:.6} s to {:.6} s", p.start, p.time(p.len() - 1)))
-        .collect();
+    let mut told: Vec<String> =
+        pieces.iter().take(TOLD).map(|p| format!("{:.6} s to {:.6} s", p.start, p.time(p.len() - 1))).collect();
     if pieces.len() > TOLD {
         told.push("...".to_owned());
     }

@@ -11,8 +11,8 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::output_error::{Free, OutputError};
 use super::long_run::Scores;
+use super::output_error::{Free, OutputError};
 use super::parameters::{Estimated, wider};
 use super::record::{Record, Row};
 use super::regression::RegressionError;

@@ -49,7 +49,11 @@ impl<'a> Joined<'a> {
             end += p.len();
             end - p.len()..end
         });
-        Ok(Self { samples: Cow::Owned(samples), pieces: ranges.collect(), starts: pieces.iter().map(|p| p.start).collect() })
+        Ok(Self {
+            samples: Cow::Owned(samples),
+            pieces: ranges.collect(),
+            starts: pieces.iter().map(|p| p.start).collect(),
+        })
     }
 
     /// All samples, one piece after the other: their times are [`Joined::time`]'s and not the trace's own.
@@ -174,7 +178,10 @@ mod tests {
 
     fn piece(start: f64, values: std::ops::Range<u32>) -> Trace {
         let column: Vec<f64> = values.map(f64::from).collect();
-        Trace::new(start, 0.5, Hold::Zoh).with(Signal::T, column.clone()).and_then(|t| t.with(Signal::Theta1, column)).unwrap()
+        Trace::new(start, 0.5, Hold::Zoh)
+            .with(Signal::T, column.clone())
+            .and_then(|t| t.with(Signal::Theta1, column))
+            .unwrap()
     }
 
     #[test]

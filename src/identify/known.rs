@@ -59,7 +59,8 @@ impl Known {
             ));
         }
         if !self.left.is_empty() {
-            let simulated = if structure == Structure::Rigid { "" } else { " are part of the output-error model alone;" };
+            let simulated =
+                if structure == Structure::Rigid { "" } else { " are part of the output-error model alone;" };
             words.push(format!(
                 "of the effects of the axis file, {}{simulated} the regressions leave them out: they have no torque along a \
                  measured motion that could be taken off",
@@ -78,11 +79,8 @@ impl Known {
         let mut torque = trace.require(Signal::T)?.to_vec();
         let theta = trace.require(Signal::Theta1)?;
         let omega = trace.get(Signal::Omega1);
-        let base = Base {
-            k: machine.parameters.k,
-            b: machine.parameters.b,
-            rigid: machine.structure == Structure::Rigid,
-        };
+        let base =
+            Base { k: machine.parameters.k, b: machine.parameters.b, rigid: machine.structure == Structure::Rigid };
         for piece in joined.pieces() {
             for k in piece.clone() {
                 let v = omega.map_or_else(
@@ -100,7 +98,8 @@ impl Known {
                     if effect.is_dry() && slides == 0.0 {
                         continue;
                     }
-                    torque[k] -= effect.with_law(Along { p: machine.effects.of(*effect), base: &base, moment: &moment });
+                    torque[k] -=
+                        effect.with_law(Along { p: machine.effects.of(*effect), base: &base, moment: &moment });
                 }
             }
         }

@@ -164,12 +164,7 @@ struct Reconciliation<'a> {
 impl Reconciliation<'_> {
     /// The covariance of the five ratios carried to the four parameters (over their units): `A*five*A'` with
     /// `A = inv(J'J)*J'*W`, which is how the parameters move with the ratios.
-    fn carried(
-        &self,
-        q: &DVector<f64>,
-        relative: &DMatrix<f64>,
-        five: &SMatrix<f64, 5, 5>,
-    ) -> Option<DMatrix<f64>> {
+    fn carried(&self, q: &DVector<f64>, relative: &DMatrix<f64>, five: &SMatrix<f64, 5, 5>) -> Option<DMatrix<f64>> {
         let jacobian = DMatrix::from_fn(5, 4, {
             let residual = self.residual(q);
             move |i, j| residual[i].eps[j]

@@ -72,7 +72,8 @@ impl<'a> Record<'a> {
         let means: Vec<f64> = ranges
             .iter()
             .map(|r| {
-                theta1[r.clone()].iter().zip(&theta2[r.clone()]).map(|(a, b)| a - b).sum::<f64>() / r.len().max(1) as f64
+                theta1[r.clone()].iter().zip(&theta2[r.clone()]).map(|(a, b)| a - b).sum::<f64>()
+                    / r.len().max(1) as f64
             })
             .collect();
         let squares: f64 = ranges
@@ -93,7 +94,17 @@ impl<'a> Record<'a> {
             }
         }
         let omega = trace.get(Signal::Omega1).zip(trace.get(Signal::Omega2));
-        Ok(Self { torque, theta1, theta2, omega, dt: trace.dt, start: trace.start, hold: trace.hold, zero_offset, pieces })
+        Ok(Self {
+            torque,
+            theta1,
+            theta2,
+            omega,
+            dt: trace.dt,
+            start: trace.start,
+            hold: trace.hold,
+            zero_offset,
+            pieces,
+        })
     }
 
     /// Number of samples.

@@ -151,7 +151,12 @@ impl Moments {
     ///
     /// The sums of squares are over the rows that the estimate remembers, `3/(1 - lambda)` of them; its weights fall as
     /// `lambda^k`, so that `Omega = sum(lambda^2k)*long-run covariance` and `X'X = sum(lambda^k)*mean(x*x')`.
-    pub fn covariance(&self, motor: &SVector<f64, 3>, table: &SVector<f64, 2>, lambda: f64) -> Option<SMatrix<f64, 5, 5>> {
+    pub fn covariance(
+        &self,
+        motor: &SVector<f64, 3>,
+        table: &SVector<f64, 2>,
+        lambda: f64,
+    ) -> Option<SMatrix<f64, 5, 5>> {
         let remembered = if lambda < 1.0 { (3.0 / (1.0 - lambda)).ceil() as usize } else { self.rows };
         let blocks = remembered.div_ceil(self.block).clamp(1, self.sums.len().max(1));
         let skipped = self.sums.len() - blocks.min(self.sums.len());
@@ -178,7 +183,10 @@ impl Moments {
 }
 
 /// `inv(information)*omega*inv(information)`; None where a direction is not determined.
-fn sandwich<const N: usize>(information: &SMatrix<f64, N, N>, omega: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+fn sandwich<const N: usize>(
+    information: &SMatrix<f64, N, N>,
+    omega: &SMatrix<f64, N, N>,
+) -> Option<SMatrix<f64, N, N>> {
     let scale = SVector::<f64, N>::from_fn(|i, _| 1.0 / information[(i, i)].sqrt());
     let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.try_inverse()?;
@@ -616,11 +624,7 @@ fn batch<const P: usize>(
             y - plain.dot(&SVector::from(x))
         })
         .collect();
-    let mut fitted = Fitted {
-        phi: plain,
-        covariance: plain_covariance,
-        coefficients: Vec::new(),
-    };
+    let mut fitted = Fitted { phi: plain, covariance: plain_covariance, coefficients: Vec::new() };
     let left = super::statistics::rms(&(0..n).map(|k| row(k).1).collect::<Vec<_>>());
     for round in 1..=ROUNDS {
         // Without a residual beyond rounding there is no noise to model.
@@ -639,9 +643,8 @@ fn batch<const P: usize>(
         let solution = triangle.solve().map_err(|_| RegressionError::Diverged { what: "batch ELS" })?;
         let next = SVector::<f64, P>::from_fn(|i, _| solution.phi[(i, 0)]);
         let v = variance(&solution, triangle.rms(P + NOISE_ORDER));
-        let moved = (0..P)
-            .map(|i| ((next[i] - fitted.phi[i]).powi(2) / fitted.covariance[(i, i)]).sqrt())
-            .fold(0.0, f64::max);
+        let moved =
+            (0..P).map(|i| ((next[i] - fitted.phi[i]).powi(2) / fitted.covariance[(i, i)]).sqrt()).fold(0.0, f64::max);
         fitted.phi = next;
         fitted.covariance = SMatrix::from_fn(|i, j| solution.inverse[(i, j)] * v);
         fitted.coefficients = (0..NOISE_ORDER).map(|l| solution.phi[(P + l, 0)]).collect();

@@ -207,14 +207,7 @@ fn in_windows(motions: &Motions, half: usize) -> Result<Rigid, RigidError> {
     let modelled: Vec<f64> = rows.iter().map(|r| (0..4).map(|j| r[j] * values[j]).sum()).collect();
     let residual: Vec<f64> = rows.iter().zip(&modelled).map(|(r, m)| r[4] - m).collect();
     let std = robust(&rows, &residual, &of_piece, &solution.inverse);
-    Ok(Rigid {
-        values,
-        std,
-        half,
-        fit: (times, rows.iter().map(|r| r[4]).collect(), modelled),
-        rows,
-        of_piece,
-    })
+    Ok(Rigid { values, std, half, fit: (times, rows.iter().map(|r| r[4]).collect(), modelled), rows, of_piece })
 }
 
 /// The rows of the piece that has most.
@@ -270,8 +263,9 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
     let (v, s) = (&found.values, &found.std);
     if !v.iter().chain(s.iter()).all(|v| v.is_finite()) || v[0] <= 0.0 {
         return Err("the inertia comes out negative or without bound: the torque of this record does not accelerate this axis, or \
-                    another torque that the model lacks (gravity, a spring, a second inertia) rules it. Look at the record \
-                    (`eixo inspect`), or diagnose it"
+                    another torque that the model lacks (gravity, a spring, a second inertia) rules it. One that is known goes \
+                    into [effects] of the axis file (a weight on a hinge is [effects.gravity]) and is taken off; otherwise look \
+                    at the record (`eixo inspect`), or diagnose it"
             .to_owned());
     }
     for (i, name) in [(1, "viscous friction"), (2, "dry friction")] {
@@ -330,11 +324,7 @@ pub(super) fn identify(
                 format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
-            evidence = Evidence {
-                held_out: held_out(regressed),
-                shares: Some(shares(&motions)),
-                explained: None,
-            };
+            evidence = Evidence { held_out: held_out(regressed), shares: Some(shares(&motions)), explained: None };
             for (i, name) in names.into_iter().enumerate() {
                 let r = if i == 0 { reference } else { None };
                 result.parameters.push(Estimate::new(name, units(motion)[i], found.values[i], Some(found.std[i]), r));
@@ -346,7 +336,9 @@ pub(super) fn identify(
             let percent = 100.0 * rms(&error) / rms(&measured).max(f64::MIN_POSITIVE);
             let at = |k: usize| time[k];
             let residual: Vec<f64> = error.iter().map(|e| -e).collect();
-            result.outputs.push(OutputFit { signal: Signal::T, ..output_fit(Signal::T, &measured, &residual, at, motion) });
+            result
+                .outputs
+                .push(OutputFit { signal: Signal::T, ..output_fit(Signal::T, &measured, &residual, at, motion) });
             result.excitation = Some(ExcitationEstimate {
                 formulation: "I*a + D*w + F*sign(w) + L, means over the windows",
                 error_percent: percent,

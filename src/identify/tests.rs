@@ -239,10 +239,22 @@ fn disturbed(seed: u64) -> (Trace, Parameters) {
     let (n, h) = (2048, 1e-3);
     let torque = Multisine::in_band(Kind::RandomPhase, n, h, 1.0, 120.0, 1.0, 0.0, 7).unwrap().period();
     let a = Matrix4::new(
-        0.0, 1.0, 0.0, 0.0,
-        -p.k / p.i1, -p.b / p.i1, p.k / p.i1, p.b / p.i1,
-        0.0, 0.0, 0.0, 1.0,
-        p.k / p.i2, p.b / p.i2, -p.k / p.i2, -p.b / p.i2,
+        0.0,
+        1.0,
+        0.0,
+        0.0,
+        -p.k / p.i1,
+        -p.b / p.i1,
+        p.k / p.i1,
+        p.b / p.i1,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        p.k / p.i2,
+        p.b / p.i2,
+        -p.k / p.i2,
+        -p.b / p.i2,
     ) * (0.5 * h);
     let left = (Matrix4::identity() - a).try_inverse().unwrap();
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);

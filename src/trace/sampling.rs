@@ -152,7 +152,9 @@ pub fn resample_far(time: &[f64], values: &[f64], grid: &Grid, samples: usize, h
     let mut below = 0;
     let logged = (time[n - 1] - time[0]) / (n - 1).max(1) as f64;
     if held && grid.dt > 1.5 * logged {
-        return (0..samples).map(|k| mean_of_held(time, values, grid.start + k as f64 * grid.dt, grid.dt, &mut below)).collect();
+        return (0..samples)
+            .map(|k| mean_of_held(time, values, grid.start + k as f64 * grid.dt, grid.dt, &mut below))
+            .collect();
     }
     (0..samples)
         .map(|k| {

@@ -134,14 +134,17 @@ pub(super) fn tncscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         // The first cell is the control's own count of time; the cycle time is what spaces the samples.
         let cells: Vec<&str> = line.trim_end_matches(';').split(';').map(str::trim).collect();
         if cells.len() > names.len() + 1 {
-            let what = format!("row {at}: {} cells where the time and {} curves are expected", cells.len(), names.len());
+            let what =
+                format!("row {at}: {} cells where the time and {} curves are expected", cells.len(), names.len());
             return Err(wrong(what));
         }
         filled.put("time [s]", Some(f64::from(row) * dt), String::new, at, file)?;
         for ((name, curve), cell) in names.iter().zip(&curves).zip(&cells[1..]) {
             // A curve of another cycle time is not of the same instants.
             let value = if cycle(&curve[3]) == Some(dt) { cell.parse().ok() } else { None };
-            let text = || if cycle(&curve[3]) == Some(dt) { (*cell).to_owned() } else { format!("cycle time {} us", curve[3]) };
+            let text = || {
+                if cycle(&curve[3]) == Some(dt) { (*cell).to_owned() } else { format!("cycle time {} us", curve[3]) }
+            };
             filled.put(name, value, text, at, file)?;
         }
         filled.end(at);

@@ -112,8 +112,24 @@ pub fn writable(path: &Path) -> Result<(), TraceError> {
     let failed = |reason| TraceError::Write { path: path.to_owned(), reason };
     match Target::of(path).map_err(failed)? {
         Target::Output => Ok(()),
+        // To open a pipe and close it again would tell its reader that there is no more to come.
+        Target::Through(to) if is_pipe(&to) => Ok(()),
         Target::Through(to) => std::fs::OpenOptions::new().write(true).open(to).map(|_| ()).map_err(failed),
         Target::File(to) => Pending::in_folder(folder_of(&to)).map(Pending::forget).map_err(failed),
+    }
+}
+
+/// Whether it is a named pipe.
+fn is_pipe(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        std::fs::metadata(path).is_ok_and(|there| there.file_type().is_fifo())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
     }
 }
 

@@ -102,7 +102,9 @@ impl Inputs {
         if from.is_none() && to.is_none() && resample.is_none() {
             return Ok(self);
         }
-        let (Some(first), Some(last)) = (self.time.first().copied(), self.time.last().copied()) else { return Ok(self) };
+        let (Some(first), Some(last)) = (self.time.first().copied(), self.time.last().copied()) else {
+            return Ok(self);
+        };
         let (from, to) = (from.unwrap_or(first), to.unwrap_or(last));
         let slack = 1e-6 * (last - first) / (self.time.len() as f64);
         let rows: Vec<usize> = match resample {
@@ -113,7 +115,8 @@ impl Inputs {
                 if count > MOST {
                     return Err(SimulateError::Part { from, to, left: count });
                 }
-                let at = |k: usize| self.time.partition_point(|t| *t <= start + k as f64 * dt + slack).saturating_sub(1);
+                let at =
+                    |k: usize| self.time.partition_point(|t| *t <= start + k as f64 * dt + slack).saturating_sub(1);
                 let rows = (0..count as usize).map(at).collect();
                 self.notes.push(format!(
                     "the inputs were resampled to dt = {dt:e} s, each with the value logged last: what moves faster than {:.4} Hz \

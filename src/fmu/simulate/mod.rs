@@ -48,7 +48,9 @@ pub enum SimulateError {
         near: String,
     },
     /// A part of the inputs that is none.
-    #[error("{left:.0} samples of the input lie from {from} s to {to} s at the steps asked for; give other --from, --to or --resample")]
+    #[error(
+        "{left:.0} samples of the input lie from {from} s to {to} s at the steps asked for; give other --from, --to or --resample"
+    )]
     Part {
         /// From when, s.
         from: f64,
