@@ -52,6 +52,11 @@ impl Scores {
         self.sums[block * self.width + unknown] += value;
     }
 
+    /// Their sum.
+    pub fn total<const N: usize>(&self) -> [f64; N] {
+        std::array::from_fn(|i| self.sums.iter().skip(i).step_by(self.width).sum())
+    }
+
     /// Omega of `N` unknowns.
     pub fn omega_of<const N: usize>(&self) -> SMatrix<f64, N, N> {
         let omega = self.omega();

@@ -534,7 +534,13 @@ fn pseudolinear(
     let inverse = scaled.try_inverse()?;
     let inverse = SMatrix::<f64, ALL, ALL>::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
     let weight = sums(lambda * lambda) * count / sums(lambda).powi(2);
-    let covariance = inverse * scores.omega_of::<ALL>() * inverse.transpose() * weight;
+    let mut covariance = inverse * scores.omega_of::<ALL>() * inverse.transpose() * weight;
+    if lambda >= 1.0 {
+        // A recursion that remembers its first steps need not have come to rest where the sum of its scores is zero: what is
+        // left of the way there is an error, too.
+        let way = inverse * SVector::<f64, ALL>::from(scores.total::<ALL>());
+        covariance += way * way.transpose();
+    }
     let kept = [0, 1, 2, MOTOR_ELS, MOTOR_ELS + 1];
     let five = SMatrix::<f64, 5, 5>::from_fn(|i, j| covariance[(kept[i], kept[j])]);
     five.iter().all(|v| v.is_finite()).then_some(five)
