@@ -505,8 +505,8 @@ impl Search<'_> {
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
     /// without it: what no effect explains may be what explains this one, too.
     fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
-        let plain = plainer(chosen, i, pool);
-        let Some(plain) = plain.or((chosen.terms.len() == 1).then_some(parameters)) else { return 1.0 };
+        let plain = if chosen.terms.len() == 1 { Some(parameters) } else { plainer(chosen, i, pool) };
+        let Some(plain) = plain else { return 1.0 };
         let share = |e: usize| {
             let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
             if without > with { (without - with) / without } else { 0.0 }
@@ -582,12 +582,13 @@ fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
-/// The likeliest fit of all effects of another but one.
+/// The likeliest fit of all effects of another but one, each in its form: another form of one may do what the missing one does, and
+/// which of the two it is the evidence says.
 fn plainer<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
-    let gone = fit.terms[i].0;
-    pool.iter()
-        .filter(|f| f.terms.len() + 1 == fit.terms.len() && is_more(fit, f) && f.terms.iter().all(|t| t.0 != gone))
-        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+    let mut terms = fit.terms.clone();
+    terms.remove(i);
+    let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
+    pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 /// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
