@@ -103,6 +103,7 @@ fn example(name: &str) -> Identification {
             hold: "zoh",
             signals: vec![Signal::T, Signal::Theta1, Signal::Theta2],
             period: Some(2048),
+            pieces: 1,
         },
         methods: vec![
             method("ls", "Least squares", -0.2),
