@@ -127,7 +127,7 @@ impl<'a> OutputError<'a> {
     /// # Errors
     /// When the torque or any output is missing.
     pub fn new(trace: &'a Trace, rho: f64, structure: Structure, effects: Settings) -> Result<Self, TraceError> {
-        Self::in_pieces(trace, vec![0..trace.len()], vec![trace.start], rho, structure, effects)
+        Self::in_pieces(trace, std::iter::once(0..trace.len()).collect(), vec![trace.start], rho, structure, effects)
     }
 
     /// Takes a record in pieces, see [`OutputError::new`].

@@ -39,7 +39,7 @@ impl<'a> Record<'a> {
     /// # Errors
     /// When T, theta1 or both of theta2 and x2 are missing.
     pub fn new(trace: &'a Trace, rho: f64) -> Result<Self, TraceError> {
-        Self::in_pieces(trace, &[0..trace.len()], Cow::Borrowed(&[]), rho)
+        Self::in_pieces(trace, std::slice::from_ref(&(0..trace.len())), Cow::Borrowed(&[]), rho)
     }
 
     /// Takes the signals of a record in pieces, see [`Record::new`].

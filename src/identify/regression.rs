@@ -112,14 +112,17 @@ const fn table_row(r: &Row) -> [f64; 3] {
     [r.twist, r.rate, r.a2]
 }
 
+/// Products over a block: of the motor's regressors, 3 x 4, and of the table's, 2 x 3.
+type Products = ([[f64; 4]; 3], [[f64; 3]; 2]);
+
 /// Products of the regressors with themselves and with the left side over blocks of rows: from them the scores follow
 /// for any estimate, without a second pass.
 pub(super) struct Moments {
     block: usize,
     rows: usize,
     taken: usize,
-    /// Motor: 3 x 4; table: 2 x 3; one pair a block.
-    sums: Vec<([[f64; 4]; 3], [[f64; 3]; 2])>,
+    /// One pair a block.
+    sums: Vec<Products>,
 }
 
 impl Moments {

@@ -124,7 +124,7 @@ pub fn follows(found: &Identification, record: Option<&Joined>) -> Option<Block>
 /// What the simulation was compared with: the record, or the average of the periods of its longest piece.
 enum Compared<'a> {
     Record(&'a Joined<'a>),
-    Average(Trace),
+    Average(Box<Trace>),
 }
 
 fn compared<'a>(found: &Identification, record: &'a Joined<'a>, best: &MethodResult) -> Compared<'a> {
@@ -134,7 +134,7 @@ fn compared<'a>(found: &Identification, record: &'a Joined<'a>, best: &MethodRes
     let longest = record.longest_trace();
     let average = || frequency::average(&longest, &frequency::measure(&longest, found.trace.period?)?).ok();
     match short.then(average).flatten() {
-        Some(average) => Compared::Average(average),
+        Some(average) => Compared::Average(Box::new(average)),
         None => Compared::Record(record),
     }
 }
