@@ -8,6 +8,10 @@ use super::robust::quantile;
 const JITTER: f64 = 0.02;
 /// A step of so many intervals has lost samples (as [`crate::trace::grid`] counts them).
 const LOST: f64 = 1.5;
+/// A step of so many intervals has lost samples whatever its neighbours say.
+const LOST_FOR_SURE: f64 = 2.5;
+/// Stamps on each side of a step that tell whether it is one sample too long or one stamp is late.
+const NEIGHBOURS: usize = 5;
 
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let Some(stamps) = input.stamps.filter(|s| s.len() >= 3) else { return };
@@ -15,7 +19,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let steps = || stamps.windows(2).map(|w| w[1] - w[0]);
     let middle = quantile(stamps.windows(2).map(|w| w[1] - w[0]), 0.5);
     // Stamps that a computer took come in clusters: the mean of the steps without lost samples is the rate.
-    let single = || steps().filter(|s| *s > 0.0 && *s <= 2.5 * middle);
+    let single = || steps().filter(|s| *s > 0.0 && *s <= LOST_FOR_SURE * middle);
     let usual = (single().sum::<f64>() / single().count().max(1) as f64).max(middle);
     let back = runs(n, |k| k > 0 && stamps[k] <= stamps[k - 1]);
     if !back.is_empty() {
@@ -36,9 +40,9 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     if usual <= 0.0 {
         return;
     }
-    let lost = runs(n, |k| k > 0 && stamps[k] - stamps[k - 1] > LOST * usual);
+    let lost = runs(n, |k| k > 0 && lost_before(stamps, k, usual) > 0.0);
     if !lost.is_empty() {
-        let missing: f64 = steps().filter(|s| *s > LOST * usual).map(|s| (s / usual).round() - 1.0).sum();
+        let missing: f64 = (1..n).map(|k| lost_before(stamps, k, usual)).sum();
         findings.push(
             Finding::new(
                 "lost_samples",
@@ -83,5 +87,49 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
                 "Log with the drive's own clock; if the sampling is even and only its stamps are not, give dt in [signals].",
             ),
         });
+    }
+}
+
+/// Samples lost between stamp `k - 1` and stamp `k`, at `usual` seconds a sample. One stamp late by half a sample is followed by
+/// a short step: of a step that could be that, the stamps around it are compared with even ones.
+fn lost_before(stamps: &[f64], k: usize, usual: f64) -> f64 {
+    let step = |k: usize| (stamps[k] - stamps[k - 1]) / usual;
+    if step(k) <= LOST {
+        return 0.0;
+    }
+    if step(k) > LOST_FOR_SURE {
+        return step(k).round() - 1.0;
+    }
+    let whole = |k: &usize| step(*k) <= LOST_FOR_SURE;
+    let before = (k.saturating_sub(NEIGHBOURS).max(1)..k).rev().take_while(whole).count();
+    let after = (k + 1..(k + NEIGHBOURS).min(stamps.len())).take_while(whole).count();
+    let offset = |i: usize| stamps[i] / usual - i as f64;
+    let middle = |range: std::ops::Range<usize>| {
+        let mut offsets: Vec<f64> = range.map(offset).collect();
+        offsets.sort_by(f64::total_cmp);
+        offsets[offsets.len() / 2]
+    };
+    (middle(k..k + after + 1) - middle(k - 1 - before..k)).round().max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_late_stamp_is_no_lost_sample() {
+        let even: Vec<f64> = (0..40).map(|k| 1e-3 * f64::from(k)).collect();
+        let count = |stamps: &[f64]| (1..stamps.len()).map(|k| lost_before(stamps, k, 1e-3)).sum::<f64>();
+        let mut late = even.clone();
+        late[20] += 0.7e-3;
+        late[30] -= 0.7e-3;
+        assert!((count(&late) - 0.0).abs() < 1e-9);
+        let mut lost = late.clone();
+        lost.remove(10);
+        assert!((count(&lost) - 1.0).abs() < 1e-9);
+        lost.drain(22..25);
+        assert!((count(&lost) - 4.0).abs() < 1e-9);
+        lost.remove(1);
+        assert!((count(&lost) - 5.0).abs() < 1e-9);
     }
 }
