@@ -12,9 +12,6 @@ const BEYOND: f64 = 1.5;
 /// noise together, as far as the motion rules (Gautier & Khalil's practice), which a rigid axis is taken to be; else as far as it shows.
 const STANDS_RIGID: f64 = 400.0;
 const STANDS: f64 = 4.0;
-/// Samples from which a record of two inertias is brought to the rate of its band, too.
-pub const LONG: usize = 20_000;
-
 /// Samples over which the window falls to an idle stretch.
 const SOFT: usize = 24;
 

@@ -218,6 +218,7 @@ impl<'a> Descent<'a> {
             bandwidth: self.at.bandwidth,
             rows: self.at.rows,
             iterations: self.iterations,
+            settled: false,
             at_bound: self.leaves,
         }
     }

@@ -1,5 +1,7 @@
 //! A hypothesis fitted, and its evidence: what the model lacks along the record, and how that changes with every free value.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
@@ -9,7 +11,7 @@ use super::super::record::Record;
 use super::descent::{Along, Descent, differ};
 use super::likelihood::{Band, C, Discrepancy, Lacking, Motion};
 use super::scales::Scales;
-use super::tracking::{Bandwidth, track};
+use super::tracking::{Bandwidth, Resolution, Tracked, track};
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 
@@ -56,6 +58,8 @@ pub struct Fit {
     pub log_prior: f64,
     /// Steps that the fit took.
     pub iterations: usize,
+    /// Whether it was made to its end.
+    pub settled: bool,
     /// Whether an effect stands where physics would not let it go on to where the record wants it: at the limit where it is another.
     pub at_bound: bool,
 }
@@ -72,6 +76,8 @@ impl Fit {
     }
 }
 
+/// A record in its band, to which hypotheses are fitted.
+#[derive(Clone)]
 pub struct Problem<'a> {
     pub record: &'a Record,
     pub band: &'a Band,
@@ -80,7 +86,8 @@ pub struct Problem<'a> {
     pub range: [f64; 2],
     pub scales: Option<Scales>,
     /// Spectra of the measured motion; `None` where it is not measured whole.
-    motion: Option<Motion>,
+    motion: Option<Arc<Motion>>,
+    resolution: Resolution,
 }
 
 impl<'a> Problem<'a> {
@@ -94,11 +101,30 @@ impl<'a> Problem<'a> {
                 (high - low).max(1e-12)
             })
         });
-        Self { record, band, nominal, range, scales: None, motion: band.motion(record) }
+        Self {
+            record,
+            band,
+            nominal,
+            range,
+            scales: None,
+            motion: band.motion(record).map(Arc::new),
+            resolution: Resolution::Full,
+        }
     }
 }
 
 impl Problem<'_> {
+    /// The same for looks that only rank.
+    #[must_use]
+    pub fn coarse(&self) -> Self {
+        Self { resolution: Resolution::Coarse, ..self.clone() }
+    }
+
+    /// What a model lacks along the record, in time.
+    pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
+        track(model, self.record, bandwidth, self.resolution)
+    }
+
     pub fn base(&self) -> Vec<Free> {
         BaseParameter::of(self.nominal.structure).iter().map(|p| Free::Base(*p)).collect()
     }
@@ -127,7 +153,7 @@ impl Problem<'_> {
     }
 
     pub fn rows(&self, model: &Model, bandwidth: Bandwidth) -> Option<Lacking> {
-        let tracked = track(model, self.record, bandwidth)?;
+        let tracked = self.track(model, bandwidth)?;
         Some(PLANNER.with_borrow_mut(|planner| self.band.lacking(model, &tracked, planner)))
     }
 
@@ -197,7 +223,7 @@ impl Problem<'_> {
     /// A model that cannot be run along the record lacks all of its torque.
     #[must_use]
     pub fn nothing(&self) -> Fit {
-        let mut tracked = super::tracking::Tracked::nothing(self.record.len());
+        let mut tracked = Tracked::nothing(self.record.len());
         tracked.torque[0].copy_from_slice(&self.record.torque);
         let rows = PLANNER.with_borrow_mut(|planner| self.band.lacking(&self.nominal, &tracked, planner));
         let s = self.band.discrepancy(&rows);
@@ -222,7 +248,11 @@ impl Problem<'_> {
             let columns = self.columns(&at.model, &fit.coordinates, &at.rows, bandwidth)?;
             Some(Fit { discrepancy: at.s, rows: at.rows, columns, bandwidth, ..fit.clone() })
         };
-        if differ(bandwidth, fit.bandwidth) { followed().unwrap_or_else(|| fit.clone()) } else { fit.clone() }
+        if self.resolution == Resolution::Coarse || differ(bandwidth, fit.bandwidth) {
+            followed().unwrap_or_else(|| fit.clone())
+        } else {
+            fit.clone()
+        }
     }
 
     /// The nominal parameters as a fit that has not moved.
@@ -246,6 +276,7 @@ impl Problem<'_> {
             log_prior: 0.0,
             rows: at.rows,
             iterations: 0,
+            settled: false,
             at_bound: false,
         }
     }
@@ -262,7 +293,7 @@ impl Problem<'_> {
         let mut descent = Descent::new(self, &fit.model, &fit.terms, fit.discrepancy)?;
         descent.run(STEPS)?;
         descent.sharpen()?;
-        Some(descent.done())
+        Some(Fit { settled: true, ..descent.done() })
     }
 
     /// Whether physics lets the effects be what they are in a model.

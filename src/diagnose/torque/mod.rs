@@ -12,6 +12,8 @@ mod descent;
 mod fit;
 mod gap;
 mod likelihood;
+mod pool;
+mod race;
 mod scales;
 mod search;
 mod starts;
@@ -38,7 +40,7 @@ use gap::Gap;
 use likelihood::Band;
 pub use search::{Confusable, Decision, Weighed};
 use search::{LIKELY, Search, decide};
-use tracking::{Tracked, track};
+use tracking::{Resolution, Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
 const SEARCHED: usize = 16_384;
@@ -76,7 +78,8 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
 
 /// What a model lacks along the record, in the band, and where that shows.
 fn lacked(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
-    let tracked = track(model, &p.record, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()));
+    let tracked =
+        track(model, &p.record, bandwidth, Resolution::Full).unwrap_or_else(|| Tracked::nothing(p.record.len()));
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
     let site = where_by_torque(&series, model.structure == Structure::Rigid);
     (tracked, series, site)
@@ -117,11 +120,7 @@ fn prepared(record: &Record, nominal: &Model) -> Prepared {
     let whole = record.part(0..band::smooth(record.len()));
     let mask = band::mask(&whole);
     let limit = band::limit(&whole, &mask, nominal.structure);
-    let record = if whole.len() > band::LONG || nominal.structure == Structure::Rigid {
-        band::decimate(&whole, limit)
-    } else {
-        whole
-    };
+    let record = band::decimate(&whole, limit);
     let record = if record.len() > SEARCHED { record.part(0..band::smooth(SEARCHED)) } else { record };
     let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);

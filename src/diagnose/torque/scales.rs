@@ -2,10 +2,10 @@
 
 use super::super::model::Model;
 use super::fit::{Fit, Problem};
-use super::tracking::track;
 use crate::axis::Structure;
 use crate::effects::{Effect, Extent, Family, Place, Scale, Settings};
 
+#[derive(Clone)]
 pub struct Scales {
     pub torque: f64,
     pub peak: f64,
@@ -26,7 +26,7 @@ pub struct Scales {
 
 impl Scales {
     pub fn new(p: &Problem<'_>, fit: &Fit) -> Option<Self> {
-        let t = track(&fit.model, p.record, p.bandwidth(fit.discrepancy))?;
+        let t = p.track(&fit.model, p.bandwidth(fit.discrepancy))?;
         let n = t.motion.len() as f64;
         let rms = |f: &dyn Fn(&[f64; 4]) -> f64| (t.motion.iter().map(|m| f(m).powi(2)).sum::<f64>() / n).sqrt();
         let side = |i: usize| {

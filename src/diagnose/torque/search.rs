@@ -13,6 +13,7 @@ use super::super::model::{Coordinate, Free};
 use super::super::verdict::Verdict;
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
+use super::pool::Pool;
 use super::scales::Scales;
 use super::starts::{Regression, StartPoint, starts};
 use crate::axis::Structure;
@@ -42,11 +43,8 @@ const MOST: usize = 5;
 const AGAIN: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
-/// Steps of a fit that is looked at, and how many of these are then fitted to their end.
+/// Steps of a fit that is looked at.
 const PROBE: usize = 5;
-const DEEPENED: usize = 4;
-/// Variance of what a few steps leave, over that of the best, from which no further ones are made.
-const HOPELESS: f64 = 30.0;
 /// Share of the gap's power that the causes must explain together to be called its causes.
 const EXPLAINED: f64 = 0.75;
 /// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
@@ -57,12 +55,12 @@ const LEFT: f64 = 0.25;
 const DOUBT: f64 = 0.5;
 /// Probability from which an effect may be named: as likely as one of two that the record cannot tell, and a remainder beside them.
 pub const LIKELY: f64 = 0.35;
-/// The same where no cause is named and the residual is not white: more than a torque sensor's own error.
-const UNCAUSED: f64 = 0.15;
+/// The same where no cause is named, white or not: more than the error of a measured current (one to five per cent).
+const UNCAUSED: f64 = 0.08;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 /// Difference of log evidence below which two hypotheses are alike.
-const ALIKE: f64 = 3.0;
+pub const ALIKE: f64 = 3.0;
 
 /// A hypothesis with its evidence.
 #[derive(Debug, Clone)]
@@ -162,7 +160,8 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     let over = search.band().torque_share(parameters.discrepancy, search.problem.record).max(1.0);
     search.gap = parameters.discrepancy.map(|s| s / (over * over));
     search.problem.scales = Scales::new(&search.problem, &parameters);
-    let mut pool = vec![given.clone(), parameters.clone()];
+    let mut pool = Pool::default();
+    pool.extend([given.clone(), parameters.clone()]);
     let mut chosen = search.climb(parameters.clone(), &mut pool);
     // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
     let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
@@ -186,20 +185,20 @@ pub fn decide(mut search: Search<'_>) -> Decision {
         let better = search.pruned(better, &mut pool);
         chosen = search.climb(better, &mut pool);
     }
-    search.conclude(given, parameters, chosen, pool)
+    search.conclude(given, parameters, chosen, pool.into_fits())
 }
 
 impl Search<'_> {
-    fn band(&self) -> &Band {
+    pub fn band(&self) -> &Band {
         self.problem.band
     }
 
-    fn evidence(&self, fit: &Fit, independent: f64) -> f64 {
+    pub fn evidence(&self, fit: &Fit, independent: f64) -> f64 {
         self.problem.evidence(fit, independent)
     }
 
     /// Share of independent values of the residual of the likeliest.
-    fn independent(&self, fits: &[Fit]) -> f64 {
+    pub fn independent(&self, fits: &[Fit]) -> f64 {
         let best = fits.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
         best.map_or(1.0, |f| self.band().independent(&f.rows, f.discrepancy))
     }
@@ -232,19 +231,20 @@ impl Search<'_> {
                 .filter_map(|(fit, term, i)| {
                     let start = self.starts_of(fit, term).into_iter().next()?;
                     let terms: Vec<Term> = fit.terms.iter().copied().chain([term]).collect();
-                    Some((self.problem.fit(&start.model, &terms, fit.discrepancy, PROBE)?, i + 1))
+                    Some((self.problem.coarse().fit(&start.model, &terms, fit.discrepancy, PROBE)?, i + 1))
                 })
                 .collect();
             all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
             shorter = longer;
         }
-        self.deepened(all, Some(chosen))
+        self.raced(all, Some(chosen))
     }
 
     fn starts_of(&self, fit: &Fit, term: Term) -> Vec<StartPoint> {
-        let Some(scales) = &self.problem.scales else { return Vec::new() };
-        let fit = &self.problem.along_the_record(fit);
-        starts(&self.problem, fit, &Regression::new(&self.problem, fit), scales, term)
+        let problem = &self.problem.coarse();
+        let Some(scales) = &problem.scales else { return Vec::new() };
+        let fit = &problem.along_the_record(fit);
+        starts(problem, fit, &Regression::new(problem, fit), scales, term)
     }
 
     /// Whether an effect may stand beside these.
@@ -253,13 +253,13 @@ impl Search<'_> {
     }
 
     /// Adds, drops and exchanges effects as long as the evidence grows.
-    fn climb(&self, from: Fit, pool: &mut Vec<Fit>) -> Fit {
+    fn climb(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
         for _ in 0..2 * MOST {
             if self.at_floor(&best) || self.leaves_little(&best) || self.is_negligible(&best) {
                 break;
             }
-            (self.progress)(&format!("{} hypotheses fitted", pool.len()));
+            (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
             if let Some(next) = self.joined(&best, pool) {
                 best = self.pruned(next, pool);
                 continue;
@@ -275,36 +275,46 @@ impl Search<'_> {
     }
 
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
-    fn overlooked(&self, chosen: &Fit, pool: &[Fit]) -> Option<Fit> {
+    fn overlooked(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
         if self.at_floor(chosen) || self.is_negligible(chosen) {
             return None;
         }
         let share = self.independent(std::slice::from_ref(chosen));
         // Of accounts that leave next to nothing the shorter is told.
         let most = if self.leaves_little(chosen) { chosen.terms.len() } else { MOST };
-        let rivals: Vec<Fit> = pool.iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= most).cloned().collect();
+        let rivals: Vec<Fit> =
+            pool.fits().iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= most).cloned().collect();
         let best = self.best(&rivals, share)?;
         (self.evidence(best, share) > self.evidence(chosen, share) + ALIKE).then(|| best.clone())
     }
 
     /// The fit with the effect that explains the most beside it; `None` where none is a material cause.
-    fn joined(&self, best: &Fit, pool: &mut Vec<Fit>) -> Option<Fit> {
+    fn joined(&self, best: &Fit, pool: &mut Pool) -> Option<Fit> {
         if best.terms.len() >= MOST {
             return None;
         }
-        let mut added = self.added(best, best.terms.len());
-        if best.terms.is_empty()
-            && let Some(nominal) = self.unmoved(best)
-        {
-            added.extend(self.added(&nominal, 0));
-        }
-        pool.extend(added.iter().cloned());
+        let added = self.extended(best, best.terms.len(), pool);
         let share = self.independent(&added);
         let all: Vec<Fit> =
             added.into_iter().filter(|f| self.is_material(best, f) && !is_lost(best, f, share)).collect();
         let share = self.independent(&all);
         let next = self.best(&all, share)?;
         (self.evidence(next, share) > self.evidence(best, share)).then(|| next.clone())
+    }
+
+    /// The fits with one effect more, each looked for once.
+    fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
+        if let Some(known) = pool.extensions(&fit.terms) {
+            return known;
+        }
+        let mut added = self.added(fit, keep);
+        if fit.terms.is_empty()
+            && let Some(nominal) = self.unmoved(fit)
+        {
+            added.extend(self.added(&nominal, keep));
+        }
+        pool.extend_all(&fit.terms, &added);
+        added
     }
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.
@@ -337,14 +347,15 @@ impl Search<'_> {
 
     /// The fit with each effect that may join it, the best starts of all fitted.
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
-        let Some(scales) = &self.problem.scales else { return Vec::new() };
-        let fit = &self.problem.along_the_record(fit);
-        let regression = Regression::new(&self.problem, fit);
+        let problem = &self.problem.coarse();
+        let Some(scales) = &problem.scales else { return Vec::new() };
+        let fit = &problem.along_the_record(fit);
+        let regression = Regression::new(problem, fit);
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
         let of = |terms: Vec<Term>| -> Vec<StartPoint> {
             terms
                 .par_iter()
-                .flat_map_iter(|t| starts(&self.problem, fit, &regression, scales, *t).into_iter().take(2))
+                .flat_map_iter(|t| starts(problem, fit, &regression, scales, *t).into_iter().take(2))
                 .collect()
         };
         // Forms that free more than another are looked at where that other is among the best.
@@ -366,50 +377,39 @@ impl Search<'_> {
             .filter_map(|s| {
                 let mut terms = fit.terms.clone();
                 terms.insert(keep, s.term);
-                self.problem.fit(&s.model, &terms, fit.discrepancy, PROBE)
+                problem.fit(&s.model, &terms, fit.discrepancy, PROBE)
             })
             .collect();
-        self.deepened(probed, None)
+        self.raced(probed, None)
     }
 
-    /// Fits of a few steps, the best of them fitted to their end; what is hopelessly far behind the best is not.
-    fn deepened(&self, mut probed: Vec<Fit>, rival: Option<&Fit>) -> Vec<Fit> {
-        let share = self.independent(&probed);
-        probed.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
-        let best = rival.or(probed.first()).map_or([0.0; 2], |f| f.discrepancy);
-        let hopeless = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > HOPELESS * best[i]);
-        probed.par_iter_mut().take(DEEPENED).for_each(|f| {
-            if !hopeless(f)
-                && let Some(more) = self.problem.deepen(f)
-            {
-                *f = more;
-            }
-        });
-        probed
+    /// The fit without one of its effects, the known one where it was made.
+    fn without(&self, fit: &Fit, i: usize, pool: &Pool) -> Option<Fit> {
+        let mut terms = fit.terms.clone();
+        terms.remove(i);
+        pool.settled(&terms).cloned().or_else(|| self.refitted(fit, i))
     }
 
-    /// The fit without one of its effects.
-    fn without(&self, fit: &Fit, i: usize) -> Option<Fit> {
+    /// The fit without one of its effects, from where it stands.
+    fn refitted(&self, fit: &Fit, i: usize) -> Option<Fit> {
         let mut terms = fit.terms.clone();
         let (gone, _) = terms.remove(i);
         let mut start = fit.model;
         start.effects.of_mut(gone).copy_from_slice(self.problem.nominal.effects.of(gone));
-        let plain = self.problem.fit(&start, &terms, fit.discrepancy, PROBE)?;
+        let plain = self.problem.coarse().fit(&start, &terms, fit.discrepancy, PROBE)?;
         self.problem.deepen(&plain)
     }
 
     /// Each effect in turn exchanged for another that explains the record better.
-    fn exchanged(&self, fit: Fit, pool: &mut Vec<Fit>) -> Fit {
+    fn exchanged(&self, fit: Fit, pool: &mut Pool) -> Fit {
         let mut best = fit;
         if best.terms.len() < 2 {
             return best;
         }
         for i in 0..best.terms.len() {
-            let Some(without) = self.without(&best, i) else { continue };
-            let others = self.added(&without, i);
-            pool.extend(others.iter().cloned());
+            let Some(without) = self.without(&best, i, pool) else { continue };
+            let mut all = self.extended(&without, i, pool);
             pool.push(without);
-            let mut all = others;
             all.push(best.clone());
             let share = self.independent(&all);
             if let Some(other) = self.best(&all, share) {
@@ -420,11 +420,11 @@ impl Search<'_> {
     }
 
     /// Drops effects that the evidence does not need.
-    fn pruned(&self, fit: Fit, pool: &mut Vec<Fit>) -> Fit {
+    fn pruned(&self, fit: Fit, pool: &mut Pool) -> Fit {
         let mut best = fit;
         while best.terms.len() > 1 {
             let mut all: Vec<Fit> =
-                (0..best.terms.len()).into_par_iter().filter_map(|i| self.without(&best, i)).collect();
+                (0..best.terms.len()).into_par_iter().filter_map(|i| self.without(&best, i, pool)).collect();
             pool.extend(all.iter().cloned());
             let share = self.independent(std::slice::from_ref(&best));
             all.retain(|plain| {
@@ -479,7 +479,7 @@ impl Search<'_> {
         if chosen.terms.len() > 1
             && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
             && !likely(&probabilities[least])
-            && let Some(refitted) = self.without(&chosen, least)
+            && let Some(refitted) = self.refitted(&chosen, least)
         {
             // What is named without an effect has no rival that has another such effect in it.
             let pool: Vec<Fit> =
@@ -492,7 +492,7 @@ impl Search<'_> {
         let verdict = match chosen.terms.is_empty() {
             false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
-            true if left > LEFT || !settled && left > UNCAUSED => Verdict::Unexplained,
+            true if left > UNCAUSED => Verdict::Unexplained,
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
         };

@@ -4,7 +4,6 @@ use super::super::model::Model;
 use super::fit::{Fit, Problem, Term};
 use super::likelihood::{C, Weight};
 use super::scales::Scales;
-use super::tracking::track;
 use crate::effects::{Place, Role, Scale, Settings, Start};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -143,7 +142,7 @@ fn peaks(power: &[f64], most: usize) -> Vec<usize> {
 
 /// Orders (periods per radian over 2 pi: as the effect's own unit, 1/rad) at which the residual is periodic in the angle.
 fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Vec<f64>> {
-    let t = track(&fit.model, p.record, fit.bandwidth)?;
+    let t = p.track(&fit.model, fit.bandwidth)?;
     let band = p.band;
     let per = 2 * band.equations();
     let eq = if band.equations() == 2 { side } else { 0 };

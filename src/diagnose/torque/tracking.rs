@@ -47,10 +47,22 @@ const GROWING: f64 = 2.5;
 /// Damping ratio of the feedback.
 const DAMPING: f64 = 0.7;
 
+/// How finely effects are stepped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Resolution {
+    /// As the axis itself asks.
+    Full,
+    /// A quarter of that many steps: what a look needs that only ranks.
+    Coarse,
+}
+
+/// Steps of [`Resolution::Full`] in one of [`Resolution::Coarse`]: the fastest motion then turns by one radian a step.
+const COARSER: usize = 4;
+
 /// Simulates the model held to the record; `None` when it leaves the finite numbers.
 #[must_use]
-pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth) -> Option<Tracked> {
-    Some(track_with(model, record, bandwidth, &[])?.0)
+pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth, resolution: Resolution) -> Option<Tracked> {
+    Some(track_with(model, record, bandwidth, resolution, &[])?.0)
 }
 
 /// The same, with the effects' internal states at some samples, in order.
@@ -58,13 +70,17 @@ fn track_with(
     model: &Model,
     record: &Record,
     bandwidth: Bandwidth,
+    resolution: Resolution,
     kept: &[usize],
 ) -> Option<(Tracked, Vec<crate::effects::Memory<f64>>)> {
     let mut memories = Vec::with_capacity(kept.len());
     let n = record.len();
     let dt = record.dt;
     let rigid = model.structure == Structure::Rigid;
-    let per = substeps(&model.parameters, model.structure, &model.effects, dt);
+    let per = match (resolution, substeps(&model.parameters, model.structure, &model.effects, dt)) {
+        (Resolution::Full, per) => per,
+        (Resolution::Coarse, per) => per.div_ceil(COARSER),
+    };
     let h = dt / per as f64;
     let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
     let p = &model.parameters;
@@ -214,7 +230,7 @@ const STARTING: f64 = 0.1;
 /// States of a model held to the record, at some samples.
 #[must_use]
 pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<Run> {
-    let tracked = track_with(model, record, [STARTING / record.dt; 2], samples);
+    let tracked = track_with(model, record, [STARTING / record.dt; 2], Resolution::Full, samples);
     match tracked {
         Some((t, memories)) => {
             samples.iter().zip(memories).map(|(&k, memory)| Run { motion: t.motion[k], memory }).collect()

@@ -1,0 +1,53 @@
+//! Fits of a few steps go on side by side, and those that fall behind are given up.
+
+use rayon::prelude::*;
+
+use super::fit::{Fit, STEPS};
+use super::search::{ALIKE, Search};
+
+/// Fits that go on.
+const RACING: usize = 4;
+/// Variance of what a few steps leave, over that of the best, from which no further ones are made.
+const HOPELESS: f64 = 30.0;
+/// Steps between two looks at how a fit stands beside the others.
+const ROUND: usize = 8;
+/// Times the gain of its last steps that a fit may be behind the best: no further does it come.
+const PATIENCE: f64 = 10.0;
+
+impl Search<'_> {
+    /// The same fits, best first, those that keep up with the best and with `rival` fitted to their end.
+    pub fn raced(&self, mut fits: Vec<Fit>, rival: Option<&Fit>) -> Vec<Fit> {
+        let share = self.independent(&fits);
+        let evidence = |f: &Fit| self.evidence(f, share);
+        fits.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
+        let best = rival.or(fits.first()).map_or([0.0; 2], |f| f.discrepancy);
+        let hopeless = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > HOPELESS * best[i]);
+        let mut racing: Vec<usize> = (0..fits.len().min(RACING)).filter(|i| !hopeless(&fits[*i])).collect();
+        let mut first = rival.map_or(f64::NEG_INFINITY, evidence);
+        for _ in 0..STEPS / ROUND {
+            let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);
+            let further: Vec<Option<Fit>> = racing.par_iter().map(|&i| on(&fits[i])).collect();
+            first = further.iter().flatten().map(evidence).fold(first, f64::max);
+            let mut still = Vec::new();
+            for (i, further) in racing.into_iter().zip(further) {
+                let Some(further) = further else { continue };
+                let gain = (evidence(&further) - evidence(&fits[i])).max(0.0);
+                if first - evidence(&further) <= PATIENCE * gain + ALIKE {
+                    still.push(i);
+                }
+                fits[i] = further;
+            }
+            racing = still;
+            if racing.iter().all(|&i| fits[i].iterations < ROUND) {
+                break;
+            }
+        }
+        let ended: Vec<Option<Fit>> = racing.par_iter().map(|&i| self.problem.deepen(&fits[i])).collect();
+        for (i, fit) in racing.into_iter().zip(ended) {
+            if let Some(fit) = fit {
+                fits[i] = fit;
+            }
+        }
+        fits
+    }
+}
