@@ -33,7 +33,10 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
     let channels = channels.map(|c| c.map(column));
     let noise = estimate_noise(&torque, &[0, 1, 2, 3].map(|c: usize| channels[c].as_deref()), None);
     let std = noise.std.map(|s| s.max(1e-12));
-    Some((Record { start: time[0], dt, hold: Hold::Zoh, torque, channels, noise: std, idle: Vec::new() }, noise))
+    Some((
+        Record { start: time[0], dt, hold: Hold::Zoh, torque, between: None, channels, noise: std, idle: Vec::new() },
+        noise,
+    ))
 }
 
 /// The diagnosis of the bench by both encoders, from the nominal values of an outside analysis.

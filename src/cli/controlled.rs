@@ -25,6 +25,7 @@ fn logged(trace: &Trace) -> Logged {
         dt: trace.dt,
         hold: trace.hold,
         torque: channel(Signal::T).unwrap_or_default(),
+        between: None,
         channels: [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(channel),
         noise: [0.0; 4],
         idle: Vec::new(),

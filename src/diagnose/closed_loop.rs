@@ -233,6 +233,7 @@ mod tests {
                 dt,
                 hold: Hold::Zoh,
                 torque: silent(3000),
+                between: None,
                 channels: [Some(silent(3000)), None, Some(silent(3000)), None],
                 noise: [1e-9; 4],
                 idle: Vec::new(),

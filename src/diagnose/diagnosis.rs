@@ -126,6 +126,8 @@ pub struct Diagnosis {
     pub parameters: Vec<AxisParameter>,
     /// The steps in which the readings come; `None` where they are fine, or the model knows of them.
     pub rounding: Option<Rounding>,
+    /// Whether the search for causes ended at its limit of work.
+    pub cut_short: bool,
     /// What the drive's loop says, for a record under control whose drive is known.
     pub closed_loop: Option<ClosedLoop>,
 }

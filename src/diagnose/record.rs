@@ -1,6 +1,7 @@
 //! The record that the diagnosis works on: torque, the measured channels and the noise of each.
 
 use crate::axis::Hold;
+use crate::effects::Ramp;
 
 /// Names of the channels, in the order of [`Record::channels`].
 pub const CHANNELS: [&str; 4] = ["theta1", "omega1", "theta2", "omega2"];
@@ -16,6 +17,8 @@ pub struct Record {
     pub hold: Hold,
     /// Torque on the motor (or its command), N.m; one value a sample.
     pub torque: Vec<f64>,
+    /// Where it is known more often than the motion: at this many even instants a sample, the first of them the sample's own.
+    pub between: Option<(usize, Vec<f64>)>,
     /// `[theta1, omega1, theta2, omega2]`, rad and rad/s, as long as the torque; what was not measured is `None`.
     pub channels: [Option<Vec<f64>>; 4],
     /// Standard deviation of the noise of each channel, in its unit; means nothing where the channel is `None`.
@@ -39,6 +42,7 @@ impl Record {
             dt: self.dt,
             hold: self.hold,
             torque: self.torque[range.clone()].to_vec(),
+            between: (self.between.as_ref()).map(|(m, t)| (*m, t[m * range.start..m * range.end].to_vec())),
             channels: std::array::from_fn(|c| self.channels[c].as_ref().map(|v| v[range.clone()].to_vec())),
             noise: self.noise,
             idle: (self.idle.iter())
@@ -47,6 +51,30 @@ impl Record {
                 .map(|r| r.start - range.start..r.end - range.start)
                 .collect(),
         }
+    }
+
+    /// Instants a sample at which the torque is known.
+    #[must_use]
+    pub fn instants(&self) -> usize {
+        self.between.as_ref().map_or(1, |(m, _)| *m)
+    }
+
+    /// The torque over part `j` of the `parts` equal ones of the interval after sample `k`, N.m.
+    #[must_use]
+    pub fn ramp(&self, k: usize, j: usize, parts: usize) -> Ramp<f64> {
+        let share = |i: usize| i as f64 / parts as f64;
+        if let Some((instants, torque)) = &self.between {
+            let at = |i: usize| {
+                let x = (k as f64 + share(i)) * *instants as f64;
+                let first = (x as usize).min(torque.len() - 1);
+                let next = (first + 1).min(torque.len() - 1);
+                torque[first] + (torque[next] - torque[first]) * (x - first as f64)
+            };
+            return Ramp { start: at(j), end: at(j + 1) };
+        }
+        let whole: Ramp<f64> = self.hold.ramp(&self.torque, k);
+        let at = |i: usize| whole.start + (whole.end - whole.start) * share(i);
+        if parts == 1 || self.hold == Hold::Zoh { whole } else { Ramp { start: at(j), end: at(j + 1) } }
     }
 
     /// Whether there is no sample.

@@ -38,6 +38,7 @@ mod tests {
             dt: 1e-3,
             hold: Hold::Zoh,
             torque: vec![0.0; 4096],
+            between: None,
             channels: [Some(y), None, None, None],
             noise: [NOISE, 0.0, 0.0, 0.0],
             idle: Vec::new(),

@@ -110,6 +110,7 @@ pub fn friction(machine: &str) -> Diagnosis {
             fitted: Estimate { value: 2.3701e-4, std: Some(1.2e-7), unit: "kg.m2" },
         }],
         rounding: Some(Rounding { step: 1e-3, channels: vec!["theta1"], role: RoundingRole::Noise }),
+        cut_short: false,
         closed_loop: None,
     }
 }

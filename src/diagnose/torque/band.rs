@@ -116,23 +116,35 @@ pub fn smooth(n: usize) -> usize {
 
 /// Samples a period of the band's upper end that are kept.
 const KEPT: f64 = 8.0;
+/// Instants a sample at which the torque is kept: what runs straight between fewer of them has images in it that an axis of unlike
+/// inertias answers by more than the noise.
+const INSTANTS: [usize; 2] = [4, 5];
 
-/// The record at the lower rate that its band needs; its torque then runs straight from sample to sample, raised so that within
+/// Every how many samples one is kept, and the instants of the torque within: as many of both as there may be.
+fn thinning(most: usize) -> (usize, usize) {
+    if most <= INSTANTS[1] {
+        return (most, most);
+    }
+    INSTANTS.map(|m| (most / m * m, m)).into_iter().max().unwrap_or((1, 1))
+}
+
+/// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
 /// the band it is the one that acted.
 pub fn decimate(record: &Record, limit: f64) -> Record {
     use crate::axis::Hold;
-    let every = (1.0 / (record.dt * KEPT * limit)).floor() as usize;
+    let (every, instants) = thinning((1.0 / (record.dt * KEPT * limit)).floor() as usize);
     let n = record.len();
     if every < 2 || n < 64 {
         return record.clone();
     }
     let dt = record.dt;
     let slow = dt * every as f64;
+    let step = every / instants;
     let pad = n.min(4096).max(every * 8).min(n - 1);
     let total = smooth_up(n + 2 * pad);
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(total), planner.plan_fft_inverse(total));
-    let filter = |y: &[f64], odd: bool, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
+    let filter = |y: &[f64], odd: bool, every: usize, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
         let at = |i: isize| -> f64 {
             let last = n as isize - 1;
             if i < 0 {
@@ -180,15 +192,19 @@ pub fn decimate(record: &Record, limit: f64) -> Record {
         } else {
             Complex::new(sinc(f * dt).powi(2), 0.0)
         };
-        held * (low(f) / sinc(f * slow).powi(2))
+        held * (low(f) / sinc(f * dt * step as f64).powi(2))
     };
-    let torque = filter(&record.torque, false, &shape);
+    let fine = filter(&record.torque, false, step, &shape);
+    let torque: Vec<f64> = fine.iter().copied().step_by(instants).collect();
+    let mut between = fine;
+    between.resize(torque.len() * instants, between.last().copied().unwrap_or_default());
     let channels = [0, 1, 2, 3].map(|c: usize| {
-        record.channels[c].as_ref().map(|y| filter(y, c.is_multiple_of(2), &|f| Complex::new(low(f), 0.0)))
+        record.channels[c].as_ref().map(|y| filter(y, c.is_multiple_of(2), every, &|f| Complex::new(low(f), 0.0)))
     });
     let noise = record.noise.map(|s| s / (every as f64).sqrt());
     let idle = record.idle.iter().map(|r| r.start / every..r.end / every).collect();
-    let out = Record { start: record.start, dt: slow, hold: Hold::Linear, torque, channels, noise, idle };
+    let between = Some((instants, between));
+    let out = Record { start: record.start, dt: slow, hold: Hold::Linear, torque, between, channels, noise, idle };
     let m = smooth(out.len());
     out.part(0..m)
 }

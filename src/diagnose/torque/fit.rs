@@ -1,6 +1,7 @@
 //! A hypothesis fitted, and its evidence: what the model lacks along the record, and how that changes with every free value.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -11,7 +12,7 @@ use super::super::record::Record;
 use super::descent::{Along, Descent, differ};
 use super::likelihood::{Band, C, Discrepancy, Lacking, Motion};
 use super::scales::Scales;
-use super::tracking::{Bandwidth, Resolution, Tracked, track};
+use super::tracking::{Bandwidth, Resolution, Tracked, parts, track};
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 
@@ -88,6 +89,8 @@ pub struct Problem<'a> {
     /// Spectra of the measured motion; `None` where it is not measured whole.
     motion: Option<Arc<Motion>>,
     resolution: Resolution,
+    /// Steps simulated so far.
+    steps: Arc<AtomicU64>,
 }
 
 impl<'a> Problem<'a> {
@@ -109,6 +112,7 @@ impl<'a> Problem<'a> {
             scales: None,
             motion: band.motion(record).map(Arc::new),
             resolution: Resolution::Full,
+            steps: Arc::default(),
         }
     }
 }
@@ -120,8 +124,15 @@ impl Problem<'_> {
         Self { resolution: Resolution::Coarse, ..self.clone() }
     }
 
+    /// Steps simulated so far: of all that runs side by side only once it has ended the same on any number of threads.
+    pub fn steps(&self) -> u64 {
+        self.steps.load(Ordering::Relaxed)
+    }
+
     /// What a model lacks along the record, in time.
     pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
+        let steps = self.record.len() * parts(model, self.record, self.resolution);
+        self.steps.fetch_add(steps as u64, Ordering::Relaxed);
         track(model, self.record, bandwidth, self.resolution)
     }
 

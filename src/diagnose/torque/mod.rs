@@ -45,6 +45,9 @@ use tracking::{Resolution, Tracked, track};
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
 const SEARCHED: usize = 16_384;
 
+/// Steps of the fit through which a band sees its noise.
+const REFERRED: usize = 24;
+
 /// Hypotheses that are told, each with its own run over the held-out data.
 const TOLD: usize = 12;
 
@@ -62,7 +65,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects = case.suspects.iter().copied().filter(may).collect();
     let problem = Problem::new(&searched.record, &searched.band, case.nominal);
-    let decision = decide(Search { problem, suspects, gap: [0.0; 2], progress });
+    let decision = decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress });
     progress("held-out data");
     let models = [decision.given.model, decision.parameters.model, decision.chosen.model];
     let on_train = gap::measure(&searched.record, &models);
@@ -115,20 +118,33 @@ fn split(case: &Case<'_>) -> (Record, Record) {
     }
 }
 
+/// Noises up to which the parameters alone follow a record that is searched at its own rate: the one of the band is not that exact.
+const EXACT: f64 = 10.0;
+
 /// The record in the band of its motion.
 fn prepared(record: &Record, nominal: &Model) -> Prepared {
     let whole = record.part(0..band::smooth(record.len()));
     let mask = band::mask(&whole);
     let limit = band::limit(&whole, &mask, nominal.structure);
-    let record = band::decimate(&whole, limit);
-    let record = if record.len() > SEARCHED { record.part(0..band::smooth(SEARCHED)) } else { record };
+    if nominal.structure == Structure::TwoInertia {
+        let (own, left) = referred(whole.part(0..band::smooth(whole.len().min(SEARCHED))), nominal, limit);
+        if left < EXACT {
+            return own;
+        }
+    }
+    let slow = band::decimate(&whole, limit);
+    referred(slow.part(0..band::smooth(slow.len().min(SEARCHED))), nominal, limit).0
+}
+
+/// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,
+/// in noises.
+fn referred(record: Record, nominal: &Model, limit: f64) -> (Prepared, f64) {
     let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);
-    // The noise is seen through the axis as it is, not as its data sheet has it.
-    let reference =
-        Problem::new(&record, &plain, *nominal).fit(nominal, &[], [f64::MAX; 2], 24).map_or(*nominal, |f| f.model);
-    let band = Band::new(&record, &reference, limit, &mask);
-    Prepared { record, band }
+    let fit = Problem::new(&record, &plain, *nominal).fit(nominal, &[], [f64::MAX; 2], REFERRED);
+    let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
+    let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
+    (Prepared { record, band }, left)
 }
 
 /// Where the torque that a model lacks shows along the record.
@@ -194,6 +210,7 @@ fn build(
         },
         parameters: parameters(case, decision),
         rounding: None,
+        cut_short: decision.cut_short,
         closed_loop: None,
     }
 }

@@ -7,6 +7,8 @@
 //!
 //! Held-out data have no part in it.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rayon::prelude::*;
 
 use super::super::model::{Coordinate, Free};
@@ -39,6 +41,8 @@ const FITTED: usize = 12;
 const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
+/// Simulated steps after which what was found is only added to: half a minute on two cores.
+const WORK: u64 = 50_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
@@ -89,6 +93,8 @@ pub struct Confusable {
 pub struct Decision {
     /// The verdict.
     pub verdict: Verdict,
+    /// Whether the search ended before every exchange was tried.
+    pub cut_short: bool,
     /// Model as given.
     pub given: Fit,
     /// Its parameters fitted.
@@ -145,6 +151,8 @@ pub struct Search<'a> {
     pub suspects: Vec<Effect>,
     /// Discrepancy of the axis with its parameters alone: the gap.
     pub gap: Discrepancy,
+    /// Whether something was left untried for want of work.
+    pub cut_short: AtomicBool,
     /// Told what is being done.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
@@ -165,7 +173,7 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     let mut chosen = search.climb(parameters.clone(), &mut pool);
     // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
     let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
-    if !decided && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
+    if !decided && !search.is_tired() && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
         // All of the textbook's combinations, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
         let textbook = search.textbook(&parameters, &chosen);
@@ -181,6 +189,9 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     }
     // What was fitted along the way, and is likelier than where the way led, is gone on from.
     for _ in 0..AGAIN {
+        if search.is_tired() {
+            break;
+        }
         let Some(better) = search.overlooked(&chosen, &pool) else { break };
         let better = search.pruned(better, &mut pool);
         chosen = search.climb(better, &mut pool);
@@ -191,6 +202,14 @@ pub fn decide(mut search: Search<'_>) -> Decision {
 impl Search<'_> {
     pub fn band(&self) -> &Band {
         self.problem.band
+    }
+
+    /// Whether enough was simulated for what was found to be only added to. Asked between two looks alone, where it is the same on any
+    /// number of threads.
+    fn is_tired(&self) -> bool {
+        let tired = self.problem.steps() > WORK;
+        self.cut_short.fetch_or(tired, Ordering::Relaxed);
+        tired
     }
 
     pub fn evidence(&self, fit: &Fit, independent: f64) -> f64 {
@@ -264,6 +283,9 @@ impl Search<'_> {
                 best = self.pruned(next, pool);
                 continue;
             }
+            if self.is_tired() {
+                break;
+            }
             // What was named first was named without the others.
             let other = self.exchanged(best.clone(), pool);
             if other.terms == best.terms {
@@ -290,7 +312,7 @@ impl Search<'_> {
 
     /// The fit with the effect that explains the most beside it; `None` where none is a material cause.
     fn joined(&self, best: &Fit, pool: &mut Pool) -> Option<Fit> {
-        if best.terms.len() >= MOST {
+        if best.terms.len() >= MOST || self.problem.steps() > 2 * WORK {
             return None;
         }
         let added = self.extended(best, best.terms.len(), pool);
@@ -319,7 +341,12 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.
     fn leaves_little(&self, fit: &Fit) -> bool {
-        (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
+        self.total(fit.discrepancy) < MINOR * self.total(self.gap)
+    }
+
+    /// Variance of the torque lacking in all equations.
+    fn total(&self, s: Discrepancy) -> f64 {
+        s.iter().take(self.band().equations()).sum()
     }
 
     /// Whether what a fit leaves is less than a log's torque is true to.
@@ -342,7 +369,7 @@ impl Search<'_> {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
         (0..self.band().equations())
-            .any(|i| after[i] <= (1.0 - share) * before[i] && before[i] - after[i] >= MINOR * self.gap[i])
+            .any(|i| after[i] <= (1.0 - share) * before[i] && before[i] - after[i] >= MINOR * self.total(self.gap))
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
@@ -499,7 +526,19 @@ impl Search<'_> {
         ranking.truncate(40);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
         let shares = self.shares(&chosen);
-        Decision { verdict, given, parameters, chosen, ranking, shares, probabilities, independent, confusable }
+        let cut_short = self.cut_short.load(Ordering::Relaxed);
+        Decision {
+            verdict,
+            cut_short,
+            given,
+            parameters,
+            chosen,
+            ranking,
+            shares,
+            probabilities,
+            independent,
+            confusable,
+        }
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted

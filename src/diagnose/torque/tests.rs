@@ -42,6 +42,7 @@ fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn
         dt: DT,
         hold: Hold::Zoh,
         torque,
+        between: None,
         channels: [Some(theta), None, None, None],
         noise: [1e-6; 4],
         idle: Vec::new(),

@@ -14,8 +14,8 @@
 
 use super::super::model::Model;
 use super::super::record::Record;
-use crate::axis::{Axis, Hold, Scheme, Structure, substeps};
-use crate::effects::{Ramp, TorqueHistory};
+use crate::axis::{Axis, Scheme, Structure, substeps};
+use crate::effects::TorqueHistory;
 
 /// What the model lacks, and the motion it was lacking it along.
 #[derive(Debug, Clone)]
@@ -59,6 +59,13 @@ pub enum Resolution {
 /// Steps of [`Resolution::Full`] in one of [`Resolution::Coarse`]: the fastest motion then turns by one radian a step.
 const COARSER: usize = 4;
 
+/// Steps a sample: as many as effects and torque need.
+pub fn parts(model: &Model, record: &Record, resolution: Resolution) -> usize {
+    let full = substeps(&model.parameters, model.structure, &model.effects, record.dt);
+    let steps = if resolution == Resolution::Full { full } else { full.div_ceil(COARSER) };
+    steps.next_multiple_of(record.instants())
+}
+
 /// Simulates the model held to the record; `None` when it leaves the finite numbers.
 #[must_use]
 pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth, resolution: Resolution) -> Option<Tracked> {
@@ -77,10 +84,7 @@ fn track_with(
     let n = record.len();
     let dt = record.dt;
     let rigid = model.structure == Structure::Rigid;
-    let per = match (resolution, substeps(&model.parameters, model.structure, &model.effects, dt)) {
-        (Resolution::Full, per) => per,
-        (Resolution::Coarse, per) => per.div_ceil(COARSER),
-    };
+    let per = parts(model, record, resolution);
     let h = dt / per as f64;
     let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
     let p = &model.parameters;
@@ -147,9 +151,8 @@ fn track_with(
         if k + 1 == n {
             break;
         }
-        let sample: Ramp<f64> = record.hold.ramp(&record.torque, k);
         for j in 0..per {
-            let mut ramp = substep(sample, record.hold, j, per);
+            let mut ramp = record.ramp(k, j, per);
             if !axis.on().inputs().is_empty() {
                 ramp = model.effects.transform_input(axis.on(), ramp, h, &mut inputs);
             }
@@ -166,12 +169,6 @@ fn track_with(
     // Squares of what is larger than this are no numbers.
     let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
     bounded.then_some((Tracked { torque, error, motion }, memories))
-}
-
-/// One of the equal parts of a sample's torque.
-fn substep(sample: Ramp<f64>, hold: Hold, j: usize, per: usize) -> Ramp<f64> {
-    let part = |i: usize| sample.start + (sample.end - sample.start) * (i as f64 / per as f64);
-    if per == 1 || hold == Hold::Zoh { sample } else { Ramp { start: part(j), end: part(j + 1) } }
 }
 
 /// Adds `D e` to what was given.
@@ -252,7 +249,7 @@ impl Run {
         range: &std::ops::Range<usize>,
         motion: [f64; 4],
     ) -> Vec<[f64; 4]> {
-        let per = substeps(&model.parameters, model.structure, &model.effects, record.dt);
+        let per = parts(model, record, Resolution::Full);
         let h = record.dt / per as f64;
         let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
         let mut state = axis.resume(motion, &self.memory, record.time(range.start));
@@ -260,7 +257,7 @@ impl Run {
         let warm = range.start.saturating_sub(WARM);
         let mut inputs = TorqueHistory::settled(record.torque[warm]);
         let torque = |k: usize, inputs: &mut TorqueHistory<f64>, j: usize| {
-            let ramp = substep(record.hold.ramp(&record.torque, k), record.hold, j, per);
+            let ramp = record.ramp(k, j, per);
             if axis.on().inputs().is_empty() { ramp } else { model.effects.transform_input(axis.on(), ramp, h, inputs) }
         };
         for k in warm..range.start {

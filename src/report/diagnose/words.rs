@@ -99,7 +99,12 @@ pub fn warnings(d: &Diagnosis) -> Vec<String> {
     let rounding = d.rounding.iter().map(|r| {
         format!("{} read in steps of {:.3e}; the noise floor holds their rounding.", r.channels.join(" and "), r.step)
     });
-    rounding.collect()
+    let cut_short = d.cut_short.then(|| {
+        "The search for causes ended at its limit of work: not every one of them was exchanged for every other. Diagnose a shorter \
+         part (--from, --to) to have all of it."
+            .to_owned()
+    });
+    rounding.chain(cut_short).collect()
 }
 
 /// Where the gap shows.
