@@ -5,10 +5,10 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use super::say::say;
 use super::diagnosed;
-use super::outputs;
 use super::drives::{Drives, ideal, machine};
+use super::outputs;
+use super::say::say;
 use crate::circle::roundness::{Roundness, bidirectional};
 use crate::circle::trace::{analyse, turns};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
@@ -20,7 +20,9 @@ use crate::trace::{Machine, write_columns, write_text};
 
 /// Arguments of `eixo circle`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  eixo circle axis.toml --radius 0.1 --feed 2 --report circle.html\n  eixo circle axis.toml --diagnosed diagnosis.json --report circle.html\n  eixo circle --measured ccw.csv cw.csv --report ballbar.html")]
+#[command(
+    after_help = "Examples:\n  eixo circle axis.toml --radius 0.1 --feed 2 --report circle.html\n  eixo circle axis.toml --diagnosed diagnosis.json --report circle.html\n  eixo circle --measured ccw.csv cw.csv --report ballbar.html"
+)]
 pub struct Args {
     /// The X axis (axis.toml), with Y's mass in its I2, as identified in place; the paper's axis without
     axis: Option<PathBuf>,
@@ -98,7 +100,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let axes = [x, y];
         let known = (args.axis.is_some() || args.y.is_some()).then_some(&axes);
         let found = super::circle_measured::findings(&args.measured, &args.directions, &args.test, known)?;
-        return tell(&args, || ballbar::report(&found), || super::circle_json::measured(&found), &ballbar::short(&found));
+        return tell(
+            &args,
+            || ballbar::report(&found),
+            || super::circle_json::measured(&found),
+            &ballbar::short(&found),
+        );
     }
     let found = match &args.diagnosed {
         None => None,
@@ -137,11 +144,7 @@ fn tell(
 ///
 /// # Errors
 /// When the test cannot be run.
-pub(super) fn findings(
-    axes: &[Machine; 2],
-    found: Option<&[Machine; 2]>,
-    wanted: &Test,
-) -> anyhow::Result<Findings> {
+pub(super) fn findings(axes: &[Machine; 2], found: Option<&[Machine; 2]>, wanted: &Test) -> anyhow::Result<Findings> {
     let [x, y] = axes;
     let given = wanted.drives.axes(x, y)?;
     let circle = CircleTest {
@@ -172,7 +175,8 @@ pub(super) fn findings(
         runs.push(turn(names[1].to_owned(), last)?);
     }
     let less = if less.len() < 2 { Vec::new() } else { less };
-    let without = less.into_iter().map(|(name, axes)| turn(format!("without {name}"), axes)).collect::<Result<_, _>>()?;
+    let without =
+        less.into_iter().map(|(name, axes)| turn(format!("without {name}"), axes)).collect::<Result<_, _>>()?;
     let analysis = runs.last().and_then(|run| {
         let [one, other] = run.paths.clone();
         let (turns, _) = turns(&[(circle.clockwise, one), (!circle.clockwise, other)], circle.radius)?;

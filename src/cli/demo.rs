@@ -70,7 +70,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.next("simulating the FMU");
     let host = Host::new().context("cannot find this program's own file")?;
     let options = Options { hold: Hold::Linear, rows: Rows::InputsSet, ..Options::default() };
-    let record = simulate(&fmu_file, &Inputs::of(&torque)?, &options, &host).with_context(|| fmu_file.display().to_string())?;
+    let record =
+        simulate(&fmu_file, &Inputs::of(&torque)?, &options, &host).with_context(|| fmu_file.display().to_string())?;
     let trace = record.trace(Hold::Linear)?;
     write_csv(&file("trace.csv"), &trace, Motion::Rotary)?;
 
@@ -84,10 +85,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })?;
 
     steps.next("computing the paper's tables again");
-    let findings =
-        Findings { record: trace, consistent, euler, tables: reproduce()?, crest_factor: excitation.crest_factor(), lines: LINES };
+    let findings = Findings {
+        record: trace,
+        consistent,
+        euler,
+        tables: reproduce()?,
+        crest_factor: excitation.crest_factor(),
+        lines: LINES,
+    };
 
-    let Hidden { said: diagnosis, diagnosis: found, circle } = hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
+    let Hidden { said: diagnosis, diagnosis: found, circle } =
+        hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
 
     steps.next("writing the report");
     write_text(&file("identification.json"), &serde_json::to_vec_pretty(&findings.consistent)?)?;
@@ -96,7 +104,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let layout = terminal::Layout { colour: std::io::stdout().is_terminal(), ..terminal::Layout::default() };
     say!("{}", terminal::blocks(&short(&findings), layout))?;
-    say_line!("\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n")?;
+    say_line!(
+        "\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n"
+    )?;
     say!("{}", terminal::blocks(&diagnosis, layout))?;
     say_line!()?;
     for (name, what) in [
@@ -156,7 +166,8 @@ fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Step
     let mut machine = Machine { name: "a machine with hidden friction".to_owned(), parameters, ..Machine::default() };
     write_text(&file("nominal.toml"), machine.to_toml().as_bytes())?;
 
-    let super::diagnose::Recorded { record, noise, .. } = super::diagnose::record(&file("machine.csv"), &machine, super::examined::Believed::default())?;
+    let super::diagnose::Recorded { record, noise, .. } =
+        super::diagnose::record(&file("machine.csv"), &machine, super::examined::Believed::default())?;
     let case = Case {
         machine: machine.name.clone(),
         nominal: Model::new(machine.parameters, machine.structure, machine.effects),

@@ -8,20 +8,22 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
-use super::say::{say, say_line};
 use super::examined::{Believed, Examined, examined};
 use super::many::Many;
 use super::outputs;
+use super::say::{say, say_line};
 use crate::axis::Structure;
-use crate::diagnose::{CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise};
+use crate::diagnose::{
+    CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise,
+};
 use crate::effects::{EFFECTS, Effect};
 use crate::fleet::{Found, Tracked};
-use crate::report::diagnose::{Findings, json as contract, report, short, warnings};
-use crate::report::format::{Medium, number, printable};
-use crate::report::{html, terminal};
 use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Setting};
+use crate::report::diagnose::{Findings, json as contract, report, short, warnings};
+use crate::report::format::{Medium, number, printable};
+use crate::report::{html, terminal};
 use crate::trace::{Machine, Signal, Trace, nearest, write_text};
 
 /// Arguments of `eixo diagnose`.
@@ -156,10 +158,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let suspects = library(&args.without)?;
     if args.many.is_wanted(&args.traces)? {
         let ids: Vec<&str> = suspects.iter().map(|e| e.info().id).collect();
-        return args.many.run("diagnose", &FACTS, format!("{} {:?}", ids.join(","), args.believed), &args.traces, args.axis.as_deref(), &|item| {
-            let axis = item.axis.as_deref().context("no axis.toml in its folder or above, and no --axis")?;
-            Ok(found(&examine(&item.path, axis, None, suspects.clone(), args.believed, &|_| ())?))
-        });
+        return args.many.run(
+            "diagnose",
+            &FACTS,
+            format!("{} {:?}", ids.join(","), args.believed),
+            &args.traces,
+            args.axis.as_deref(),
+            &|item| {
+                let axis = item.axis.as_deref().context("no axis.toml in its folder or above, and no --axis")?;
+                Ok(found(&examine(&item.path, axis, None, suspects.clone(), args.believed, &|_| ())?))
+            },
+        );
     }
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref()).chain(args.holdout.as_deref());
     outputs::check(inputs, [args.json.as_ref(), args.report.as_ref(), args.fmu.as_ref()])?;
@@ -249,7 +258,12 @@ fn replayed(path: &Path, replay: &Replay) -> anyhow::Result<String> {
         let error = squares(&|k| own[k] - measured[k]) / squares(&|k| measured[k] - mean);
         parts.push(format!("{name} {}", number(100.0 * error.sqrt(), 3, Medium::Terminal) + " %"));
     }
-    Ok(format!("{}: run on held-out data, {} samples: its own error is {} of the signal", path.display(), record.len(), parts.join(", ")))
+    Ok(format!(
+        "{}: run on held-out data, {} samples: its own error is {} of the signal",
+        path.display(),
+        record.len(),
+        parts.join(", ")
+    ))
 }
 
 fn library(without: &[String]) -> anyhow::Result<Vec<Effect>> {

@@ -55,13 +55,18 @@ fn detail(e: &EffectInfo) -> String {
     for p in e.parameters {
         let unit = if p.unit.is_empty() { "1" } else { p.unit };
         let word = if p.role == Role::Size { "off at" } else { "default" };
-        let _ = writeln!(out, "\n{}.{} [{unit}]\n    {}; {word} {}, from {} to {}", e.id, p.name, p.doc, p.off, p.min, p.max);
+        let _ = writeln!(
+            out,
+            "\n{}.{} [{unit}]\n    {}; {word} {}, from {} to {}",
+            e.id, p.name, p.doc, p.off, p.min, p.max
+        );
     }
     out
 }
 
 fn markdown() -> String {
-    let mut out = String::from("| effect | place | what it is | signature in the residual torques |\n|---|---|---|---|\n");
+    let mut out =
+        String::from("| effect | place | what it is | signature in the residual torques |\n|---|---|---|---|\n");
     for effect in EFFECTS {
         let e = effect.info();
         let _ = writeln!(out, "| `{}` | {} | {} | {} |", e.id, e.place.as_str(), e.title, e.signature);

@@ -77,8 +77,7 @@ pub struct Args {
 fn band(text: &str) -> Result<(f64, f64), String> {
     let usage = || format!("{text:?} is not a band; write LOW:HIGH in Hz, as in 1:50");
     let (low, high) = text.split_once(':').ok_or_else(usage)?;
-    let (low, high): (f64, f64) =
-        (low.trim().parse().map_err(|_| usage())?, high.trim().parse().map_err(|_| usage())?);
+    let (low, high): (f64, f64) = (low.trim().parse().map_err(|_| usage())?, high.trim().parse().map_err(|_| usage())?);
     if low.is_finite() && high.is_finite() && 0.0 <= low && low < high { Ok((low, high)) } else { Err(usage()) }
 }
 
@@ -117,8 +116,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let resolution = 1.0 / (args.samples as f64 * args.dt);
     let harmonic = |k: Option<&crate::identify::excitation::Line>| k.map_or(0.0, |l| l.harmonic as f64 * resolution);
-    say_line!("{}: {} samples at dt = {} s, {} period(s) of {:.6} s", args.output.display(), total, args.dt, args.periods,
-        args.samples as f64 * args.dt)?;
+    say_line!(
+        "{}: {} samples at dt = {} s, {} period(s) of {:.6} s",
+        args.output.display(),
+        total,
+        args.dt,
+        args.periods,
+        args.samples as f64 * args.dt
+    )?;
     say_line!(
         "lines         {} from {:.6} to {:.6} Hz",
         signal.lines.len(),

@@ -5,20 +5,22 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::drives::Drives;
 use super::outputs;
 use super::say::{say, say_line};
-use super::drives::Drives;
+use crate::fmu::archive::{Archive, Limits};
+use crate::fmu::description::{Description, Fmi};
 use crate::fmu::isolation;
 use crate::fmu::output;
 use crate::fmu::package::{Package, XyTable};
-use crate::fmu::archive::{Archive, Limits};
-use crate::fmu::description::{Description, Fmi};
 use crate::fmu::validation::{Options, validate};
 use crate::trace::{Machine, write_text};
 
 /// Arguments of `eixo export`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  eixo export axis.fmu --axis axis.toml\n  eixo export table.ssp --axis x.toml --y y.toml")]
+#[command(
+    after_help = "Examples:\n  eixo export axis.fmu --axis axis.toml\n  eixo export table.ssp --axis x.toml --y y.toml"
+)]
 pub struct Args {
     /// The FMU to write; with the name's end .ssp an XY table of two axes and their drives (SSP 1.0)
     pub fmu: PathBuf,
@@ -69,7 +71,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         anyhow::ensure!(!args.check, "--check is for an FMU: give {} the end .fmu", args.fmu.display());
         return table(&args, x.unwrap_or_default());
     }
-    anyhow::ensure!(args.y.is_none() && !args.bare, "--y and --bare are for an XY table: give {} the end .ssp", args.fmu.display());
+    anyhow::ensure!(
+        args.y.is_none() && !args.bare,
+        "--y and --bare are for an XY table: give {} the end .ssp",
+        args.fmu.display()
+    );
     let file = || args.axis.as_ref().map_or_else(String::new, |path| path.display().to_string());
     let package = match x {
         Some(machine) if !args.drive => Package::of(&machine).with_context(file)?,
@@ -136,6 +142,10 @@ fn table(args: &Args, x: Machine) -> anyhow::Result<ExitCode> {
     read_back(&bytes, "SystemStructure.ssd")?;
     write_text(&args.fmu, &bytes)?;
     let step = args.drives.dt;
-    say_line!("{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s", args.fmu.display(), table.name)?;
+    say_line!(
+        "{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s",
+        args.fmu.display(),
+        table.name
+    )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -10,15 +10,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use serde_json::json;
 
-use super::say::say;
 use super::FINDINGS;
 use super::examined::{Believed, Extent, Refused, judged, judged_pieces};
 use super::many::Many;
 use super::outputs;
+use super::say::say;
 use crate::axis::{Scheme, Structure};
 use crate::fleet::{Found, Tracked};
-use crate::identify::result::{Estimate, Identification};
 use crate::identify::joined::Joined;
+use crate::identify::result::{Estimate, Identification};
 use crate::identify::run::{Method, Request, identify_joined};
 use crate::identify::stream;
 use crate::report::{Block, Cell, Table, terminal};
@@ -144,8 +144,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     anyhow::ensure!(args.p0 > 0.0 && args.p0.is_finite(), "--p0 is {}: it must be greater than zero", args.p0);
     if args.many.is_wanted(&args.traces)? {
         // All that bears on the result, in words.
-        let settings =
-            format!("{:?} {:?} {:?} {}", request(&args, true), args.hold, args.believed, args.stream);
+        let settings = format!("{:?} {:?} {:?} {}", request(&args, true), args.hold, args.believed, args.stream);
         return args.many.run("identify", &FACTS, settings, &args.traces, args.axis.as_deref(), &|item| {
             let (_, result, record) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
             found(&result, Joined::of(&record).ok().as_ref())
@@ -172,7 +171,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
     if let Some(path) = &args.report {
-        write_text(path, crate::report::html::page(&crate::report::identify::report(&result, Joined::of(&record).ok().as_ref())).as_bytes())?;
+        write_text(
+            path,
+            crate::report::html::page(&crate::report::identify::report(&result, Joined::of(&record).ok().as_ref()))
+                .as_bytes(),
+        )?;
     }
     if let Some(path) = &args.axis_out {
         write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
@@ -260,14 +263,10 @@ fn found(result: &Identification, record: Option<&Joined>) -> anyhow::Result<Fou
     } else {
         "not_explained"
     };
-    let tracked = |e: &Estimate| Tracked { name: e.name.to_owned(), unit: e.unit.to_owned(), value: e.value, std: e.std };
+    let tracked =
+        |e: &Estimate| Tracked { name: e.name.to_owned(), unit: e.unit.to_owned(), value: e.value, std: e.std };
     Ok(Found {
-        facts: vec![
-            json!(verdict),
-            json!(method.method),
-            json!(fit),
-            json!(best.why),
-        ],
+        facts: vec![json!(verdict), json!(method.method), json!(fit), json!(best.why)],
         parameters: method.parameters.iter().map(tracked).collect(),
         warnings: result.warnings.clone(),
         result: json!(result),

@@ -10,8 +10,8 @@ use serde_json::{Value as Json, json};
 use super::info3;
 use super::say::say;
 use crate::fmu::archive::Archive;
-use crate::fmu::xml::Document;
 use crate::fmu::description::{Causality, Description, Interface, SI_BASE, Unit, Value, Variable};
+use crate::fmu::xml::Document;
 
 /// Arguments of `eixo info`.
 #[derive(Debug, clap::Args)]
@@ -43,7 +43,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let xml = archive.read("modelDescription.xml").with_context(|| args.fmu.display().to_string())?;
     let name = || args.fmu.display().to_string();
     let document = Document::parse(&xml).with_context(name)?;
-    if document.root.name == "fmiModelDescription" && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3.")) {
+    if document.root.name == "fmiModelDescription"
+        && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3."))
+    {
         let words: Vec<String> = args.causality.iter().map(|c| c.word().to_owned()).collect();
         let platforms = platforms(&archive);
         if args.json {
@@ -57,11 +59,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let shown: Vec<&Variable> =
         d.variables.iter().filter(|v| args.causality.is_empty() || args.causality.contains(&v.causality)).collect();
     let platforms = platforms(&archive);
-    let text = if args.json {
-        format!("{:#}\n", as_json(&d, &platforms, &shown))
-    } else {
-        as_text(&d, &platforms, &shown)
-    };
+    let text =
+        if args.json { format!("{:#}\n", as_json(&d, &platforms, &shown)) } else { as_text(&d, &platforms, &shown) };
     say!("{text}")?;
     Ok(ExitCode::SUCCESS)
 }
@@ -182,7 +181,8 @@ fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
         line("platforms", Some("none: neither binaries nor sources".into()));
     }
     for (at, (folder, files)) in platforms.iter().enumerate() {
-        let files: Vec<String> = files.iter().map(|(name, size)| format!("{name} ({} kB)", size.div_ceil(1000))).collect();
+        let files: Vec<String> =
+            files.iter().map(|(name, size)| format!("{name} ({} kB)", size.div_ceil(1000))).collect();
         line(if at == 0 { "platforms" } else { "" }, Some(format!("{folder}: {}", files.join(", "))));
     }
     for (at, unit) in d.units.iter().enumerate() {

@@ -82,13 +82,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut asker = Asker { yes: args.yes };
     let made = make(&table, &mut asker)?;
     let text = write(&made, &table, None, &file);
-    let machine = Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
+    let machine =
+        Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
     let loaded = from_table(&table, &args.part.of(machine.signals.clone()))?;
     // A first idea of the parameters, from the log itself: it says whether units and signs are right.
     let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
     let rough = rough(&loaded.trace, &machine, &examination);
     let text = write(&made, &table, rough, &file);
-    let machine = Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
+    let machine =
+        Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
     let seen = Inspected {
         examination: &examination,
         trace: &loaded.trace,
@@ -113,7 +115,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// A name as a shell takes it.
 fn quoted(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
-    if name.chars().all(plain) && !name.is_empty() { name.to_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
+    if name.chars().all(plain) && !name.is_empty() {
+        name.to_owned()
+    } else {
+        format!("'{}'", name.replace('\'', "'\\''"))
+    }
 }
 
 /// Asks a person, or takes the answer that is offered.
@@ -169,7 +175,9 @@ fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
     ] {
         let there = guesses.iter().position(|g| g.role == role);
         let table_side = guesses.iter().any(|g| matches!(g.role, Role::Signal(Signal::Theta2 | Signal::X2)));
-        if there.is_some_and(|k| guesses[k].score >= SURE) || (role == Role::Signal(Signal::Theta1) && there.is_none() && table_side) {
+        if there.is_some_and(|k| guesses[k].score >= SURE)
+            || (role == Role::Signal(Signal::Theta1) && there.is_none() && table_side)
+        {
             continue;
         }
         let offered = there.map(|k| guesses[k].column.clone());
@@ -197,7 +205,8 @@ fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
         table.file,
         table.names()
     );
-    let quantity = |s: Signal| guesses.iter().find(|g| g.role == Role::Signal(s)).and_then(|g| g.unit).map(|u| u.quantity);
+    let quantity =
+        |s: Signal| guesses.iter().find(|g| g.role == Role::Signal(s)).and_then(|g| g.unit).map(|u| u.quantity);
     let length = quantity(Signal::Theta1) == Some(Quantity::Length)
         || (!has(Signal::Theta1) && quantity(Signal::Theta2) == Some(Quantity::Length))
         || quantity(Signal::T) == Some(Quantity::Force);
@@ -214,7 +223,8 @@ fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
     let fits = |g: &Guess| match (g.role, g.unit) {
         (Role::Signal(s), Some(u)) => {
             let needed = s.quantity(motion);
-            u.quantity == needed || (u.quantity == Quantity::Drive && matches!(needed, Quantity::Torque | Quantity::Force))
+            u.quantity == needed
+                || (u.quantity == Quantity::Drive && matches!(needed, Quantity::Torque | Quantity::Force))
         }
         (Role::Time, Some(u)) => u.quantity == Quantity::Time,
         (_, None) => true,
@@ -235,7 +245,8 @@ fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
             "1",
         );
         let given = answer.parse::<f64>().ok().filter(|v| v.is_finite() && *v != 0.0);
-        torque_scale = given.with_context(|| format!("the torque constant is {answer:?}: give a number, as in 0.52"))?;
+        torque_scale =
+            given.with_context(|| format!("the torque constant is {answer:?}: give a number, as in 0.52"))?;
     }
     Ok(Made { guesses, motion, dt, torque_scale })
 }
@@ -266,7 +277,8 @@ fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<
 /// Number with four digits, as a person would write it into the file.
 fn four(value: f64) -> String {
     let text = format!("{value:.3e}");
-    text.parse::<f64>().map_or(text, |v| if (1e-3..1e4).contains(&v.abs()) || v == 0.0 { v.to_string() } else { format!("{v:e}") })
+    text.parse::<f64>()
+        .map_or(text, |v| if (1e-3..1e4).contains(&v.abs()) || v == 0.0 { v.to_string() } else { format!("{v:e}") })
 }
 
 /// The axis file, with comments.
@@ -287,8 +299,10 @@ fn write(made: &Made, table: &Table, rough: Option<[f64; 4]>, file: &str) -> Str
         "# Placeholders: the log did not say. Put in the values of the data sheet, or those that `eixo identify` finds."
     };
     if made.is_rigid() {
-        let _ = writeln!(out, "structure = \"rigid\"               # one encoder: the flexible mode is out of its reach");
-        let _ = writeln!(out, "\n[parameters]\n{origin}\nI1 = {}    # {inertia}, motor and all that it moves", four(i1));
+        let _ =
+            writeln!(out, "structure = \"rigid\"               # one encoder: the flexible mode is out of its reach");
+        let _ =
+            writeln!(out, "\n[parameters]\n{origin}\nI1 = {}    # {inertia}, motor and all that it moves", four(i1));
     } else {
         let _ = writeln!(out, "\n[parameters]\n{origin}");
         let _ = writeln!(out, "I1 = {}    # {inertia}, motor side", four(i1));
@@ -312,14 +326,22 @@ fn write(made: &Made, table: &Table, rough: Option<[f64; 4]>, file: &str) -> Str
     for signal in Signal::ALL {
         let Some(g) = made.of(signal) else { continue };
         if signal == Signal::Reference {
-            let _ = writeln!(out, "# {} looks like the reference of the drive: with its gains it belongs into [controller].", g.column);
+            let _ = writeln!(
+                out,
+                "# {} looks like the reference of the drive: with its gains it belongs into [controller].",
+                g.column
+            );
             continue;
         }
         let scale = if signal == Signal::T { made.torque_scale } else { 1.0 };
         let hold = if signal == Signal::T { ", hold = \"zoh\"" } else { "" };
         let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, hold));
         if signal == Signal::T && g.unit.is_none_or(|u| u.quantity == Quantity::Drive) && scale == 1.0 {
-            let _ = writeln!(out, "# scale is 1: all inertias and stiffnesses come out in units of {} instead of {torque}.", g.column);
+            let _ = writeln!(
+                out,
+                "# scale is 1: all inertias and stiffnesses come out in units of {} instead of {torque}.",
+                g.column
+            );
         }
     }
     out

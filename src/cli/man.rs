@@ -41,7 +41,9 @@ fn page() -> std::io::Result<Vec<u8>> {
             page.render_extra_section(&mut part)?;
         }
         // A command's sections become the parts of its own section.
-        text.extend_from_slice(String::from_utf8_lossy(&part).replace(".SH EXTRA", ".SS EXAMPLES").replace(".SH ", ".SS ").as_bytes());
+        text.extend_from_slice(
+            String::from_utf8_lossy(&part).replace(".SH EXTRA", ".SS EXAMPLES").replace(".SH ", ".SS ").as_bytes(),
+        );
     }
     Ok(text)
 }

@@ -26,22 +26,35 @@ pub struct Cli {
     pub command: Command,
 }
 
-mod say;
-
+// Plain declarations: the formatter does not follow those that a macro makes.
+mod circle;
 mod circle_json;
 mod circle_measured;
+mod completions;
 mod controlled;
+mod demo;
+mod diagnose;
 mod diagnosed;
 mod drives;
+mod effects;
 mod examined;
+mod excite;
+mod export;
+mod identify;
+mod info;
 mod info3;
+mod init;
+mod inspect;
 mod limits;
+mod man;
+mod many;
 mod outputs;
+mod say;
+mod simulate;
+mod validate;
 
 macro_rules! commands {
     ($($(#[$doc:meta])* $name:ident => $module:ident),* $(,)?) => {
-        $(mod $module;)*
-
         /// The commands, one file each.
         #[derive(Debug, Subcommand)]
         pub enum Command {
@@ -57,8 +70,6 @@ macro_rules! commands {
         }
     };
 }
-
-mod many;
 
 commands! {
     /// Run the main job on bundled data, start to finish, ending in an HTML report

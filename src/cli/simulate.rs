@@ -108,12 +108,14 @@ pub enum Noise {
 }
 
 fn parse_noise(text: &str) -> Result<Noise, String> {
-    let usage = || format!("{text:?} is no noise; write NAME=STANDARD_DEVIATION, as in theta1=1e-5, or a ratio, as in 60dB");
+    let usage =
+        || format!("{text:?} is no noise; write NAME=STANDARD_DEVIATION, as in theta1=1e-5, or a ratio, as in 60dB");
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(usage);
     match text.split_once('=') {
-        Some((name, std)) => {
-            Ok(Noise::Column(name.trim().to_owned(), number(std).and_then(|x| if x >= 0.0 { Ok(x) } else { Err(usage()) })?))
-        }
+        Some((name, std)) => Ok(Noise::Column(
+            name.trim().to_owned(),
+            number(std).and_then(|x| if x >= 0.0 { Ok(x) } else { Err(usage()) })?,
+        )),
         None => {
             let ratio = text.strip_suffix("dB").or_else(|| text.strip_suffix("db")).ok_or_else(usage)?;
             Ok(Noise::Ratio(number(ratio)?))
@@ -242,7 +244,11 @@ fn controlled(args: Args) -> anyhow::Result<ExitCode> {
     );
     let machine = Machine::read(&args.model)?;
     let input = args.input.as_deref().context("--controlled needs --input: the trace of the reference")?;
-    let mut record = super::controlled::simulate(&Machine { signals: args.part.of(machine.signals.clone()), ..machine }, input, &args.set)?;
+    let mut record = super::controlled::simulate(
+        &Machine { signals: args.part.of(machine.signals.clone()), ..machine },
+        input,
+        &args.set,
+    )?;
     if let Some(name) = args.outputs.iter().find(|name| !record.columns.iter().any(|c| c.name == **name)) {
         let names: Vec<&str> = record.columns.iter().map(|c| c.name.as_str()).collect();
         bail!("--outputs {name}: in the loop there are {}", names.join(", "));

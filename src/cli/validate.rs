@@ -162,7 +162,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     });
     let comparison = args.reference.as_ref().filter(|_| report.is_ok()).map(|reference| {
         bar.set_message("reference results");
-        anyhow::ensure!(args.tolerance > 0.0 && args.tolerance.is_finite(), "--tolerance {}: must be above 0", args.tolerance);
+        anyhow::ensure!(
+            args.tolerance > 0.0 && args.tolerance.is_finite(),
+            "--tolerance {}: must be above 0",
+            args.tolerance
+        );
         let wanted = Wanted { reference, input: args.input.as_deref(), hold: Hold::Linear, tolerance: args.tolerance };
         let host = Host {
             program: options.program.clone(),

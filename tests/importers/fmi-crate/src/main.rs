@@ -17,7 +17,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let import: Fmi2Import = import::from_path(path)?;
     let reference = |name: &str| {
         let variables = &import.model_description().model_variables.variables;
-        variables.iter().find(|v| v.name == name).map(|v| v.value_reference).ok_or_else(|| format!("no variable {name}"))
+        variables
+            .iter()
+            .find(|v| v.name == name)
+            .map(|v| v.value_reference)
+            .ok_or_else(|| format!("no variable {name}"))
     };
     let outputs = OUTPUTS.map(reference).into_iter().collect::<Result<Vec<_>, _>>()?;
     let torque = reference("T")?;
