@@ -1,7 +1,7 @@
 """What other validators find of the FMUs that `eixo validate` is tested on, in one run.
 
 Usage:
-    EIXO_MUTANTS=target/mutants cargo test --test validate writes_the_mutants
+    EIXO_MUTANTS=target/mutants cargo test --test validate writes_the_mutants -- --ignored
     .venv/bin/python scripts/validators.py target/mutants ../shared/fmus [--eixo target/release/eixo]
 
 The first folder holds FMUs that are broken, in a folder a group; the second sound ones (the Reference FMUs). Beside eixo:

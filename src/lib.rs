@@ -30,3 +30,8 @@ pub mod identify;
 pub mod report;
 #[cfg(feature = "cli")]
 pub mod trace;
+
+// What a machine lacks is said in one way by unit tests and by the program's.
+#[cfg(test)]
+#[path = "../tests/program/skip.rs"]
+mod skip;

@@ -2,12 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
 #[path = "program/run.rs"]
 mod run;
+#[path = "program/skip.rs"]
+mod skip;
 
 use run::{eixo, fine};
 
@@ -84,12 +86,7 @@ fn the_loop_needs_a_drive_and_a_reference_and_says_so() {
 #[test]
 fn the_loop_with_the_published_gains_names_the_causes_of_the_free_windows_on_emps() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let data = std::env::var_os("EIXO_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let trace = data.join("emps/train.csv");
-    if !trace.is_file() {
-        eprintln!("SKIPPED: no {}; set EIXO_DATA", trace.display());
-        return;
-    }
+    let Some(trace) = skip::traces("emps/train.csv") else { return };
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("emps.json").into_os_string().into_string().unwrap();
     let axis = root.join("tests/data/emps.toml").into_os_string().into_string().unwrap();

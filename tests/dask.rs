@@ -5,17 +5,13 @@ use std::process::Command;
 
 #[path = "fleet/machines.rs"]
 mod machines;
+#[path = "program/skip.rs"]
+mod skip;
 
 #[test]
 fn two_dask_workers_write_the_same_summary_and_index_to_the_byte() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let python = root.join(".venv/bin/python");
-    let there =
-        Command::new(&python).args(["-c", "import dask.distributed"]).output().is_ok_and(|o| o.status.success());
-    if !there {
-        eprintln!("SKIPPED: Dask is not installed (scripts/venv.sh)");
-        return;
-    }
+    let Some(python) = skip::python("dask.distributed") else { return };
     let folder = tempfile::tempdir().unwrap();
     machines::machines(folder.path());
     let eixo = env!("CARGO_BIN_EXE_eixo");

@@ -3,36 +3,21 @@
 #![cfg(all(unix, feature = "cli"))]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use eixo::fmu::description::Fmi;
 use eixo::fmu::host::Fmu;
 use eixo::fmu::package::Package;
 
+#[path = "program/skip.rs"]
+mod skip;
+
 fn eixo(args: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_eixo")).args(args).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "eixo {args:?}: {}{said}", String::from_utf8_lossy(&output.stdout));
     said
-}
-
-fn python() -> Option<PathBuf> {
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python");
-    let there = Command::new(&python).args(["-c", "import fmpy"]).output().is_ok_and(|o| o.status.success());
-    if !there {
-        eprintln!("SKIPPED: FMPy is not installed in .venv; see scripts/venv.sh");
-    }
-    there.then_some(python)
-}
-
-fn reference_fmus() -> Option<PathBuf> {
-    let usual = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/fmus");
-    let folder = std::env::var_os("EIXO_FMUS").map_or_else(usual, PathBuf::from).join("fmi3");
-    if !folder.is_dir() {
-        eprintln!("SKIPPED: there are no Reference FMUs in {}", folder.display());
-    }
-    folder.is_dir().then_some(folder)
 }
 
 /// Header (without units) and rows of a CSV.
@@ -57,7 +42,7 @@ fn table(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 
 /// Runs an FMU in both and compares all outputs: equal to the last bits of the step's sums.
 fn beside_fmpy(name: &str, step: &str, input: Option<&str>, more: &[&str], theirs_alone: &[&str]) {
-    let (Some(fmus), Some(python)) = (reference_fmus(), python()) else { return };
+    let (Some(fmus), Some(python)) = (skip::reference_fmus("fmi3"), skip::python("fmpy")) else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = |file: &str| folder.path().join(file).to_str().unwrap().to_owned();
     let fmu = fmus.join(format!("{name}.fmu")).to_str().unwrap().to_owned();
@@ -219,7 +204,7 @@ fn an_fmu_of_fmi_3_is_stepped_back_to_the_bit_and_refuses_what_is_out_of_place()
 
 #[test]
 fn fmpy_imports_validates_and_simulates_the_axis_of_fmi_3() {
-    let Some(python) = python() else { return };
+    let Some(python) = skip::python("fmpy") else { return };
     let folder = tempfile::tempdir().unwrap();
     let [_, three] = both(folder.path());
     let script = "

@@ -4,6 +4,11 @@ use std::path::{Path, PathBuf};
 
 use eixo::trace::{Column, Mapping, Signal, Table, TraceError, load};
 
+#[path = "program/skip.rs"]
+mod skip;
+
+use skip::{Lack, skipped};
+
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/formats").join(name)
 }
@@ -102,8 +107,7 @@ fn files_that_matlab_wrote_hold_what_matlab_put_there() {
         concat!(env!("CARGO_MANIFEST_DIR"), "/.venv/lib/python3*/site-packages/scipy/io/matlab/tests/data/*.mat");
     let files: Vec<PathBuf> = glob::glob(pattern).unwrap().map(Result::unwrap).collect();
     if files.is_empty() {
-        eprintln!("SKIPPED: no scipy in .venv; scripts/venv.sh makes it");
-        return;
+        return skipped(Lack::Python, "no scipy in .venv; scripts/venv.sh installs it");
     }
     let (mut doubles, mut matrices) = (0, 0);
     for path in &files {

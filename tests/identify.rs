@@ -11,22 +11,13 @@ use eixo::trace::{Mapping, Motion, Signal, Trace, load, write_csv};
 
 #[path = "program/run.rs"]
 mod run;
+#[path = "program/skip.rs"]
+mod skip;
 
 use run::eixo;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// A file of the measured data, or None with a word about it.
-fn data(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("EIXO_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let path = folder.join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there; set EIXO_DATA to the folder of measured data", path.display());
-    None
 }
 
 fn text(path: &Path) -> &str {
@@ -163,7 +154,7 @@ fn what_the_paper_tables_say_in_words_is_what_their_figures_show() {
 
 #[test]
 fn the_real_two_inertia_bench_has_the_resonances_and_inertias_of_the_outside_analysis() {
-    let Some(log) = data("two_inertia_bench/schroeder.csv") else { return };
+    let Some(log) = skip::traces("two_inertia_bench/schroeder.csv") else { return };
     let folder = tempfile::tempdir().unwrap();
     let result = folder.path().join("bench.json");
     let axis = root().join("tests/data/two_inertia_bench.toml");
@@ -193,7 +184,7 @@ fn the_real_two_inertia_bench_has_the_resonances_and_inertias_of_the_outside_ana
 
 #[test]
 fn the_real_emps_axis_has_the_published_parameters() {
-    let Some(log) = data("emps/train.csv") else { return };
+    let Some(log) = skip::traces("emps/train.csv") else { return };
     let folder = tempfile::tempdir().unwrap();
     let result = folder.path().join("emps.json");
     let axis = root().join("tests/data/emps.toml");

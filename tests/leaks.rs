@@ -9,6 +9,11 @@ use std::process::Command;
 use eixo::fmu::package::Package;
 use eixo::variables::guid;
 
+#[path = "program/skip.rs"]
+mod skip;
+
+use skip::{Lack, skipped};
+
 #[test]
 fn a_thousand_cycles_leak_nothing_and_touch_nothing_they_may_not() {
     let folder = tempfile::tempdir().unwrap();
@@ -18,7 +23,7 @@ fn a_thousand_cycles_leak_nothing_and_touch_nothing_they_may_not() {
     let driver = folder.path().join("leaks");
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/importers/leaks.c");
     match Command::new("cc").arg("-g").arg(&source).arg("-o").arg(&driver).arg("-ldl").output() {
-        Err(error) => return eprintln!("SKIPPED: no C compiler: {error}"),
+        Err(error) => return skipped(Lack::CCompiler, error),
         Ok(done) => assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr)),
     }
     let guid = guid(&package.starts).to_string();
@@ -35,7 +40,7 @@ fn a_thousand_cycles_leak_nothing_and_touch_nothing_they_may_not() {
         "--error-exitcode=9",
     ]);
     match run(&mut valgrind, "1000") {
-        Err(error) => eprintln!("SKIPPED: no valgrind: {error}"),
+        Err(error) => skipped(Lack::Valgrind, error),
         Ok(done) => assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr)),
     }
 }

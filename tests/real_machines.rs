@@ -1,28 +1,17 @@
 //! Real machines under the diagnosis: traces from `EIXO_DATA` (default `../shared/data`); without them each test says so
 //! and passes.
 
-use std::path::PathBuf;
-
 use eixo::axis::{Motion, Parameters, Structure};
 use eixo::diagnose::{Case, Model, NoiseEstimate, Record, diagnose, estimate_noise};
 use eixo::effects::{EFFECTS, Settings};
 use eixo::trace::{Hold, Table};
 
-/// A file of the measured traces, or `None`, said aloud.
-fn data(file: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("EIXO_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    let path = root.join(file);
-    if path.is_file() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there; EIXO_DATA names the folder of the measured traces", path.display());
-    None
-}
+#[path = "program/skip.rs"]
+mod skip;
 
 /// Columns of a file as a record, and its noise.
 fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Record, NoiseEstimate)> {
-    let table = Table::read(&data(file)?).expect("the file is a table");
+    let table = Table::read(&skip::traces(file)?).expect("the file is a table");
     let column = |name: &str| {
         let at = table.position(name).unwrap_or_else(|| panic!("{file} has a column {name}"));
         table.column(at).expect("numbers").to_vec()

@@ -7,6 +7,10 @@ use std::process::Command;
 
 #[path = "program/memory.rs"]
 mod memory;
+#[path = "program/skip.rs"]
+mod skip;
+
+use skip::{Lack, skipped};
 
 /// A record of so many rows: a table of 1000 rows of the paper's axis under a multisine, in closed form (the equations of motion at
 /// each frequency), time after time.
@@ -78,8 +82,7 @@ fn the_report_of_a_streamed_record_has_no_empty_tables_or_plots() {
 #[test]
 fn memory_stays_the_same_where_the_record_is_five_times_as_long() {
     if !Path::new("/proc/self/status").exists() {
-        eprintln!("SKIPPED: no /proc to read the memory of a process from");
-        return;
+        return skipped(Lack::Processes, "no /proc to read the memory of a process from");
     }
     let folder = tempfile::tempdir().unwrap();
     let measured = |name: &str, rows: usize| {

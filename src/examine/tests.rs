@@ -177,19 +177,9 @@ fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
     assert!(longest.start == 0 && (7900..8600).contains(&longest.end), "{longest:?}");
 }
 
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("EIXO_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    if !folder.is_dir() {
-        eprintln!("skipped: no {} (EIXO_DATA names the folder)", folder.display());
-        return None;
-    }
-    Some(folder)
-}
-
 #[test]
 fn real_records_are_sound() {
-    let Some(data) = data() else { return };
+    let Some(data) = crate::skip::traces("") else { return };
     let machine =
         |name: &str| Machine::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)).unwrap();
     let mapped = |t: &str, x: &str| Mapping {

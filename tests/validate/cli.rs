@@ -3,6 +3,7 @@
 use std::process::{Command, Output};
 
 use super::corpus::{self, DESCRIPTION, description, files, pack, running};
+use super::skip;
 use eixo::fmu::rules::RULES;
 
 fn eixo(args: &[&str], fmu: &[u8]) -> Output {
@@ -275,15 +276,14 @@ fn a_run_is_compared_with_reference_results_and_the_page_shows_it() {
 /// Reference-FMUs of the Modelica Association, where they lie beside the project.
 #[test]
 fn the_reference_fmus_have_no_error_and_no_warning() {
-    let folder = std::env::var_os("EIXO_FMUS").map_or_else(
-        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/fmus"),
-        std::path::PathBuf::from,
-    );
-    let Ok(entries) = std::fs::read_dir(folder.join("fmi2")) else {
-        return eprintln!("SKIPPED: no FMUs in {} (EIXO_FMUS)", folder.display());
-    };
+    let Some(folder) = skip::reference_fmus("fmi2") else { return };
     let mut count = 0;
-    for path in entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "fmu")) {
+    for path in std::fs::read_dir(&folder)
+        .unwrap()
+        .flatten()
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "fmu"))
+    {
         let output = Command::new(corpus::program()).arg("validate").arg(&path).arg("--strict").output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", text(&output));
         count += 1;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 
+use super::skip::{Lack, skipped};
 use eixo::fmu::rules::Report;
 use eixo::fmu::validation::{self, Options};
 use zip::{ZipWriter, write::SimpleFileOptions};
@@ -68,10 +69,11 @@ pub fn description(replacements: &[(&str, &str)]) -> String {
 /// Whether there is a C compiler; says so when not.
 pub fn compiler() -> bool {
     let there = Command::new("cc").arg("--version").output().is_ok_and(|o| o.status.success());
+    let there = there && cfg!(target_os = "linux");
     if !there {
-        eprintln!("SKIPPED: there is no C compiler `cc`");
+        skipped(Lack::CCompiler, "there is no C compiler `cc`, or this is not Linux");
     }
-    there && cfg!(target_os = "linux")
+    there
 }
 
 fn scratch() -> &'static Path {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::corpus;
+use super::skip::{self, Lack, skipped};
 use eixo::fmu::rules::{Severity, Verdict};
 
 const SCRIPT: &str = r#"
@@ -38,18 +39,9 @@ fn python_library(python: &Path) -> Option<PathBuf> {
     (file.is_file() && file.to_string_lossy().contains(".so")).then_some(file)
 }
 
-fn python() -> Option<PathBuf> {
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python");
-    let there = Command::new(&python).args(["-c", "import pythonfmu"]).output().is_ok_and(|o| o.status.success());
-    if !there {
-        eprintln!("SKIPPED: PythonFMU is not installed in .venv; see scripts/venv.sh");
-    }
-    there.then_some(python)
-}
-
 #[test]
 fn an_fmu_of_pythonfmu_has_no_error() {
-    let Some(python) = python() else { return };
+    let Some(python) = skip::python("pythonfmu") else { return };
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("spring.py"), SCRIPT).unwrap();
     let mut build = Command::new(&python);
@@ -61,7 +53,7 @@ fn an_fmu_of_pythonfmu_has_no_error() {
     let report = corpus::validate_file(&fmu, false);
     assert_eq!(report.count(Severity::Error), 0, "{:#?}", report.findings);
     let Some(library) = python_library(&python) else {
-        return eprintln!("SKIPPED: this Python has no shared library to run the FMU with");
+        return skipped(Lack::PythonLibrary, "this Python has no shared library to run the FMU with");
     };
     let mut command = Command::new(corpus::program());
     command.arg("validate").arg(&fmu).args(["--format", "json", "--timeout", "30"]).env("LD_PRELOAD", library);

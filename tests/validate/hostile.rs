@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::corpus::{self, DESCRIPTION, files, pack, parallel};
+use super::skip::{Lack, skipped};
 
 const SOURCE: &str = include_str!("../corpus/hostile.c");
 
@@ -49,7 +50,7 @@ fn fenced() -> bool {
     let said = String::from_utf8(output.stdout).unwrap();
     let whole = !said.contains("Landlock") && !said.contains("seccomp");
     if !whole {
-        eprintln!("SKIPPED: this kernel lacks part of the sandbox: {said}");
+        skipped(Lack::Sandbox, said);
     }
     whole
 }

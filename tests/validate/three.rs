@@ -1,7 +1,6 @@
 //! FMI 3.0: the corpus' FMU behind the other ABI (`fmi3.c`), broken in as many ways, and the Reference FMUs.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 use std::process::Command;
 
 use eixo::fmu::description::Fmi;
@@ -9,6 +8,7 @@ use eixo::fmu::rules::{self, Severity, Verdict};
 
 use super::corpus::{self, Files, Mutant, pack, parallel};
 use super::defects::DEFECTS;
+use super::skip;
 
 const DESCRIPTION: &str = include_str!("../corpus/modelDescription3.xml");
 const BINARY: &str = "binaries/x86_64-linux/corpus.so";
@@ -345,26 +345,15 @@ fn the_sound_fmu_of_fmi_3_has_no_finding() {
     assert!(untested.is_empty(), "{untested:#?}");
 }
 
-/// The folder of the Reference FMUs.
-pub fn reference_fmus() -> Option<PathBuf> {
-    let folder = std::env::var_os("EIXO_FMUS")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/fmus"), PathBuf::from);
-    let there = folder.join("fmi3").is_dir();
-    if !there {
-        eprintln!("SKIPPED: there are no Reference FMUs in {}", folder.display());
-    }
-    there.then_some(folder)
-}
-
 /// The Reference FMUs pass. StateSpace alone does not, and is wrong: `setStartValues` of its sources/model.c (line 30) does
 /// not set `x0`, so that a reset keeps it, and its `setUInt64` counts the value before it asks for it, so that no structural
 /// parameter can be set. `scripts/oracles/state_space.py` shows both with FMPy.
 #[test]
 fn the_reference_fmus_have_no_error_and_no_warning_but_for_two_of_state_space_that_are_true() {
-    let Some(folder) = reference_fmus() else { return };
+    let Some(folder) = skip::reference_fmus("fmi3") else { return };
     let names = ["BouncingBall", "Dahlquist", "Feedthrough", "Stair", "VanDerPol", "StateSpace", "Clocks"];
     let failures = parallel(&names, |name| {
-        let report = corpus::validate_file(&folder.join(format!("fmi3/{name}.fmu")), false);
+        let report = corpus::validate_file(&folder.join(format!("{name}.fmu")), false);
         let bad: Vec<_> =
             report.findings.iter().filter(|f| rules::rule(&f.rule).unwrap().severity > Severity::Note).collect();
         let ids: Vec<&str> = bad.iter().map(|f| f.rule.as_str()).collect();
