@@ -25,6 +25,8 @@ pub(super) struct Mechanics<S> {
     pub lone: Option<Effect>,
     /// Whether dry friction acts on motor and table.
     pub dry: [bool; 2],
+    /// Half of the coupling's play, rad; zero without one.
+    half_play: S,
     /// Whether the coupling has play.
     pub backlash: bool,
     /// The step that nothing ends early.
@@ -56,7 +58,8 @@ impl<S: Scalar> Mechanics<S> {
             Structure::Rigid => Base { k: S::default(), b: S::default(), rigid: true },
         };
         let dry = PLACES.map(|place| on.dry().iter().any(|e| e.info().place == place));
-        let backlash = on.forces().contains(&Effect::Backlash) && effects.of(Effect::Backlash)[0].re() > 0.0;
+        let half_play = on.forces().iter().find_map(|e| Some(effects.of(*e)[e.play_parameter()?])).unwrap_or_default();
+        let backlash = half_play.re() > 0.0;
         let lone = match (on.forces(), on.dry()) {
             (&[one], []) | ([], &[one]) => Some(one),
             _ => None,
@@ -65,7 +68,7 @@ impl<S: Scalar> Mechanics<S> {
         let lone = lone.filter(|&one| base.rigid || !effects.is_loaded(one));
         let step = Propagator::new(&parameters, structure, scheme, h.into());
         let whole = Length { compliance: Some(step.compliance()), ..Length::new(step, lone) };
-        Self { parameters, structure, scheme, effects, on, base, lone, dry, backlash, whole }
+        Self { parameters, structure, scheme, effects, on, base, lone, dry, half_play, backlash, whole }
     }
 
     /// A step of that length.
@@ -111,20 +114,16 @@ impl<S: Scalar> Mechanics<S> {
         self.dry != [false, false] || self.backlash
     }
 
-    fn gap(&self) -> S {
-        self.effects.of(Effect::Backlash)[0]
-    }
-
     /// Contact torque of a side, N.m: positive while it pushes.
     pub fn pressure(&self, side: i8, s: &State<S>) -> S {
         let side = f64::from(side);
-        ((s.linear[2] - self.gap() * side) * self.base.k + s.linear[3] * self.base.b) * side
+        ((s.linear[2] - self.half_play * side) * self.base.k + s.linear[3] * self.base.b) * side
     }
 
     /// What is missing for a side to push, rad: negative where the twist is beyond the gap's end and the contact would
     /// not pull. A contact that has opened while compressed closes again only when both hold.
     pub fn clearance(&self, side: i8, s: &State<S>) -> S {
-        let gap = self.gap() - s.linear[2] * f64::from(side);
+        let gap = self.half_play - s.linear[2] * f64::from(side);
         let pull = -(self.pressure(side, s) / self.base.k);
         if pull.re() > gap.re() { pull } else { gap }
     }

@@ -215,43 +215,10 @@ fn a_contact_that_lets_go_while_compressed_closes_again_only_when_it_pushes() {
     assert!((s.theta1() - 1.062_538_9).abs() < 1e-6 && (s.theta2() - 1.053_133_1).abs() < 1e-5);
 }
 
-/// Each effect at a size that shows, on the paper's axis.
+/// Each effect at its example.
 pub(crate) fn shown(effect: Effect) -> Settings {
     let mut s = Settings::default();
-    let values: &[f64] = match effect {
-        Effect::CoulombMotor => &[0.006, 0.4, 2.0, 0.1, 0.2],
-        Effect::CoulombTable => &[0.001, 0.4, 2.0, 0.1, 0.2],
-        Effect::PreslidingMotor => &[0.006, 0.012, 1e-4],
-        Effect::PreslidingTable => &[0.001, 0.01, 1e-5],
-        Effect::ViscousMotor => &[1e-3, 0.2],
-        Effect::ViscousTable => &[1e-4, 0.2],
-        Effect::LoadMotor | Effect::LoadTable => &[3e-3],
-        Effect::TorqueRipple => &[5e-3, 4.0, 0.3],
-        Effect::Backlash => &[0.02],
-        Effect::CubicStiffness => &[20.0],
-        Effect::CouplingHysteresis => &[1e-3, 0.02, 1.5],
-        Effect::StiffnessDrift => &[0.3, 0.5],
-        Effect::FrictionDrift => &[4e-3, 1e-4, 0.5],
-        Effect::FlexibleMode => &[2e-6, 0.02, 1e-5],
-        Effect::MotorMode => &[5e-5, 0.2, 1e-4],
-        Effect::Disturbance => &[1e-3, 7.0, 0.4],
-        Effect::Unbalance => &[1e-3, 0.2],
-        Effect::QuadraticDrag => &[1e-5],
-        Effect::EndStop => &[0.5, 0.3, -0.2, 0.02],
-        Effect::TorqueGain => &[1.2],
-        Effect::Saturation => &[0.02],
-        Effect::Delay => &[2.3e-3],
-        Effect::ActuatorLag => &[3e-3],
-        Effect::SensorDelay => &[2.3e-3],
-        Effect::LeadError => &[0.01, 0.02, 2.0, 0.5],
-        Effect::EncoderQuantisation => &[0.01],
-        Effect::Gravity => &[2e-3, 1e-3, 1.5],
-        Effect::ExternalSpring => &[5e-3, 0.2],
-        Effect::DeadZone => &[5e-3],
-        Effect::PositionFriction => &[6e-3, 0.2, 0.3],
-        Effect::Latch => &[2.3e-3, 1.5e-3],
-    };
-    s.of_mut(effect).copy_from_slice(values);
+    s.of_mut(effect).copy_from_slice(effect.info().example);
     s
 }
 
@@ -285,7 +252,7 @@ fn every_effect_sensitivity_is_its_finite_difference() {
     // Forward-mode duals through Newton, events and all, against central differences of the same simulation.
     let torque = excitation(500, 1e-3);
     for &effect in EFFECTS {
-        if effect == Effect::EncoderQuantisation {
+        if effect.step_parameter().is_some() {
             continue; // Piecewise constant: its derivative to the step is zero nearly everywhere by definition.
         }
         let s = shown(effect);

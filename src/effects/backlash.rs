@@ -5,7 +5,8 @@
 //! ([`Moment::contact`]); here is the force of a given side, less the `K*d + B*d'` that the linear axis already has.
 //! Nordin, Gutman, Automatica 38(10), 2002 (the physical model of backlash).
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Length, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -29,6 +30,7 @@ impl Force for Backlash {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] <= 4.0 * x.twist,
+        example: &[0.02],
         variants: &[Variant { name: "", free: &[0] }],
     };
     const LENGTH: Option<Length> = Some(Length::HalfPlay(0));

@@ -7,7 +7,8 @@
 //! none, what its guides carry: the sum of the weights and springs on it (gravity, external spring, unbalance, loads). It
 //! is that of the same instant, solved with the step; at rest the level is that of the mean load over the step.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{DryFriction, Level, Slip};
 use crate::scalar::Scalar;
 
@@ -80,6 +81,7 @@ impl DryFriction for CoulombMotor {
         textbook: true,
         odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
+        example: &[0.006, 0.4, 2.0, 0.1, 0.2],
         variants: VARIANTS,
     };
 
@@ -108,6 +110,7 @@ impl DryFriction for CoulombTable {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
+        example: &[0.001, 0.4, 2.0, 0.1, 0.2],
         variants: VARIANTS,
     };
 

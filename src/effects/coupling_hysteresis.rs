@@ -4,7 +4,8 @@
 //! with the stiffness `level/reach` and closes at `level`. Wen, J. Eng. Mech. 102(2), 1976; Ikhouane, Rodellar, Systems
 //! with Hysteresis, Wiley 2007, chapter 2.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -59,6 +60,7 @@ impl Force for CouplingHysteresis {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[1] <= 6.0 * x.twist,
+        example: &[1e-3, 0.02, 1.5],
         variants: &[Variant { name: "", free: &[0, 1] }, Variant { name: "sharp", free: &[0, 1, 2] }],
     };
 

@@ -1,6 +1,7 @@
 //! Cubic stiffness: the spring is `K*(d + k3*d^3)`, hardening (`k3 > 0`) or softening.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -22,6 +23,7 @@ impl Force for CubicStiffness {
         textbook: false,
         odds: 1.0,
         bounds: |_, _| true,
+        example: &[20.0],
         variants: &[Variant { name: "", free: &[0] }],
     };
 

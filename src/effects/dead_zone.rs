@@ -3,7 +3,8 @@
 //! A ramp that crosses the edge within a step has a kink there. What is left of it is taken with its mean and its first
 //! moment (see [`Ramp`]), so that its momentum is exact wherever in the step the edge lies.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::input::{Ramp, TorqueHistory};
 use super::shapes::Input;
 use crate::scalar::Scalar;
@@ -52,6 +53,7 @@ impl Input for DeadZone {
         textbook: false,
         odds: 0.3,
         bounds: |p, x| p[0] <= 0.3 * x.torque,
+        example: &[5e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
 

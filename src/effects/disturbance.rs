@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -29,6 +30,7 @@ impl Force for Disturbance {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0].abs() <= x.torque && x.holds(std::f64::consts::TAU * p[1]),
+        example: &[1e-3, 7.0, 0.4],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 

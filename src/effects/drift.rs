@@ -3,7 +3,8 @@
 //! What changes at a rate at first may come to rest, as a part that warms up does: after a first-order lag of rate
 //! `fade` it has changed by `rate*s`, `s = (1 - exp(-fade*t))/fade`; `fade = 0` is the straight line `s = t`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Variant};
 use super::shapes::{Base, DryFriction, Force, Internal, Level, Moment, Reaction, Slip, mean_decay};
 use crate::scalar::Scalar;
 
@@ -37,6 +38,7 @@ impl Force for StiffnessDrift {
         textbook: false,
         odds: 0.05,
         bounds: |p, x| (p[0] * x.length).abs() <= 0.95,
+        example: &[0.3, 0.5],
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "that comes to rest", free: &[0, 1] }],
     };
 
@@ -71,6 +73,7 @@ impl DryFriction for FrictionDrift {
         textbook: false,
         odds: 0.01,
         bounds: |p, x| p[0].abs() * x.length <= x.torque,
+        example: &[4e-3, 1e-4, 0.5],
         variants: &[
             Variant { name: "dry", free: &[0] },
             Variant { name: "viscous", free: &[1] },

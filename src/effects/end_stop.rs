@@ -3,7 +3,8 @@
 //! `f = stiffness*depth*(1 + dissipation*rate)`, never pulling: the force of Hunt & Crossley, J. Applied Mechanics 42(2),
 //! 1975 (exponent 1), which starts from zero at the touch whatever the speed.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -47,6 +48,7 @@ impl Force for EndStop {
                 && touched > 0.0
                 && touched < 0.3
         },
+        example: &[0.5, 0.3, -0.2, 0.02],
         variants: &[
             Variant { name: "upper", free: &[0, 1] },
             Variant { name: "lower", free: &[0, 2] },

@@ -1,6 +1,7 @@
 //! A spring from the table to the frame: way cover, hose, gas spring. `f = stiffness*(theta2 - rest)`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -27,6 +28,7 @@ impl Force for ExternalSpring {
         textbook: false,
         odds: 0.02,
         bounds: |p, x| p[0] * x.travel() <= 4.0 * x.torque,
+        example: &[5e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
     const CARRIED: bool = true;

@@ -6,7 +6,8 @@
 //! Memory: twist `th - th3` and its rate, relative so that a turning axis loses no digits, and the acceleration `a3`.
 
 use super::extent::Extent;
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -91,6 +92,7 @@ impl Force for FlexibleMode {
         textbook: false,
         odds: 0.3,
         bounds: is_a_mode,
+        example: &[2e-6, 0.02, 1e-5],
         variants: VARIANTS,
     };
 
@@ -122,6 +124,7 @@ impl Force for MotorMode {
         textbook: false,
         odds: 0.3,
         bounds: is_a_mode,
+        example: &[5e-5, 0.2, 1e-4],
         variants: VARIANTS,
     };
 

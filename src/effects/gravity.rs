@@ -3,7 +3,8 @@
 //! A mass `m` at the distance `l` and the angle `a` of its hinge gives `m*g*l*sin(ratio*theta2 + a)`: `sine` is that of
 //! `a = 0`, hanging straight down at `theta2 = 0`, `cosine` that of a horizontal arm there.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -35,6 +36,7 @@ impl Force for Gravity {
                 && p[2] * x.travel() >= 0.2
                 && p[2] * x.travel() <= 0.75 * std::f64::consts::TAU
         },
+        example: &[2e-3, 1e-3, 1.5],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
     const CARRIED: bool = true;

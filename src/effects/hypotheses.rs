@@ -1,7 +1,8 @@
 //! Which effects may be named of an axis, which of them beside each other, and what tells them from their rivals.
 
 use super::Effect;
-use super::info::{Family, Place};
+use super::family::Family;
+use super::info::Place;
 use crate::axis::{Motion, Structure};
 
 impl Effect {
@@ -45,30 +46,6 @@ impl Effect {
         is(Family::Latch, Family::Delay)
             || is(Family::Latch, Family::ActuatorLag)
             || is(Family::DryFriction, Family::DryFriction) && a.place == b.place
-    }
-}
-
-/// What an experiment must vary to tell effects of a family from their rivals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Contrast {
-    /// How far the coupling is twisted: play, a cubic spring and a loop grow differently with it.
-    Twist,
-    /// How high the excitation reaches: lateness is a phase that grows with frequency.
-    Phase,
-    /// How the motion reverses: what acts against it changes sign there, a bias does not.
-    Reversals,
-}
-
-impl Family {
-    /// What tells it from its rivals; `None` where they scale differently with the amplitude.
-    #[must_use]
-    pub const fn contrast(self) -> Option<Contrast> {
-        match self {
-            Self::Backlash | Self::NonlinearStiffness | Self::Hysteresis => Some(Contrast::Twist),
-            Self::Delay | Self::ActuatorLag => Some(Contrast::Phase),
-            Self::DryFriction | Self::LoadTorque => Some(Contrast::Reversals),
-            _ => None,
-        }
     }
 }
 

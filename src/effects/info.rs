@@ -1,6 +1,7 @@
 //! What is known of an effect without running it.
 
 use super::extent::Extent;
+use super::family::Family;
 
 /// The place in the chain where an effect acts.
 ///
@@ -34,63 +35,6 @@ impl Place {
             Self::Coupling => "coupling",
             Self::Table => "table",
             Self::Sensor => "sensor",
-        }
-    }
-}
-
-/// Effects of one kind, whatever their place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[allow(missing_docs)]
-pub enum Family {
-    DryFriction,
-    ViscousFriction,
-    LoadTorque,
-    TorqueRipple,
-    Backlash,
-    NonlinearStiffness,
-    Hysteresis,
-    Drift,
-    FlexibleMode,
-    Disturbance,
-    EndStop,
-    Saturation,
-    ActuatorLag,
-    Delay,
-    Parameters,
-    Sensor,
-    Gravity,
-    ExternalSpring,
-    DeadZone,
-    PositionFriction,
-    Latch,
-}
-
-impl Family {
-    /// The name used in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::DryFriction => "dry_friction",
-            Self::ViscousFriction => "viscous_friction",
-            Self::LoadTorque => "load_torque",
-            Self::TorqueRipple => "torque_ripple",
-            Self::Backlash => "backlash",
-            Self::NonlinearStiffness => "nonlinear_stiffness",
-            Self::Hysteresis => "hysteresis",
-            Self::Drift => "drift",
-            Self::FlexibleMode => "flexible_mode",
-            Self::Disturbance => "disturbance",
-            Self::EndStop => "end_stop",
-            Self::Saturation => "saturation",
-            Self::ActuatorLag => "actuator_lag",
-            Self::Delay => "delay",
-            Self::Parameters => "parameters",
-            Self::Sensor => "sensor",
-            Self::Gravity => "gravity",
-            Self::ExternalSpring => "external_spring",
-            Self::DeadZone => "dead_zone",
-            Self::PositionFriction => "position_friction",
-            Self::Latch => "latch",
         }
     }
 }
@@ -235,12 +179,15 @@ pub struct EffectInfo {
     pub memory: usize,
     /// Whether a diagnosis may name it; what another verdict covers or what is read off the log's resolution is not fitted.
     pub named: bool,
-    /// Whether it belongs to the textbook's friction model, whose combinations a diagnosis always compares.
+    /// Whether it belongs to the textbook's friction model, which the regression of a rigid axis estimates and whose combinations a
+    /// diagnosis always compares.
     pub textbook: bool,
     /// How often it is the cause before any record speaks, against another effect of the list.
     pub odds: f64,
     /// Whether parameters are what physics lets the effect be on a record.
     pub bounds: fn(&[f64], &Extent<'_>) -> bool,
+    /// Its parameters at a size that shows on the paper's axis: what every effect is tested with.
+    pub example: &'static [f64],
     /// The forms a diagnosis fits, the simplest first.
     pub variants: &'static [Variant],
 }

@@ -4,7 +4,8 @@
 //! exponential), the ramp has its mean and its first moment: the velocity and the position it gives a free inertia at
 //! the end of the step are then exact, and the answer is smooth in the delay and in the time constant.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::Input;
 use crate::scalar::Scalar;
 
@@ -201,6 +202,7 @@ impl Input for TorqueGain {
         textbook: false,
         odds: 1.0,
         bounds: |_, _| true,
+        example: &[1.2],
         variants: &[Variant { name: "", free: &[0] }],
     };
     const GAIN: Option<usize> = Some(0);
@@ -246,6 +248,7 @@ impl Input for Saturation {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] >= 0.3 * x.torque && p[0] < x.torque,
+        example: &[0.02],
         variants: &[Variant { name: "", free: &[0] }],
     };
 
@@ -278,8 +281,10 @@ impl Input for Delay {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] <= 12.0 * x.dt,
+        example: &[2.3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
+    const DELAY: Option<usize> = Some(0);
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
         history.push(ramp, h.re());
@@ -327,6 +332,7 @@ impl Input for ActuatorLag {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] * x.band <= 20.0,
+        example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
 

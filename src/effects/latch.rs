@@ -5,7 +5,8 @@
 //! cannot know: the axis is then taken to coast on at its present speed, which is right to `alpha*delay^2/2`. Both act
 //! before every other effect of the encoders, which are late with them.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::sensor::{Reading, Seen};
 use super::shapes::Sensor;
 use crate::scalar::Scalar;
@@ -35,19 +36,17 @@ impl Sensor for Latch {
         textbook: false,
         odds: 0.1,
         bounds: |p, x| p[0] <= 0.0 && p[0] >= -12.0 * x.dt && p[1] * x.band <= 5.0,
+        example: &[2.3e-3, 1.5e-3],
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "filtered", free: &[1] }],
     };
     const MOTOR: bool = true;
+    const DELAY: Option<usize> = Some(0);
 
     fn transform<S: Scalar>(_p: &[S], reading: Reading<S>, _seen: &Seen<'_, S>) -> Reading<S> {
         reading
     }
 
     fn late<S: Scalar>(p: &[S]) -> S {
-        p[0]
-    }
-
-    fn reach(p: &[f64]) -> f64 {
         p[0]
     }
 

@@ -1,6 +1,7 @@
 //! A constant torque: gravity on a tilted axis, the offset of an amplifier. `f = torque`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -28,6 +29,7 @@ impl Force for LoadMotor {
         textbook: true,
         odds: 1.0,
         bounds: |_, _| true,
+        example: &[3e-3],
         variants: VARIANTS,
     };
 
@@ -57,6 +59,7 @@ impl Force for LoadTable {
         textbook: false,
         odds: 1.0,
         bounds: |_, _| true,
+        example: &[3e-3],
         variants: VARIANTS,
     };
 

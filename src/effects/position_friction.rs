@@ -2,7 +2,8 @@
 //!
 //! `f = sgn(v)*level*exp(-((theta1 - centre)/width)^2)`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{DryFriction, Level, Slip};
 use crate::scalar::Scalar;
 
@@ -35,6 +36,7 @@ impl DryFriction for PositionFriction {
                 && p[1] >= x.positions[0]
                 && p[1] <= x.positions[x.positions.len() - 1]
         },
+        example: &[6e-3, 0.2, 0.3],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 

@@ -4,7 +4,8 @@
 //! Astrom, Lischinsky, IEEE TAC 40(3), 1995, with a constant level (Dahl's curve). Over a step the bristle follows the
 //! mean velocity exactly: `z+ = s + (z - s)*exp(-|dx|/reach)` with `dx = h*(v + v+)/2`, `s = sgn(dx)`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -54,6 +55,7 @@ impl Force for PreslidingMotor {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
+        example: &[0.006, 0.012, 1e-4],
         variants: VARIANTS,
     };
 
@@ -81,6 +83,7 @@ impl Force for PreslidingTable {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
+        example: &[0.001, 0.01, 1e-5],
         variants: VARIANTS,
     };
 

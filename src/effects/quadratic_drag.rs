@@ -1,6 +1,7 @@
 //! Quadratic drag: `f = coefficient*w2*|w2|`, the churning of oil or air.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -24,6 +25,7 @@ impl Force for QuadraticDrag {
         textbook: false,
         odds: 0.3,
         bounds: |_, _| true,
+        example: &[1e-5],
         variants: &[Variant { name: "", free: &[0] }],
     };
 

@@ -2,7 +2,8 @@
 //!
 //! `f = -amplitude*sin(order*theta + phase)`: the sign makes the amplitude a torque that drives.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Length, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -43,6 +44,7 @@ impl Force for TorqueRipple {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0].abs() <= x.torque && x.turns(p[1]),
+        example: &[5e-3, 4.0, 0.3],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
     const LENGTH: Option<Length> = Some(Length::Periods(1));
@@ -75,6 +77,7 @@ impl Force for Unbalance {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0].abs() <= x.torque && x.turns(1.0),
+        example: &[1e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
     const LENGTH: Option<Length> = Some(Length::Turn);

@@ -1,6 +1,7 @@
 //! Effects on the positions' way out: what the measurement does, not the machine.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Scale, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Sensor, mean_decay};
 use crate::scalar::Scalar;
 
@@ -252,16 +253,14 @@ impl Sensor for SensorDelay {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| p[0] <= 12.0 * x.dt,
+        example: &[2.3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
+    const DELAY: Option<usize> = Some(0);
 
     fn transform<S: Scalar>(p: &[S], reading: Reading<S>, seen: &Seen<'_, S>) -> Reading<S> {
         let (theta2, omega2) = seen.table(p[0]);
         Reading { theta2, omega2, ..reading }
-    }
-
-    fn reach(p: &[f64]) -> f64 {
-        p[0]
     }
 }
 
@@ -289,6 +288,7 @@ impl Sensor for LeadError {
         textbook: false,
         odds: 1.0,
         bounds: |_, _| true,
+        example: &[0.01, 0.02, 2.0, 0.5],
         variants: &[
             Variant { name: "scale", free: &[0] },
             Variant { name: "periodic", free: &[1, 2, 3] },
@@ -322,6 +322,7 @@ impl Sensor for EncoderQuantisation {
         textbook: false,
         odds: 1.0,
         bounds: |_, _| true,
+        example: &[0.01],
         variants: &[Variant { name: "", free: &[0] }],
     };
 

@@ -227,7 +227,7 @@ pub trait Force {
 /// An angle of a force that is seen on the table as a length, by the parameter that holds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Length {
-    /// Half of a play, rad.
+    /// Half of a play, rad; the step locates its contacts in time, see [`Moment::contact`].
     HalfPlay(usize),
     /// Periods per radian of a force that repeats with the angle.
     Periods(usize),
@@ -241,6 +241,8 @@ pub trait Input {
     const INFO: EffectInfo;
     /// The parameter that is a factor of the torque, if it is nothing but that: every parameter of the axis seems off by it.
     const GAIN: Option<usize> = None;
+    /// The parameter that is how long ago it looks, s, which the history of torques must cover.
+    const DELAY: Option<usize> = None;
 
     /// The torque over a step of length `h`, from the torque commanded over it.
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S>;
@@ -258,6 +260,8 @@ pub trait Sensor {
     const MOTOR: bool = false;
     /// The parameter that is the step to which it rounds the readings, if it does: no derivative, but a lattice in the log.
     const STEP: Option<usize> = None;
+    /// The parameter that is how long ago it looks, s, which the history of readings must cover.
+    const DELAY: Option<usize> = None;
 
     /// What is read at an instant: `reading` as changed by the effects before, `seen` the motion up to then.
     fn transform<S: Scalar>(p: &[S], reading: Reading<S>, seen: &Seen<'_, S>) -> Reading<S>;
@@ -265,11 +269,6 @@ pub trait Sensor {
     /// How long before the log's stamp both encoders are read, s; negative after it.
     fn late<S: Scalar>(_p: &[S]) -> S {
         S::default()
-    }
-
-    /// How far back it reads, s.
-    fn reach(_p: &[f64]) -> f64 {
-        0.0
     }
 
     /// Time constant of a first-order filter before both encoders are read, s.

@@ -1,6 +1,7 @@
 //! Viscous friction to ground: `f = coefficient*(1 + asymmetry*sgn(v))*v`.
 
-use super::info::{EffectInfo, Family, ParameterInfo, Place, Start, Variant};
+use super::family::Family;
+use super::info::{EffectInfo, ParameterInfo, Place, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -39,6 +40,7 @@ impl Force for ViscousMotor {
         textbook: true,
         odds: 1.0,
         bounds: |p, _| p[1].abs() <= 0.95,
+        example: &[1e-3, 0.2],
         variants: VARIANTS,
     };
 
@@ -66,6 +68,7 @@ impl Force for ViscousTable {
         textbook: false,
         odds: 1.0,
         bounds: |p, _| p[1].abs() <= 0.95,
+        example: &[1e-4, 0.2],
         variants: VARIANTS,
     };
 

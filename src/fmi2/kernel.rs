@@ -33,8 +33,8 @@ pub enum StepError {
     },
     /// A delay longer than what is remembered.
     Delay {
-        /// Name of the parameter.
-        name: &'static str,
+        /// What is delayed.
+        effect: Effect,
         /// The delay, s.
         delay: f64,
         /// The internal step, s.
@@ -57,11 +57,16 @@ impl fmt::Display for StepError {
                     "a step of {step} s holds more than {MOST_STEPS:e} internal steps of {internal} s: raise dt_internal"
                 )
             }
-            Self::Delay { name, delay, internal } => write!(
-                f,
-                "{name} = {delay} s reaches back further than the history of past steps at an internal step of {internal} \
-                 s: use longer steps or a shorter delay"
-            ),
+            Self::Delay { effect, delay, internal } => {
+                let info = effect.info();
+                let name = effect.delay_parameter().map_or("", |i| info.parameters[i].name);
+                write!(
+                    f,
+                    "{}.{name} = {delay} s reaches back further than the history of past steps at an internal step of \
+                     {internal} s: use longer steps or a shorter delay",
+                    info.id
+                )
+            }
             Self::NotFinite { time } => {
                 write!(
                     f,
@@ -256,19 +261,19 @@ impl Kernel {
     /// The same with effects on the torque's way in or on the positions' way out.
     fn run_with_histories(&mut self, from: f64, torque: f64, count: u32, h: f64) -> Result<(), StepError> {
         let (axis, effects) = (&self.axis, self.axis.effects());
-        let too_long = |name, delay| StepError::Delay { name, delay, internal: h };
-        for &effect in axis.on().inputs() {
-            let delay = effects.of(effect)[0];
-            if effect == Effect::Delay && !self.torques.covers(delay, h) {
-                return Err(too_long("delay.time", delay));
+        let delay = |effect: Effect| effect.delay_parameter().map_or(0.0, |i| effects.of(effect)[i]);
+        let too_long = |effect, delay| StepError::Delay { effect, delay, internal: h };
+        for &effect in axis.on().inputs().iter().filter(|e| e.delay_parameter().is_some()) {
+            if !self.torques.covers(delay(effect), h) {
+                return Err(too_long(effect, delay(effect)));
             }
         }
-        let reach = |effect: Effect| effect.reach(effects.of(effect));
-        let all: f64 = axis.on().sensors().iter().map(|&e| reach(e)).sum();
-        if all > 0.0 && !self.readings.covers(all) {
-            let of_table =
-                axis.on().sensors().contains(&Effect::SensorDelay) && reach(Effect::SensorDelay) >= 0.5 * all;
-            return Err(too_long(if of_table { "sensor_delay.time" } else { "latch.delay" }, all));
+        // What two delays of the readings need together is told of the longer one.
+        let sensors = axis.on().sensors();
+        let all: f64 = sensors.iter().map(|&e| delay(e)).sum();
+        let longest = sensors.iter().copied().reduce(|a, b| if delay(b) > delay(a) { b } else { a });
+        if let Some(longest) = longest.filter(|_| all > 0.0 && !self.readings.covers(all)) {
+            return Err(too_long(longest, all));
         }
         for j in 0..count {
             let at = f64::from(j) * h;

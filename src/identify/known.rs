@@ -17,9 +17,6 @@ use crate::trace::{Machine, Signal, TraceError};
 /// Samples to either side over which a speed that is not measured is read off the angle.
 const REACH: usize = 4;
 
-/// What a rigid axis' regression estimates itself.
-const ESTIMATED: [&str; 3] = ["viscous_motor", "coulomb_motor", "load_motor"];
-
 /// What becomes of the known effects of a machine.
 pub(super) struct Known {
     /// Taken off the torque.
@@ -36,7 +33,8 @@ impl Known {
     pub fn of(machine: &Machine) -> Self {
         let rigid = machine.structure == Structure::Rigid;
         let on = EFFECTS.iter().copied().filter(|e| machine.effects.is_on(*e));
-        let on = on.filter(|e| !(rigid && ESTIMATED.contains(&e.info().id)));
+        // The textbook's friction is what a rigid axis' regression estimates itself.
+        let on = on.filter(|e| !(rigid && e.info().textbook));
         let (taken, left) = on.partition(|e| {
             let info = e.info();
             let place = info.place == Place::Motor || (rigid && info.place == Place::Table);

@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::units;
 use crate::axis::Motion;
-use crate::effects::{EFFECTS, Place};
+use crate::effects::{EFFECTS, Effect, Place};
 use crate::fmu::description::Fmi;
 use crate::variables::{Causality, FIXED, Model, Starts, Type, Variable, at, first_of};
 
@@ -145,12 +145,18 @@ fn stepping() -> Markup {
              contacts of backlash are located in time. The torque T is held over the communication step, or runs linearly \
              where its first derivative is set (fmi2SetRealInputDerivatives), for that step. When T jumps, the accelerations \
              are evaluated anew before the step. Delays remember the last 255 internal steps ("
-            code { "sensor_delay" }
-            " and "
-            code { "latch" }
+            @for (k, effect) in late_readings().enumerate() {
+                @if k > 0 { " and " }
+                code { (effect.info().id) }
+            }
             ": 127); a step that would need more is refused."
         }
     }
+}
+
+/// The effects that look back into past readings.
+fn late_readings() -> impl Iterator<Item = Effect> {
+    EFFECTS.iter().copied().filter(|e| e.info().place == Place::Sensor && e.delay_parameter().is_some())
 }
 
 fn table(rows: impl Iterator<Item = (Variable, f64)>, motion: Motion) -> Markup {

@@ -18,7 +18,7 @@ use crate::diagnose::{Diagnosis, Overlay, Site};
 use crate::effects::Place;
 use crate::trace::Motion;
 pub use controlled::errors as errors_in_the_loop;
-use naming::{improved, meaning};
+use naming::improved;
 use verdict::verdict;
 pub use words::warnings;
 
@@ -117,7 +117,7 @@ fn what(d: &Diagnosis) -> Vec<Block> {
         d.causes
             .iter()
             .map(|c| c.effect.info())
-            .map(|i| Block::Paragraph(format!("{}. In the model: {}. {}", i.title, i.equation, meaning(i.family)))),
+            .map(|i| Block::Paragraph(format!("{}. In the model: {}. {}", i.title, i.equation, i.family.meaning()))),
     );
     blocks.extend(d.confusable.iter().map(|c| Block::Warning(words::not_told(c))));
     blocks

@@ -2,7 +2,7 @@
 
 use crate::diagnose::location::{Side, StateVariable};
 use crate::diagnose::{Diagnosis, HeldOut, Hypothesis, Verdict};
-use crate::effects::{EffectInfo, Family};
+use crate::effects::EffectInfo;
 
 /// A hypothesis in words.
 pub fn title(hypothesis: &Hypothesis) -> String {
@@ -70,50 +70,5 @@ pub const fn residual(side: Side) -> &'static str {
     match side {
         Side::Motor => "residual torque on the motor",
         Side::Table => "residual torque on the table",
-    }
-}
-
-/// What a cause usually means on a machine.
-pub const fn meaning(family: Family) -> &'static str {
-    match family {
-        Family::DryFriction => {
-            "On a machine: bearings, seals, guideway pads and their preload; it makes the quadrant glitches of a circle, and friction compensation in the drive removes them."
-        }
-        Family::ViscousFriction => {
-            "On a machine: grease, oil and speed; it changes with temperature, so identify it warm."
-        }
-        Family::LoadTorque => {
-            "On a machine: weight on a tilted axis, an unbalanced load, or an offset of the amplifier."
-        }
-        Family::TorqueRipple => {
-            "On a machine: cogging or commutation of the motor (its order is a multiple of the pole pairs) or an eccentric screw (order one)."
-        }
-        Family::Backlash => {
-            "On a machine: lost preload of the nut, a worn coupling or key; it shows as a step at each reversal."
-        }
-        Family::NonlinearStiffness => {
-            "On a machine: contact stiffness of nut and bearings, or a coupling with an elastomer."
-        }
-        Family::Hysteresis => "On a machine: micro-slip in a clamped joint, an elastomer coupling, or a belt.",
-        Family::Drift => "On a machine: warming up, or wear; repeat the measurement warm, and trend it.",
-        Family::FlexibleMode => "On a machine: the workpiece, a spindle head or the frame swinging behind the table.",
-        Family::Disturbance => {
-            "On a machine: chatter, a pump, a neighbouring machine; look for what turns at this frequency."
-        }
-        Family::Gravity => "On a machine: a weight on a hinge, an arm, or a counterweight that is not in balance.",
-        Family::ExternalSpring => "On a machine: a way cover, hoses or cables, a gas spring.",
-        Family::DeadZone => "On a machine: an amplifier or a valve that does not answer to small commands.",
-        Family::PositionFriction => "On a machine: a tight spot of the screw, a damaged rail, a bent shaft.",
-        Family::Latch => {
-            "On a machine: torque and encoders logged at different instants of the cycle, or behind different filters."
-        }
-        Family::EndStop => "On a machine: the travel limit or a bellows that touches; move the test away from it.",
-        Family::Saturation => "On a machine: the torque limit of the drive; drive less, or raise the limit.",
-        Family::ActuatorLag => "On a machine: the bandwidth of the current loop.",
-        Family::Delay => "On a machine: cycles of the bus and the controller between command and torque.",
-        Family::Parameters => "On a machine: a torque constant from the data sheet that the motor does not have.",
-        Family::Sensor => {
-            "On a machine: the measurement, not the motion: encoder interpolation, pitch error, or when the value is read."
-        }
     }
 }
