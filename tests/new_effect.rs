@@ -40,7 +40,7 @@ impl Force for CubicDrag {
         let v = m.end.v;
         let torque = p[0] * v * v * v;
         let damping = 3.0 * p[0].re() * v.re() * v.re();
-        Reaction { torque, stiffness: 0.0, damping, bend: f64::INFINITY }
+        Reaction { torque, stiffness: 0.0, damping, curvature: f64::INFINITY }
     }
 }
 "#;

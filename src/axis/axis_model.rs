@@ -71,7 +71,7 @@ impl<S: Scalar> Axis<S> {
             modes: Modes::default(),
         };
         state.modes.dry = [mode(state.omega1()), mode(state.omega2())];
-        self.full.settle_contact(&mut state);
+        self.full.set_contact(&mut state);
         self.full.refresh_force(&mut state, time);
         state
     }

@@ -1,11 +1,11 @@
 //! Effects on both inertias, and dry friction that holds beside them: two equations of two unknowns.
 
 use super::axis_model::State;
-use super::balance::{Leg, before};
 use super::hold::Hold;
 use super::mechanics::{Mechanics, Motions, motions};
-use super::newton::{Balance, Pass, derive, newton};
+use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::{Linear, Propagator};
+use super::segment::{Segment, before};
 use crate::effects::{Forces, Internal, Internals, Memory, Motion, StepMotion, memory_of};
 use crate::scalar::Scalar;
 
@@ -26,12 +26,12 @@ pub(super) struct Coupled<'a, S> {
 }
 
 impl<'a, S: Scalar> Coupled<'a, S> {
-    pub fn new(mechanics: &'a Mechanics<S>, from: &'a State<S>, leg: &'a Leg<'a, S>) -> Self {
+    pub fn new(mechanics: &'a Mechanics<S>, from: &'a State<S>, segment: &'a Segment<'a, S>) -> Self {
         let sticks = mechanics.sticks(from);
         let held = sticks.iter().filter(|s| **s).count();
-        let step = &leg.length.step;
-        let [tau0, tau1] = before(from, &leg.ramp);
-        let compliance = leg.length.compliance.unwrap_or_else(|| step.compliance());
+        let step = &segment.length.step;
+        let [tau0, tau1] = before(from, &segment.ramp);
+        let compliance = segment.length.compliance.unwrap_or_else(|| step.compliance());
         Self {
             mechanics,
             hold: Hold::new(sticks, step, compliance, mechanics.structure),
@@ -41,13 +41,13 @@ impl<'a, S: Scalar> Coupled<'a, S> {
             tau0,
             tau1,
             free: step.apply(&from.linear, tau0, tau1),
-            time: leg.end,
+            time: segment.end,
             known: mechanics.on.forces().is_empty() && mechanics.on.dry().len() <= held,
         }
     }
 
     /// The state at the end, with derivatives, from what was solved without.
-    pub fn carry(&self, solved: &State<f64>) -> State<S> {
+    pub fn differentiate(&self, solved: &State<f64>) -> State<S> {
         let mut memory = self.from.memory;
         let force = if self.known { self.from.force } else { derive(self, solved.force.map(S::from), &mut memory) };
         self.state(force, force, memory)
@@ -83,7 +83,7 @@ impl Coupled<'_, f64> {
     }
 }
 
-impl<S: Scalar> Balance<S, 2> for Coupled<'_, S> {
+impl<S: Scalar> TorqueEquations<S, 2> for Coupled<'_, S> {
     type Internals = Internals<S>;
 
     fn internals(&self) -> Internals<S> {
@@ -91,10 +91,10 @@ impl<S: Scalar> Balance<S, 2> for Coupled<'_, S> {
     }
 
     fn pass(&self, torque: [S; 2], internals: &mut Internals<S>) -> Pass<S, 2> {
-        let Forces { torque: found, stiffness, damping, bend } = self.laws(&self.end(torque).0, internals);
+        let Forces { torque: found, stiffness, damping, curvature } = self.laws(&self.end(torque).0, internals);
         let off = [torque[0] - found[0], torque[1] - found[1]];
         let correction = solve2(&self.hold.jacobian(&[stiffness, damping]), off);
-        Pass { found, correction, left: if bend == 0.0 { 0.0 } else { f64::INFINITY } }
+        Pass { found, correction, left: if curvature == 0.0 { 0.0 } else { f64::INFINITY } }
     }
 
     fn remember(&self, internals: &Internals<S>, torque: [S; 2], less: [S; 2], memory: &mut Memory<S>) {

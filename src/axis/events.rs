@@ -3,9 +3,9 @@
 //! They are found and located in time on plain numbers.
 
 use super::axis_model::State;
-use super::balance::Leg;
 use super::mechanics::Mechanics;
 use super::parameters::Structure;
+use super::segment::Segment;
 use crate::effects::Ramp;
 use crate::scalar::Scalar;
 
@@ -14,7 +14,7 @@ const LOCATE: usize = 60;
 /// An event is located to this share of the step.
 pub(super) const LOCATE_TOLERANCE: f64 = 1e-12;
 
-/// What ends a leg of the step early.
+/// What ends a segment of the step early.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Event {
     /// The velocity of inertia 0 or 1 reached zero.
@@ -46,7 +46,7 @@ impl<S: Scalar> Stretch<S> {
 }
 
 impl<S: Scalar> Mechanics<S> {
-    /// The quantity whose zero is the event; it falls along the leg.
+    /// The quantity whose zero is the event; it falls along the segment.
     pub fn indicator(&self, event: Event, from: &State<S>, s: &State<S>) -> S {
         match event {
             Event::Rest(i) => velocity(s, i) * f64::from(from.modes.dry[i]),
@@ -108,7 +108,7 @@ impl Mechanics<f64> {
 
     /// The state `t` seconds into a stretch.
     fn at(&self, t: f64, from: &State<f64>, stretch: &Stretch<f64>) -> State<f64> {
-        self.solve(from, &Leg { ramp: stretch.until(t), length: &self.length(t), end: stretch.begin + t })
+        self.solve(from, &Segment { ramp: stretch.until(t), length: &self.length(t), end: stretch.begin + t })
     }
 
     /// Time into a stretch, and the state, at which the event's indicator is zero; `to` is the end beyond it. `None` if it

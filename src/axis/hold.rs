@@ -1,4 +1,4 @@
-//! Dry friction at rest: torques over a leg of a step that keep what they hold from moving.
+//! Dry friction at rest: torques over a segment of a step that keep what they hold from moving.
 
 use super::parameters::Structure;
 use super::propagator::{Compliance, Propagator};

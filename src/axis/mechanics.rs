@@ -21,8 +21,8 @@ pub(super) struct Mechanics<S> {
     pub effects: Settings<S>,
     pub on: ActiveEffects,
     pub base: Base<S>,
-    /// The effect on the motion, if it is one alone.
-    pub lone: Option<Effect>,
+    /// The only effect on the motion, where there is no other and it does not grow with the torque transmitted.
+    pub single_law: Option<Effect>,
     /// Whether dry friction acts on motor and table.
     pub dry: [bool; 2],
     /// Half of the coupling's play, rad; zero without one.
@@ -39,8 +39,8 @@ pub(super) struct Length<S> {
     pub step: Propagator<S>,
     /// Prepared for the step that nothing ends early.
     pub compliance: Option<Compliance>,
-    /// What the end of the step loses to one unit of the lone effect's torque there.
-    pub answer: Linear<S>,
+    /// Response of the end of the step to a unit of the single law's torque there, against it.
+    pub response: Linear<S>,
 }
 
 impl<S: Scalar> Mechanics<S> {
@@ -60,20 +60,20 @@ impl<S: Scalar> Mechanics<S> {
         let dry = PLACES.map(|place| on.dry().iter().any(|e| e.info().place == place));
         let half_play = on.forces().iter().find_map(|e| Some(effects.of(*e)[e.play_parameter()?])).unwrap_or_default();
         let backlash = half_play.re() > 0.0;
-        let lone = match (on.forces(), on.dry()) {
+        let single_law = match (on.forces(), on.dry()) {
             (&[one], []) | ([], &[one]) => Some(one),
             _ => None,
         };
         // A friction that grows with the torque transmitted hangs on the motion of both inertias.
-        let lone = lone.filter(|&one| base.rigid || !effects.is_loaded(one));
+        let single_law = single_law.filter(|&one| base.rigid || !effects.is_loaded(one));
         let step = Propagator::new(&parameters, structure, scheme, h.into());
-        let whole = Length { compliance: Some(step.compliance()), ..Length::new(step, lone) };
-        Self { parameters, structure, scheme, effects, on, base, lone, dry, half_play, backlash, whole }
+        let whole = Length { compliance: Some(step.compliance()), ..Length::new(step, single_law) };
+        Self { parameters, structure, scheme, effects, on, base, single_law, dry, half_play, backlash, whole }
     }
 
     /// A step of that length.
     pub fn length(&self, h: S) -> Length<S> {
-        Length::new(self.whole.step.of_length(h), self.lone)
+        Length::new(self.whole.step.of_length(h), self.single_law)
     }
 
     /// The same without derivatives.
@@ -129,7 +129,7 @@ impl<S: Scalar> Mechanics<S> {
     }
 
     /// The side of contact that belongs to the twist: the one beyond whose end it is, if that side pushes.
-    pub fn settle_contact(&self, s: &mut State<S>) {
+    pub fn set_contact(&self, s: &mut State<S>) {
         if self.backlash {
             let side = s.linear[2].re().signum() as i8;
             s.modes.contact = if self.clearance(side, s).re() < 0.0 { side } else { 0 };
@@ -147,11 +147,11 @@ impl<S: Scalar> Mechanics<S> {
 }
 
 impl<S: Scalar> Length<S> {
-    fn new(step: Propagator<S>, lone: Option<Effect>) -> Self {
+    fn new(step: Propagator<S>, single_law: Option<Effect>) -> Self {
         let still = [S::default(); 4];
-        let push = lone.map_or([0.0; 2], |effect| effect.info().place.coordinate().push());
-        let answer = step.less(&still, push.map(S::from)).map(|x| -x);
-        Self { step, compliance: None, answer }
+        let push = single_law.map_or([0.0; 2], |effect| effect.info().place.coordinate().push());
+        let response = step.less(&still, push.map(S::from)).map(|x| -x);
+        Self { step, compliance: None, response }
     }
 }
 

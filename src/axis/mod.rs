@@ -10,19 +10,19 @@
 //! their way out. The linear analogue (kg, N, m) is the same model in other units.
 
 mod axis_model;
-mod balance;
 mod continuation;
 mod coupled;
 mod criterion;
 mod events;
 mod hold;
-mod lone;
 mod mechanics;
 mod newton;
 mod oscillator;
 mod parameters;
 mod propagator;
+mod segment;
 mod simulate;
+mod single_law;
 mod step;
 
 pub use axis_model::{Axis, State};

@@ -1,5 +1,5 @@
-//! Torques that balance: Newton's method finds them on plain numbers, and one pass over numbers with derivatives gives these
-//! what is theirs (implicit function theorem).
+//! Newton's method for the effects' torques at the end of a segment, `tau = law(motion(tau))`. It iterates on plain numbers; the
+//! derivatives then follow from one more evaluation at the solution (implicit function theorem).
 
 use crate::effects::Memory;
 use crate::scalar::Scalar;
@@ -13,20 +13,20 @@ const NEWTON_TOLERANCE: f64 = 1e-13;
 /// the laws give there; `memory` goes along.
 #[inline]
 pub(super) fn newton<const N: usize>(
-    balance: &impl Balance<f64, N>,
+    equations: &impl TorqueEquations<f64, N>,
     mut torque: [f64; N],
     input: f64,
     memory: &mut Memory<f64>,
 ) -> [[f64; N]; 2] {
     let largest = |a: &[f64; N]| a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let mut internals = balance.internals();
+    let mut internals = equations.internals();
     let mut previous = f64::INFINITY;
     for iteration in 1.. {
-        let pass = balance.pass(torque, &mut internals);
+        let pass = equations.pass(torque, &mut internals);
         let size = largest(&std::array::from_fn(|i| torque[i] - pass.found[i]));
         let scale = largest(&pass.found) + input.abs();
         if size <= NEWTON_TOLERANCE * scale || iteration == NEWTON {
-            balance.remember(&internals, torque, [0.0; N], memory);
+            equations.remember(&internals, torque, [0.0; N], memory);
             return [torque, pass.found];
         }
         // A residual that grows means a kink was crossed: half the step.
@@ -35,7 +35,7 @@ pub(super) fn newton<const N: usize>(
         let less = if kink { pass.correction.map(|c| c * 0.5) } else { pass.correction };
         // Newton squares the share that is missing.
         if size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && !kink) {
-            balance.remember(&internals, torque, less, memory);
+            equations.remember(&internals, torque, less, memory);
             torque = std::array::from_fn(|i| torque[i] - less[i]);
             break;
         }
@@ -44,21 +44,21 @@ pub(super) fn newton<const N: usize>(
     [torque, torque]
 }
 
-/// The derivatives of torques whose values balance; `memory` goes along.
+/// The derivatives of torques whose values are a solution already; `memory` becomes that of the end.
 pub(super) fn derive<S: Scalar, const N: usize>(
-    balance: &impl Balance<S, N>,
+    equations: &impl TorqueEquations<S, N>,
     torque: [S; N],
     memory: &mut Memory<S>,
 ) -> [S; N] {
-    let mut internals = balance.internals();
-    let pass = balance.pass(torque, &mut internals);
-    balance.remember(&internals, torque, pass.correction, memory);
+    let mut internals = equations.internals();
+    let pass = equations.pass(torque, &mut internals);
+    equations.remember(&internals, torque, pass.correction, memory);
     std::array::from_fn(|i| torque[i] - pass.correction[i])
 }
 
-/// An equation of `N` torques at the end of a leg.
-pub(super) trait Balance<S, const N: usize> {
-    /// Internal states of its laws over the leg.
+/// An equation of `N` torques at the end of a segment.
+pub(super) trait TorqueEquations<S, const N: usize> {
+    /// Internal states of its laws over the segment.
     type Internals;
 
     /// They as they are committed.

@@ -13,8 +13,8 @@
 //! derivatives through, jumps at events included.
 
 use super::axis_model::{Axis, State};
-use super::balance::Leg;
 use super::events::{Event, LOCATE_TOLERANCE, Stretch};
+use super::segment::Segment;
 use crate::effects::Ramp;
 use crate::scalar::Scalar;
 
@@ -38,8 +38,8 @@ impl<S: Scalar> Axis<S> {
         let h = self.full.whole.step.h();
         if !self.full.has_events() {
             let end = time + h.re();
-            let solved = self.plain.solve(&s.plain(), &Leg { ramp: ramp.plain(), length: &self.plain.whole, end });
-            return self.carry(s, ramp, None, end, &solved);
+            let solved = self.plain.solve(&s.plain(), &Segment { ramp: ramp.plain(), length: &self.plain.whole, end });
+            return self.differentiate(s, ramp, None, end, &solved);
         }
         let mut now = *s;
         let mut done = S::default();
@@ -53,15 +53,15 @@ impl<S: Scalar> Axis<S> {
                 (Ramp { start: ramp.at(done / h), end: ramp.end }, &length, Some(left))
             };
             let begin = time + done.re();
-            let leg = Leg { ramp: ramp.plain(), length, end: time + h.re() };
+            let segment = Segment { ramp: ramp.plain(), length, end: time + h.re() };
             let mut from = now.plain();
-            let mut solved = self.plain.solve(&from, &leg);
+            let mut solved = self.plain.solve(&from, &segment);
             if self.plain.sticks(&from) != [false, false] {
-                self.leave_rest(&mut now, &mut from, &mut solved, &leg, begin);
+                self.leave_rest(&mut now, &mut from, &mut solved, &segment, begin);
             }
             let reached = self.plain.first_event(&from, &solved).filter(|_| event < EVENTS);
             let Some(reached) = reached else {
-                return self.carry(&now, ramp, left, leg.end, &solved);
+                return self.differentiate(&now, ramp, left, segment.end, &solved);
             };
             let at;
             (at, now) = self.locate(reached, &now, &from, &solved, &Stretch { ramp, begin, h: left.unwrap_or(h) });
@@ -74,9 +74,9 @@ impl<S: Scalar> Axis<S> {
         now
     }
 
-    /// What was solved on plain numbers, with derivatives if there are any; `h` is the length of a leg that is not whole.
+    /// What was solved on plain numbers, with derivatives if there are any; `h` is the length of a segment that is not whole.
     #[inline]
-    fn carry(&self, s: &State<S>, ramp: Ramp<S>, h: Option<S>, end: f64, solved: &State<f64>) -> State<S> {
+    fn differentiate(&self, s: &State<S>, ramp: Ramp<S>, h: Option<S>, end: f64, solved: &State<f64>) -> State<S> {
         if !S::HAS_DERIVATIVES {
             return State::lift(solved);
         }
@@ -88,7 +88,7 @@ impl<S: Scalar> Axis<S> {
                 &length
             }
         };
-        self.full.carry(s, &Leg { ramp, length, end }, solved)
+        self.full.differentiate(s, &Segment { ramp, length, end }, solved)
     }
 
     /// Where dry friction sticks and cannot hold, lets it slip in the direction of the excess: `now`, which is `from` with
@@ -98,15 +98,15 @@ impl<S: Scalar> Axis<S> {
         now: &mut State<S>,
         from: &mut State<f64>,
         solved: &mut State<f64>,
-        leg: &Leg<f64>,
+        segment: &Segment<f64>,
         time: f64,
     ) {
         let plain = &self.plain;
         for _ in 0..3 {
             let sticks = plain.sticks(from);
             let mut worst = (0.0, 0, 0);
-            // The friction that holds is one over the leg, so its level is that of the mean load.
-            let load = 0.5 * (plain.load(from, time) + plain.load(solved, leg.end));
+            // The friction that holds is one over the segment, so its level is that of the mean load.
+            let load = 0.5 * (plain.load(from, time) + plain.load(solved, segment.end));
             for i in (0..2).filter(|i| sticks[*i]) {
                 let hold = solved.friction[i];
                 let level = plain.rest_level(i, hold.signum(), from, load, time);
@@ -120,7 +120,7 @@ impl<S: Scalar> Axis<S> {
             }
             from.modes.dry[worst.1] = worst.2;
             plain.refresh_force(from, time);
-            *solved = plain.solve(from, leg);
+            *solved = plain.solve(from, segment);
         }
         if from.modes.dry != now.modes.dry {
             now.modes.dry = from.modes.dry;
@@ -141,7 +141,7 @@ impl<S: Scalar> Axis<S> {
         let Some((found, solved)) = self.plain.locate(event, from, to, &plain) else {
             return (S::default(), *now);
         };
-        let at = |t: S| self.carry(now, left.until(t), Some(t), left.begin + t.re(), &solved);
+        let at = |t: S| self.differentiate(now, left.until(t), Some(t), left.begin + t.re(), &solved);
         let t = S::from(found);
         let state = at(t);
         if !S::HAS_DERIVATIVES {

@@ -44,7 +44,7 @@ impl Force for Backlash {
         }
         if m.contact == 0 {
             let torque = -(base.k * m.end.x + base.b * m.end.v);
-            Reaction { torque, stiffness: -base.k.re(), damping: -base.b.re(), bend: 0.0 }
+            Reaction { torque, stiffness: -base.k.re(), damping: -base.b.re(), curvature: 0.0 }
         } else {
             Reaction::given(-(base.k * p[0] * f64::from(m.contact)))
         }

@@ -71,6 +71,6 @@ impl Force for CouplingHysteresis {
         let after = advance(z[0].start, dx, p[2]);
         let tangent = slope(after, if dx.re() < 0.0 { -1.0 } else { 1.0 }, p[2]).re() * per_reach.re();
         z[0].reach(after, tangent, 0.0);
-        Reaction { torque: p[0] * after, stiffness: p[0].re() * tangent, damping: 0.0, bend: f64::INFINITY }
+        Reaction { torque: p[0] * after, stiffness: p[0].re() * tangent, damping: 0.0, curvature: f64::INFINITY }
     }
 }

@@ -32,6 +32,6 @@ impl Force for CubicStiffness {
         let k3 = base.k * p[0];
         let square = m.end.x.squared();
         let stiffness = 3.0 * k3.re() * square.re();
-        Reaction { torque: k3 * square * m.end.x, stiffness, damping: 0.0, bend: f64::INFINITY }
+        Reaction { torque: k3 * square * m.end.x, stiffness, damping: 0.0, curvature: f64::INFINITY }
     }
 }

@@ -45,7 +45,7 @@ impl Force for StiffnessDrift {
     #[inline]
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let k = base.k * p[0] * drifted(p[1], m.time);
-        Reaction { torque: k * m.end.x, stiffness: k.re(), damping: 0.0, bend: 0.0 }
+        Reaction { torque: k * m.end.x, stiffness: k.re(), damping: 0.0, curvature: 0.0 }
     }
 }
 

@@ -65,7 +65,7 @@ impl Force for EndStop {
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
-        let free = Reaction { bend: f64::INFINITY, ..Reaction::given(S::default()) };
+        let free = Reaction { curvature: f64::INFINITY, ..Reaction::given(S::default()) };
         let x = m.end.x;
         let (depth, inward) = if x.re() > p[1].re() {
             (x - p[1], 1.0)
@@ -82,7 +82,7 @@ impl Force for EndStop {
             torque: p[0] * depth * push,
             stiffness: p[0].re() * push.re(),
             damping: p[0].re() * depth.re() * p[3].re() * inward,
-            bend: f64::INFINITY,
+            curvature: f64::INFINITY,
         }
     }
 }

@@ -39,6 +39,6 @@ impl Force for ExternalSpring {
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
-        Reaction { torque: p[0] * (m.end.x - p[1]), stiffness: p[0].re(), damping: 0.0, bend: 0.0 }
+        Reaction { torque: p[0] * (m.end.x - p[1]), stiffness: p[0].re(), damping: 0.0, curvature: 0.0 }
     }
 }

@@ -51,7 +51,7 @@ fn torque<S: Scalar>(p: &[S], m: &Moment<S>, memory: &mut [Internal<S>]) -> Reac
     // Absolute motion of the third inertia, from the relative memory.
     let (e, rate) = (memory[0].start, memory[1].start);
     if m.h.re() == 0.0 {
-        return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re(), bend: 0.0 };
+        return Reaction { torque: k * e + b * rate, stiffness: k.re(), damping: b.re(), curvature: 0.0 };
     }
     let half = m.h * 0.5;
     let w3 = m.start.v - rate;
@@ -71,7 +71,7 @@ fn torque<S: Scalar>(p: &[S], m: &Moment<S>, memory: &mut [Internal<S>]) -> Reac
     memory[1].reach(m.end.v - w, -h2 * per_x, 1.0 - h2 * per_v);
     memory[2].reach(a, per_x, per_v);
     let inertia = inertia.re();
-    Reaction { torque, stiffness: inertia * per_x, damping: inertia * per_v, bend: 0.0 }
+    Reaction { torque, stiffness: inertia * per_x, damping: inertia * per_v, curvature: 0.0 }
 }
 
 /// A flexible mode behind the table.

@@ -54,7 +54,7 @@ impl Force for Gravity {
             torque: p[0] * sine + p[1] * angle.cos(),
             stiffness: ratio * (a * cosine - b * sine.re()),
             damping: 0.0,
-            bend: ratio * ratio * a.hypot(b),
+            curvature: ratio * ratio * a.hypot(b),
         }
     }
 }

@@ -20,7 +20,7 @@ impl Effect {
         match info.place {
             Place::Coupling => false,
             Place::Sensor => info.family == Family::Latch,
-            Place::Table => !super::EFFECTS.iter().any(|o| o.info().place == Place::Motor && o.is_kin_of(self)),
+            Place::Table => !super::EFFECTS.iter().any(|o| o.info().place == Place::Motor && o.is_alternative_to(self)),
             Place::Input | Place::Motor => true,
         }
     }

@@ -66,12 +66,12 @@ impl<D: DryFriction> Law for Sliding<D> {
         let slides = moment.slides;
         let found = D::level(p, &slip(moment));
         // A level that hangs on the slip may do so in any way.
-        let bend = if found.constant { 0.0 } else { f64::INFINITY };
+        let curvature = if found.constant { 0.0 } else { f64::INFINITY };
         Reaction {
             torque: found.level * slides,
             stiffness: found.per_position * slides,
             damping: found.per_speed,
-            bend,
+            curvature,
         }
     }
 }

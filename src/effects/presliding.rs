@@ -34,7 +34,7 @@ fn torque<S: Scalar>(p: &[S], m: &Moment<S>, z: &mut Internal<S>) -> Reaction<S>
     let torque = level - level * lack + bristle * rate;
     let per_lack = (p[0].re() - p[2].re() * v.re().abs()) * per_speed.re();
     let damping = per_lack * lack.re() + p[2].re() * rate.re();
-    Reaction { torque, stiffness: 0.0, damping, bend: f64::INFINITY }
+    Reaction { torque, stiffness: 0.0, damping, curvature: f64::INFINITY }
 }
 
 /// Presliding friction on the motor side.

@@ -33,6 +33,6 @@ impl Force for QuadraticDrag {
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let speed = m.end.v.abs();
         let damping = 2.0 * p[0].re() * speed.re();
-        Reaction { torque: p[0] * m.end.v * speed, stiffness: 0.0, damping, bend: f64::INFINITY }
+        Reaction { torque: p[0] * m.end.v * speed, stiffness: 0.0, damping, curvature: f64::INFINITY }
     }
 }

@@ -10,8 +10,8 @@ use crate::scalar::Scalar;
 fn torque<S: Scalar>(amplitude: S, order: S, phase: S, x: S) -> Reaction<S> {
     let (sine, cosine) = (order * x + phase).sin_cos();
     let steepest = amplitude.re() * order.re();
-    let bend = (steepest * order.re()).abs();
-    Reaction { torque: -(amplitude * sine), stiffness: -(steepest * cosine), damping: 0.0, bend }
+    let curvature = (steepest * order.re()).abs();
+    Reaction { torque: -(amplitude * sine), stiffness: -(steepest * cosine), damping: 0.0, curvature }
 }
 
 /// Torque ripple: cogging, commutation, screw eccentricity.

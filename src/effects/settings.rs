@@ -84,10 +84,10 @@ impl Effect {
         EFFECTS.iter().copied().find(|e| e.info().id == id).ok_or_else(|| UnknownEffect { name: id.to_owned() })
     }
 
-    /// Whether the other is of the same family and has a size of the same name and unit: the same effect on the other side
-    /// of the coupling, or another law of the same thing.
+    /// Whether the other can stand for this one: of the same family, with a size of the same name and unit. It is the same effect
+    /// on the other side of the coupling, or another law of the same phenomenon.
     #[must_use]
-    pub fn is_kin_of(self, other: Self) -> bool {
+    pub fn is_alternative_to(self, other: Self) -> bool {
         let size = |(i, _): &(usize, usize)| self.info().parameters[*i].role == Role::Size;
         self != other && self.info().family == other.info().family && self.shared(other).any(|pair| size(&pair))
     }
@@ -325,13 +325,13 @@ pub(crate) struct Forces<S> {
     pub stiffness: [[f64; 2]; 2],
     pub damping: [[f64; 2]; 2],
     /// Sum of the laws' bends: zero if all are straight.
-    pub bend: f64,
+    pub curvature: f64,
 }
 
 impl<S: Scalar> Forces<S> {
     #[inline]
     pub(crate) fn add(&mut self, coordinate: Coordinate, r: &Reaction<S>) {
-        self.bend += r.bend;
+        self.curvature += r.curvature;
         match coordinate {
             Coordinate::Table => {
                 self.torque[1] += r.torque;
@@ -425,9 +425,9 @@ mod tests {
     use super::*;
     use crate::axis::tests::shown;
 
-    /// Newton's method ends where the bend says that its step has left nothing.
+    /// Newton's method ends where the curvature says that its step has left nothing.
     #[test]
-    fn no_law_leaves_its_tangent_by_more_than_its_bend() {
+    fn no_law_leaves_its_tangent_by_more_than_its_curvature_bound() {
         let base = Base { k: 1.76e-2, b: 5.4e-4, rigid: false };
         let mut straight = 0;
         for &effect in EFFECTS.iter().filter(|e| e.is_force()) {
@@ -441,9 +441,9 @@ mod tests {
                 let at = reaction(0.0, 0.0);
                 for (dx, dv) in [(1e-2, 0.2), (-3e-3, 0.1), (0.5, -0.3)] {
                     let off = reaction(dx, dv).torque - (at.torque + at.stiffness * dx + at.damping * dv);
-                    assert!(off.abs() <= 0.5 * at.bend * dx * dx + 1e-15, "{effect:?} {off} {}", at.bend);
+                    assert!(off.abs() <= 0.5 * at.curvature * dx * dx + 1e-15, "{effect:?} {off} {}", at.curvature);
                 }
-                straight += usize::from(at.bend == 0.0);
+                straight += usize::from(at.curvature == 0.0);
             }
         }
         // Loads, play, drift of stiffness, third inertias, spring to the frame and disturbance, at each of the three.
@@ -486,11 +486,11 @@ mod tests {
     }
 
     #[test]
-    fn kin_are_the_laws_of_one_thing_on_both_sides_of_the_coupling() {
+    fn alternatives_are_the_laws_of_one_thing_on_both_sides_of_the_coupling() {
         let mut found: Vec<[&str; 2]> = EFFECTS
             .iter()
             .flat_map(|a| EFFECTS.iter().map(move |b| (a, b)))
-            .filter(|(a, b)| a.is_kin_of(**b) && a.info().id < b.info().id)
+            .filter(|(a, b)| a.is_alternative_to(**b) && a.info().id < b.info().id)
             .map(|(a, b)| [a.info().id, b.info().id])
             .collect();
         // Of DESIGN's table: dry friction by its level, viscous friction, loads and third inertias in their two places; a

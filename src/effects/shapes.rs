@@ -60,7 +60,7 @@ pub struct Base<S> {
     pub rigid: bool,
 }
 
-/// What holds over a leg of a step, until an event.
+/// What holds over a segment of a step, until an event.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Modes {
     /// Dry friction of motor and table: -1 or +1 sliding that way, 0 sticking.
@@ -109,16 +109,16 @@ pub struct Reaction<S> {
     pub stiffness: f64,
     /// Its derivative to the velocity at the end, N.m.s/rad.
     pub damping: f64,
-    /// A move `dx` of the end takes the torque no more than `bend*dx^2/2` off this tangent, N.m/rad2: zero for a law that
-    /// is straight, infinite where nothing is known.
-    pub bend: f64,
+    /// Bound of the second derivative to the position, N.m/rad2: over `dx` the torque is within `curvature*dx^2/2` of this tangent.
+    /// Zero for a law that is linear, infinite where no bound is known.
+    pub curvature: f64,
 }
 
 impl<S: Scalar> Reaction<S> {
     /// A torque that does not hang on the end of the step.
     #[inline]
     pub fn given(torque: S) -> Self {
-        Self { torque, stiffness: 0.0, damping: 0.0, bend: 0.0 }
+        Self { torque, stiffness: 0.0, damping: 0.0, curvature: 0.0 }
     }
 }
 

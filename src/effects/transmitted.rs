@@ -25,7 +25,7 @@ impl<S: Scalar> Settings<S> {
             let (stiffness, damping) = (base.k.re(), base.b.re());
             let torque = base.k * twist.x + base.b * twist.v;
             // Its row is that of the motor; the table's is the same turned round.
-            sum.add(Coordinate::Twist, &Reaction { torque, stiffness, damping, bend: f64::INFINITY });
+            sum.add(Coordinate::Twist, &Reaction { torque, stiffness, damping, curvature: f64::INFINITY });
             return sum;
         }
         for &effect in on.forces().iter().filter(|e| e.is_carried()) {

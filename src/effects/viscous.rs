@@ -18,8 +18,8 @@ fn torque<S: Scalar>(p: &[S], m: &Moment<S>) -> Reaction<S> {
     let sign = if m.end.v.re() < 0.0 { -1.0 } else { 1.0 };
     let coefficient = p[0] * (p[1] * sign + 1.0);
     // Two straight lines that differ have a kink.
-    let bend = if p[1].re() == 0.0 { 0.0 } else { f64::INFINITY };
-    Reaction { torque: coefficient * m.end.v, stiffness: 0.0, damping: coefficient.re(), bend }
+    let curvature = if p[1].re() == 0.0 { 0.0 } else { f64::INFINITY };
+    Reaction { torque: coefficient * m.end.v, stiffness: 0.0, damping: coefficient.re(), curvature }
 }
 
 /// Viscous friction on the motor side.

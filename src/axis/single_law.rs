@@ -1,21 +1,21 @@
-//! One effect alone on the motion, free to move: one equation of one unknown, its torque along its own coordinate.
+//! A single law on a motion that nothing holds: one equation in one unknown, the law's torque along its own coordinate.
 
 use std::marker::PhantomData;
 
 use super::axis_model::State;
-use super::balance::{Leg, before};
 use super::mechanics::{Mechanics, motion};
-use super::newton::{Balance, Pass, derive, newton};
+use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::Linear;
+use super::segment::{Segment, before};
 use crate::effects::{Coordinate, Effect, Internal, Law, MEMORY_OF_ONE, Memory, Moment, Motion, WithLaw, memory_of};
 use crate::scalar::Scalar;
 
-/// The state at the end of a leg.
+/// The state at the end of a segment.
 pub(super) struct Solve<'a> {
     pub effect: Effect,
     pub mechanics: &'a Mechanics<f64>,
     pub from: &'a State<f64>,
-    pub leg: &'a Leg<'a, f64>,
+    pub segment: &'a Segment<'a, f64>,
 }
 
 impl WithLaw for Solve<'_> {
@@ -24,33 +24,33 @@ impl WithLaw for Solve<'_> {
     // Each law a function of its own: in one for all, the registers of one are saved for all.
     #[inline(never)]
     fn with<L: Law>(self) -> State<f64> {
-        let Self { effect, mechanics, from, leg } = self;
+        let Self { effect, mechanics, from, segment } = self;
         let mut memory = from.memory;
-        let lone = Lone::<_, L>::new(effect, mechanics, from, leg);
-        let [[led], [found]] = newton(&lone, [along::<_, L>(from.force)], leg.ramp.end, &mut memory);
-        lone.state(led, found, memory)
+        let equation = SingleLaw::<_, L>::new(effect, mechanics, from, segment);
+        let [[led], [found]] = newton(&equation, [along::<_, L>(from.force)], segment.ramp.end, &mut memory);
+        equation.state(led, found, memory)
     }
 }
 
 /// The same with derivatives, from what was solved without.
-pub(super) struct Carry<'a, S> {
+pub(super) struct Differentiate<'a, S> {
     pub effect: Effect,
     pub mechanics: &'a Mechanics<S>,
     pub from: &'a State<S>,
-    pub leg: &'a Leg<'a, S>,
+    pub segment: &'a Segment<'a, S>,
     pub solved: &'a State<f64>,
 }
 
-impl<S: Scalar> WithLaw for Carry<'_, S> {
+impl<S: Scalar> WithLaw for Differentiate<'_, S> {
     type Output = State<S>;
 
     #[inline(never)]
     fn with<L: Law>(self) -> State<S> {
-        let Self { effect, mechanics, from, leg, solved } = self;
+        let Self { effect, mechanics, from, segment, solved } = self;
         let mut memory = from.memory;
-        let lone = Lone::<_, L>::new(effect, mechanics, from, leg);
-        let [torque] = derive(&lone, [along::<_, L>(solved.force).into()], &mut memory);
-        lone.state(torque, torque, memory)
+        let equation = SingleLaw::<_, L>::new(effect, mechanics, from, segment);
+        let [torque] = derive(&equation, [along::<_, L>(solved.force).into()], &mut memory);
+        equation.state(torque, torque, memory)
     }
 }
 
@@ -60,11 +60,11 @@ fn along<T: Copy, L: Law>([motor, table]: [T; 2]) -> T {
 }
 
 /// The equation of a law.
-struct Lone<'a, S, L> {
+struct SingleLaw<'a, S, L> {
     mechanics: &'a Mechanics<S>,
     effect: Effect,
     from: &'a State<S>,
-    leg: &'a Leg<'a, S>,
+    segment: &'a Segment<'a, S>,
     /// The end without the torque there.
     free: Linear<S>,
     /// The same, and what one unit of the torque takes from it, along the law's coordinate.
@@ -73,27 +73,27 @@ struct Lone<'a, S, L> {
     law: PhantomData<L>,
 }
 
-impl<'a, S: Scalar, L: Law> Lone<'a, S, L> {
+impl<'a, S: Scalar, L: Law> SingleLaw<'a, S, L> {
     #[inline]
-    fn new(effect: Effect, mechanics: &'a Mechanics<S>, from: &'a State<S>, leg: &'a Leg<'a, S>) -> Self {
-        let [tau0, tau1] = before(from, &leg.ramp);
-        let free = leg.length.step.apply(&from.linear, tau0, tau1);
+    fn new(effect: Effect, mechanics: &'a Mechanics<S>, from: &'a State<S>, segment: &'a Segment<'a, S>) -> Self {
+        let [tau0, tau1] = before(from, &segment.ramp);
+        let free = segment.length.step.apply(&from.linear, tau0, tau1);
         let end = motion(&free, L::COORDINATE);
-        let per_torque = motion(&leg.length.answer, L::COORDINATE);
-        Self { mechanics, effect, from, leg, free, end, per_torque, law: PhantomData }
+        let per_torque = motion(&segment.length.response, L::COORDINATE);
+        Self { mechanics, effect, from, segment, free, end, per_torque, law: PhantomData }
     }
 
     /// The end that one torque led to and where the law gives another.
     #[inline]
     fn state(&self, led: S, found: S, memory: Memory<S>) -> State<S> {
-        let linear = std::array::from_fn(|i| self.free[i] - self.leg.length.answer[i] * led);
+        let linear = std::array::from_fn(|i| self.free[i] - self.segment.length.response[i] * led);
         let [motor, table] = L::COORDINATE.push();
         let force = [found * motor, found * table];
         State { linear, friction: [S::default(); 2], force, memory, ..*self.from }
     }
 }
 
-impl<S: Scalar, L: Law> Balance<S, 1> for Lone<'_, S, L> {
+impl<S: Scalar, L: Law> TorqueEquations<S, 1> for SingleLaw<'_, S, L> {
     type Internals = [Internal<S>; MEMORY_OF_ONE];
 
     #[inline]
@@ -108,10 +108,10 @@ impl<S: Scalar, L: Law> Balance<S, 1> for Lone<'_, S, L> {
 
     #[inline]
     fn pass(&self, [torque]: [S; 1], internals: &mut Self::Internals) -> Pass<S, 1> {
-        let Self { mechanics, from, leg, end, per_torque: per, .. } = self;
+        let Self { mechanics, from, segment, end, per_torque: per, .. } = self;
         // A friction alone does not grow with its load, or it were not alone; but it may have the derivative to that.
         let load = if L::LOADED && S::HAS_DERIVATIVES && !mechanics.base.rigid {
-            let twist = |i: usize| self.free[i] - leg.length.answer[i] * torque;
+            let twist = |i: usize| self.free[i] - segment.length.response[i] * torque;
             (mechanics.base.k * twist(2) + mechanics.base.b * twist(3)).abs()
         } else {
             S::default()
@@ -119,18 +119,18 @@ impl<S: Scalar, L: Law> Balance<S, 1> for Lone<'_, S, L> {
         let moment = Moment {
             start: motion(&from.linear, L::COORDINATE),
             end: Motion { x: end.x - per.x * torque, v: end.v - per.v * torque },
-            time: leg.end,
-            h: leg.length.step.h(),
+            time: segment.end,
+            h: segment.length.step.h(),
             contact: from.modes.contact,
             slides: from.modes.slides(L::COORDINATE),
             load,
         };
         let p = mechanics.effects.of(self.effect);
         let found = L::react(p, &mechanics.base, &moment, &mut internals[..L::MEMORY]);
-        let answers = found.stiffness * per.x.re() + found.damping * per.v.re();
-        let correction = (torque - found.torque) / (1.0 + answers);
+        let gain = found.stiffness * per.x.re() + found.damping * per.v.re();
+        let correction = (torque - found.torque) / (1.0 + gain);
         let moved = per.x.re() * correction.re();
-        let left = if found.bend == 0.0 { 0.0 } else { 0.5 * found.bend * moved * moved };
+        let left = if found.curvature == 0.0 { 0.0 } else { 0.5 * found.curvature * moved * moved };
         Pass { found: [found.torque], correction: [correction], left }
     }
 
