@@ -90,7 +90,7 @@ fn example(name: &str) -> Identification {
         ..method("iv", "Instrumental variables", 0.0)
     };
     Identification {
-        earned: eixo::identify::earned::Earned::yes(),
+        identifiability: eixo::identify::identifiability::Identifiability::yes(),
         schema: SCHEMA,
         machine: name.into(),
         structure: "two_inertia",

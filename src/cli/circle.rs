@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use super::diagnosed;
 use super::drives::{Drives, ideal, machine};
 use super::outputs;
-use super::say::say;
+use super::stdout::out;
 use crate::circle::roundness::{Roundness, bidirectional};
 use crate::circle::trace::{analyse, turns};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
@@ -135,7 +135,7 @@ fn tell(
         write_text(file, html::page(&page()).as_bytes())?;
     }
     let colour = std::io::stdout().is_terminal();
-    say!("{}", terminal::blocks(short, terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(short, terminal::Layout { colour, ..terminal::Layout::default() }))?;
     Ok(ExitCode::SUCCESS)
 }
 

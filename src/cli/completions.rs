@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::CommandFactory;
 
-use super::say::say;
+use super::stdout::out;
 
 /// Arguments of `eixo completions`.
 #[derive(Debug, clap::Args)]
@@ -21,6 +21,6 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut super::Cli::command(), "eixo", &mut text);
-    say!("{}", String::from_utf8(text)?)?;
+    out!("{}", String::from_utf8(text)?)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -16,7 +16,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::say::{say, say_line};
+use super::stdout::{out, out_line};
 use crate::axis::{Parameters, dt_criterion};
 use crate::diagnose::{Case, Model, diagnose};
 use crate::effects::EFFECTS;
@@ -103,12 +103,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.finish();
 
     let layout = terminal::Layout { colour: std::io::stdout().is_terminal(), ..terminal::Layout::default() };
-    say!("{}", terminal::blocks(&short(&findings), layout))?;
-    say_line!(
+    out!("{}", terminal::blocks(&short(&findings), layout))?;
+    out_line!(
         "\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n"
     )?;
-    say!("{}", terminal::blocks(&diagnosis, layout))?;
-    say_line!()?;
+    out!("{}", terminal::blocks(&diagnosis, layout))?;
+    out_line!()?;
     for (name, what) in [
         ("axis.fmu", "the axis, for any tool that imports FMI 2.0"),
         ("excitation.csv", "the torque"),
@@ -120,7 +120,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         ("diagnosis.html", "where the gap lies, what causes it, how far it shrinks"),
         ("circle.html", "what the hidden friction does to a circle"),
     ] {
-        say_line!("  {:<40} {what}", file(name).display())?;
+        out_line!("  {:<40} {what}", file(name).display())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::examined::{Believed, Examined, examined};
 use super::many::Many;
 use super::outputs;
-use super::say::{say, say_line};
+use super::stdout::{out, out_line};
 use crate::axis::Structure;
 use crate::diagnose::{
     CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise,
@@ -184,7 +184,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let findings = diagnosed.findings();
     let outcome = &diagnosed.outcome;
     let colour = std::io::stdout().is_terminal();
-    say!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
     if let Some(path) = &args.json {
         let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis))?;
         text.push('\n');
@@ -202,7 +202,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let bytes = Package::of(&improved).with_context(|| path.display().to_string())?.archive()?;
         super::export::read_back(&bytes, "modelDescription.xml").with_context(|| path.display().to_string())?;
         write_text(path, &bytes)?;
-        say_line!("{}", replayed(path, &outcome.replay)?)?;
+        out_line!("{}", replayed(path, &outcome.replay)?)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use super::say::say;
+use super::stdout::out;
 use crate::effects::{EFFECTS, Effect, EffectInfo, Role};
 
 /// Arguments of `eixo effects`.
@@ -27,7 +27,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None if args.markdown => markdown(),
         None => list(),
     };
-    say!("{text}")?;
+    out!("{text}")?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -104,7 +104,7 @@ impl Refused {
 /// When it cannot be read; [`Refused`] when it cannot be believed and the user does not say so.
 pub fn examined(path: &Path, machine: &Machine, known: bool, believed: Believed) -> anyhow::Result<Examined> {
     let loaded = load(path, &believed.part.of(machine.signals.clone()))?;
-    judged(loaded, path, machine, known, believed.trust, Extent::Whole)
+    examined_log(loaded, path, machine, known, believed.trust, Extent::Whole)
 }
 
 /// What is taken of a record that has stretches of no use.
@@ -119,7 +119,7 @@ pub enum Extent {
 ///
 /// # Errors
 /// [`Refused`].
-pub fn judged(
+pub fn examined_log(
     loaded: Loaded,
     path: &Path,
     machine: &Machine,
@@ -166,7 +166,7 @@ const MOST_PIECES: usize = 64;
 ///
 /// # Errors
 /// [`Refused`], when the longest piece cannot be believed; a shorter one is left out with a word.
-pub fn judged_pieces(
+pub fn examined_pieces(
     loaded: LoadedPieces,
     path: &Path,
     machine: &Machine,

@@ -7,7 +7,7 @@ use anyhow::Context;
 
 use super::limits;
 use super::outputs;
-use super::say::say_line;
+use super::stdout::out_line;
 use crate::identify::excitation::{Kind, Multisine};
 use crate::report::format::{Medium, number};
 use crate::trace::{Hold, Motion, Signal, Trace, write_csv};
@@ -116,7 +116,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let resolution = 1.0 / (args.samples as f64 * args.dt);
     let harmonic = |k: Option<&crate::identify::excitation::Line>| k.map_or(0.0, |l| l.harmonic as f64 * resolution);
-    say_line!(
+    out_line!(
         "{}: {} samples at dt = {} s, {} period(s) of {:.6} s",
         args.output.display(),
         total,
@@ -124,13 +124,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.periods,
         args.samples as f64 * args.dt
     )?;
-    say_line!(
+    out_line!(
         "lines         {} from {:.6} to {:.6} Hz",
         signal.lines.len(),
         harmonic(signal.lines.first()),
         harmonic(signal.lines.last())
     )?;
-    say_line!("rms           {}", number(signal.rms(), 4, Medium::Terminal))?;
-    say_line!("crest factor  {:.3}", signal.crest_factor())?;
+    out_line!("rms           {}", number(signal.rms(), 4, Medium::Terminal))?;
+    out_line!("crest factor  {:.3}", signal.crest_factor())?;
     Ok(ExitCode::SUCCESS)
 }

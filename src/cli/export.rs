@@ -7,7 +7,7 @@ use anyhow::Context;
 
 use super::drives::Drives;
 use super::outputs;
-use super::say::{say, say_line};
+use super::stdout::{out, out_line};
 use crate::fmu::archive::{Archive, Limits};
 use crate::fmu::description::{Description, Fmi};
 use crate::fmu::isolation;
@@ -96,7 +96,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     read_back(&bytes, "modelDescription.xml").with_context(file)?;
     write_text(&args.fmu, &bytes)?;
     let platforms: Vec<&str> = Package::platforms().collect();
-    say_line!("{}: FMI {spelt} co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
+    out_line!("{}: FMI {spelt} co-simulation, {}, for {}", args.fmu.display(), package.name, platforms.join(" and "))?;
     if args.check { check(&args.fmu) } else { Ok(ExitCode::SUCCESS) }
 }
 
@@ -107,7 +107,7 @@ fn check(fmu: &Path) -> anyhow::Result<ExitCode> {
     let report = validate(fmu, &options, &|_, _| {});
     isolation::end_orphans();
     let report = report?;
-    say!("{}", output::text(&report, false, false, false))?;
+    out!("{}", output::text(&report, false, false, false))?;
     Ok(if report.passes(false) { ExitCode::SUCCESS } else { ExitCode::from(super::FINDINGS) })
 }
 
@@ -142,7 +142,7 @@ fn table(args: &Args, x: Machine) -> anyhow::Result<ExitCode> {
     read_back(&bytes, "SystemStructure.ssd")?;
     write_text(&args.fmu, &bytes)?;
     let step = args.drives.dt;
-    say_line!(
+    out_line!(
         "{}: SSP 1.0, {}: x_axis, x_drive, y_axis, y_drive, made for steps of {step} s",
         args.fmu.display(),
         table.name

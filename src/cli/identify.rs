@@ -11,10 +11,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::FINDINGS;
-use super::examined::{Believed, Extent, Refused, judged, judged_pieces};
+use super::examined::{Believed, Extent, Refused, examined_log, examined_pieces};
 use super::many::Many;
 use super::outputs;
-use super::say::say;
+use super::stdout::out;
 use crate::axis::{Scheme, Structure};
 use crate::fleet::{Found, Tracked};
 use crate::identify::joined::Joined;
@@ -166,7 +166,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if machine.controller.is_some() && result.recommended.is_some() {
         said.extend(super::controlled::identified(path, args.believed.part, &machine, &improved(&machine, &result)?)?);
     }
-    say!("{}", terminal::blocks(&said, terminal::Layout::default()))?;
+    out!("{}", terminal::blocks(&said, terminal::Layout::default()))?;
     if let Some(path) = &args.json {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
@@ -180,7 +180,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.axis_out {
         write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
     }
-    Ok(if result.earned.identified { ExitCode::SUCCESS } else { ExitCode::from(FINDINGS) })
+    Ok(if result.identifiability.identified { ExitCode::SUCCESS } else { ExitCode::from(FINDINGS) })
 }
 
 /// Identifies one trace.
@@ -209,7 +209,7 @@ fn examine(
         let stream = Stream::open(path, &machine.signals)?;
         // The head of the record stands for it: a defect of a sensor or a unit shows there as well.
         let head = Loaded { trace: stream.head(EXAMINED)?, stamps: None, warnings: Vec::new() };
-        let seen = judged(head, path, &machine, axis.is_some(), args.believed.trust, Extent::Longest)?;
+        let seen = examined_log(head, path, &machine, axis.is_some(), args.believed.trust, Extent::Longest)?;
         let mut request = request(args, axis.is_some());
         request.methods.retain(|m| stream::METHODS.contains(m));
         anyhow::ensure!(!request.methods.is_empty(), "--stream: only --method ls and rls are computed piece by piece");
@@ -218,14 +218,14 @@ fn examine(
         return Ok((machine, result, Vec::new()));
     }
     let loaded = load_pieces(path, &args.believed.part.of(machine.signals.clone()))?;
-    // What is not there is said before what is there is judged.
+    // What is not there is said before what is there is examined.
     let there = &loaded.longest.trace;
     let mut needed = vec![Signal::T, Signal::Theta1];
     if machine.structure == Structure::TwoInertia && !there.has(Signal::X2) {
         needed.push(Signal::Theta2);
     }
     needed.into_iter().try_for_each(|s| there.require(s).map(|_| ())).context(file.clone())?;
-    let (pieces, warnings) = judged_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
+    let (pieces, warnings) = examined_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
     let joined = Joined::of(&pieces)?;
     let request = request(args, axis.is_some());
     let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file)?;
@@ -254,7 +254,7 @@ fn found(result: &Identification, record: Option<&Joined>) -> anyhow::Result<Fou
     let best = result.recommended.as_ref().context("no method gives an estimate to trust")?;
     let method = &result.methods[best.method];
     let fit = method.outputs.iter().map(|o| o.fit_percent / 100.0).reduce(f64::min);
-    let verdict = if !result.earned.identified {
+    let verdict = if !result.identifiability.identified {
         "not_identified"
     } else if method.outputs.is_empty() {
         "not_compared"
@@ -363,7 +363,7 @@ fn paper_tables(json: Option<&Path>) -> anyhow::Result<ExitCode> {
         blocks.push(Block::Paragraph(t.verdict.clone()));
     }
     blocks.extend(tables.words.iter().cloned().map(Block::Paragraph));
-    say!("{}", terminal::blocks(&blocks, terminal::Layout { width: 120, colour: false }))?;
+    out!("{}", terminal::blocks(&blocks, terminal::Layout { width: 120, colour: false }))?;
     if let Some(path) = json {
         write_text(path, &serde_json::to_vec_pretty(&tables)?)?;
     }

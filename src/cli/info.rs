@@ -8,7 +8,7 @@ use anyhow::Context;
 use serde_json::{Value as Json, json};
 
 use super::info3;
-use super::say::say;
+use super::stdout::out;
 use crate::fmu::archive::Archive;
 use crate::fmu::description::{Causality, Description, Interface, SI_BASE, Unit, Value, Variable};
 use crate::fmu::xml::Document;
@@ -49,9 +49,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let words: Vec<String> = args.causality.iter().map(|c| c.word().to_owned()).collect();
         let platforms = platforms(&archive);
         if args.json {
-            say!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
+            out!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
         } else {
-            say!("{}", info3::as_text(&document.root, &platforms, &words))?;
+            out!("{}", info3::as_text(&document.root, &platforms, &words))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -61,7 +61,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let platforms = platforms(&archive);
     let text =
         if args.json { format!("{:#}\n", as_json(&d, &platforms, &shown)) } else { as_text(&d, &platforms, &shown) };
-    say!("{text}")?;
+    out!("{text}")?;
     Ok(ExitCode::SUCCESS)
 }
 

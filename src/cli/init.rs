@@ -9,7 +9,7 @@ use anyhow::Context;
 
 use super::examined::Part;
 use super::outputs;
-use super::say::{say, say_line};
+use super::stdout::{out, out_line};
 use crate::axis::Structure;
 use crate::examine::{Examination, Input, examine};
 use crate::identify::run::{Request, identify};
@@ -105,10 +105,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     blocks.extend(loaded.warnings.iter().cloned().map(Block::Warning));
     blocks.extend(findings(&examination).into_iter().filter(|b| !matches!(b, Block::Table(_))));
     let colour = std::io::stdout().is_terminal();
-    say!("{}", terminal::blocks(&blocks, terminal::Layout { colour, ..terminal::Layout::default() }))?;
-    say_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
-    say_line!("{}: the log, drawn", page.display())?;
-    say_line!("next: eixo identify {} --axis {}", quoted(&file), quoted(&axis.display().to_string()))?;
+    out!("{}", terminal::blocks(&blocks, terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
+    out_line!("{}: the log, drawn", page.display())?;
+    out_line!("next: eixo identify {} --axis {}", quoted(&file), quoted(&axis.display().to_string()))?;
     Ok(ExitCode::SUCCESS)
 }
 

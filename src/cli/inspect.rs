@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use super::FINDINGS;
 use super::examined::Part;
 use super::outputs;
-use super::say::say;
+use super::stdout::out;
 use crate::examine::{Input, examine};
 use crate::report::examine::{Inspected, report, short};
 use crate::report::{html, terminal};
@@ -73,6 +73,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, html::page(&report(&seen)).as_bytes())?;
     }
     let colour = std::io::stdout().is_terminal();
-    say!("{}", terminal::blocks(&short(&seen), terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(&short(&seen), terminal::Layout { colour, ..terminal::Layout::default() }))?;
     Ok(if examination.refuses() { ExitCode::from(FINDINGS) } else { ExitCode::SUCCESS })
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::CommandFactory;
 
-use super::say::say;
+use super::stdout::out;
 
 /// Arguments of `eixo man`.
 #[derive(Debug, clap::Args)]
@@ -17,7 +17,7 @@ pub struct Args {}
 /// # Errors
 /// When standard output cannot be written.
 pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    say!("{}", String::from_utf8(page()?)?)?;
+    out!("{}", String::from_utf8(page()?)?)?;
     Ok(ExitCode::SUCCESS)
 }
 

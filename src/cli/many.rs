@@ -8,7 +8,7 @@ use std::time::Duration;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::say::{say, say_line};
+use super::stdout::{out, out_line};
 use super::{COULD_NOT_RUN, FINDINGS};
 use crate::fleet::{Found, Item, Plan, find, is_many, run};
 use crate::report::terminal;
@@ -83,7 +83,7 @@ impl Many {
         }
         if self.list {
             for item in &items {
-                say_line!("{}", item.path.display())?;
+                out_line!("{}", item.path.display())?;
             }
             return Ok(ExitCode::SUCCESS);
         }
@@ -112,8 +112,8 @@ impl Many {
         let outcome = done?;
         if self.part.is_empty() {
             let colour = std::io::stdout().is_terminal();
-            say!("{}", terminal::blocks(&outcome.short, terminal::Layout { colour, width: 120 }))?;
-            say_line!("\n{}", output.join("index.html").display())?;
+            out!("{}", terminal::blocks(&outcome.short, terminal::Layout { colour, width: 120 }))?;
+            out_line!("\n{}", output.join("index.html").display())?;
         }
         if outcome.reused > 0 {
             eprintln!("{} of {} traces were done by an earlier run", outcome.reused, items.len());

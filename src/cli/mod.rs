@@ -49,8 +49,8 @@ mod limits;
 mod man;
 mod many;
 mod outputs;
-mod say;
 mod simulate;
+mod stdout;
 mod validate;
 
 macro_rules! commands {
@@ -113,7 +113,7 @@ pub fn main() -> ExitCode {
             if let Some(refused) = error.downcast_ref::<examined::Refused>() {
                 let colour = std::io::IsTerminal::is_terminal(&std::io::stdout());
                 let layout = crate::report::terminal::Layout { colour, ..Default::default() };
-                let said = say::say!("{}", crate::report::terminal::blocks(&refused.blocks(), layout));
+                let said = stdout::out!("{}", crate::report::terminal::blocks(&refused.blocks(), layout));
                 return ExitCode::from(if said.is_ok() { FINDINGS } else { COULD_NOT_RUN });
             }
             eprintln!("error: {}", crate::report::format::printable(&format!("{error:#}")));

@@ -47,7 +47,7 @@ pub fn check<'a>(
     let mut seen: Vec<(&Path, Identity)> = Vec::new();
     for path in outputs.into_iter().flatten() {
         if path == Path::new("-") {
-            super::say::to_stderr();
+            super::stdout::to_stderr();
         }
         if let Some(own) = identity(path) {
             if let Some((input, _)) = inputs.iter().find(|(_, i)| i.as_ref() == Some(&own)) {

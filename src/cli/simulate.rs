@@ -12,7 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::examined::Part;
 use super::limits;
 use super::outputs;
-use super::say::say_line;
+use super::stdout::out_line;
 use crate::fmu::contained::{self, Host, simulate};
 use crate::fmu::isolation;
 use crate::fmu::package::Package;
@@ -264,7 +264,7 @@ fn finish(mut record: Record, output: &Path, noise: &[Noise], seed: u64) -> anyh
     let columns: Vec<(&str, &[f64])> = table.iter().map(|(name, values)| (name.as_str(), *values)).collect();
     write_columns(output, &columns)?;
     record.notes.iter().for_each(|note| eprintln!("note: {note}"));
-    say_line!(
+    out_line!(
         "{}: {} rows, {} s to {} s, {} columns",
         output.display(),
         record.time.len(),

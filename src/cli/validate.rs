@@ -9,7 +9,7 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::outputs;
-use super::say::say;
+use super::stdout::out;
 use crate::fmu::contained::Host;
 use crate::fmu::isolation;
 use crate::fmu::output;
@@ -210,7 +210,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Writes to the file, which appears whole or not at all, or to standard output.
 fn write(args: &Args, text: &str) -> anyhow::Result<()> {
     let Some(path) = &args.output else {
-        return Ok(say!("{text}")?);
+        return Ok(out!("{text}")?);
     };
     write_text(path, text.as_bytes())?;
     Ok(())

@@ -71,11 +71,6 @@ pub trait Problem {
     /// `|r(p)|^2 / 2`; None where the model cannot be evaluated.
     fn cost(&self, p: &DVector<f64>) -> Option<f64>;
 
-    /// The cost at p once its nuisance parameters, if it has any, are where they are best given the others.
-    fn settle(&self, p: &mut DVector<f64>) -> Option<f64> {
-        self.cost(p)
-    }
-
     /// The normal equations at p; None where the model cannot be evaluated.
     fn linearise(&self, p: &DVector<f64>) -> Option<Normal>;
 
@@ -94,8 +89,8 @@ pub struct Options {
     pub step: f64,
     /// Stop when no parameter's gradient is larger than this times `|r|*|J_j|`: the cosine of their angle.
     pub gradient: f64,
-    /// Give up when after so many steps the cost is above a bar: pairs of both.
-    pub hopeless: Vec<(usize, f64)>,
+    /// Pairs of a number of steps and a cost: stop when the cost after so many steps is above it.
+    pub abort_bounds: Vec<(usize, f64)>,
     /// First damping, relative to the scaled curvature.
     pub damping: f64,
     /// Longest step of each parameter, n; empty: none.
@@ -113,7 +108,7 @@ impl Default for Options {
             cost: 1e-12,
             step: 1e-10,
             gradient: 1e-10,
-            hopeless: Vec::new(),
+            abort_bounds: Vec::new(),
             damping: 1e-3,
             stride: Vec::new(),
             lower: Vec::new(),
@@ -136,8 +131,9 @@ pub enum Termination {
     Exact,
     /// The limit of iterations was reached: the result is the best point so far.
     Iterations,
-    /// Given up: [`Options::hopeless`].
-    Hopeless,
+    /// The cost was above its bound after some steps: [`Options::abort_bounds`].
+    #[serde(rename = "hopeless")]
+    AbortBound,
     /// No damping makes the cost fall though the gradient is not zero: the derivatives and the cost disagree.
     NoProgress,
     /// The problem could not be evaluated at the start.
@@ -270,7 +266,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 growth *= 2.0;
                 continue;
             };
-            let mut trial = DVector::from_fn(n, |i, _| (p[i] + step[i]).max(lower(i)).min(upper(i)));
+            let trial = DVector::from_fn(n, |i, _| (p[i] + step[i]).max(lower(i)).min(upper(i)));
             let moved = &trial - &p;
             if options.stride.iter().zip(moved.iter()).any(|(most, moved)| moved.abs() > *most) {
                 damping *= growth;
@@ -278,21 +274,21 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 continue;
             }
             let small = (0..n).all(|i| moved[i].abs() <= options.step * (p[i].abs() + options.step));
-            let promised = -(normal.gradient.dot(&moved) + 0.5 * moved.dot(&(&normal.curvature * &moved)));
+            let predicted = -(normal.gradient.dot(&moved) + 0.5 * moved.dot(&(&normal.curvature * &moved)));
             if small {
                 break Err(Termination::Step);
             }
             evaluations += 1;
-            let cost = problem.settle(&mut trial).filter(|c| c.is_finite()).unwrap_or(f64::INFINITY);
-            let brought = normal.cost - cost;
-            if brought > 0.0 && promised > 0.0 {
-                let gain = brought / promised;
+            let cost = problem.cost(&trial).filter(|c| c.is_finite()).unwrap_or(f64::INFINITY);
+            let reduction = normal.cost - cost;
+            if reduction > 0.0 && predicted > 0.0 {
+                let gain = reduction / predicted;
                 damping = (damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-15);
                 growth = 2.0;
-                break Ok((trial, brought, promised));
+                break Ok((trial, reduction, predicted));
             }
             // Neither better nor worse than rounding: this is the bottom.
-            if promised <= options.cost * normal.cost && brought.abs() <= 1e-10 * normal.cost {
+            if predicted <= options.cost * normal.cost && reduction.abs() <= 1e-10 * normal.cost {
                 break Err(Termination::Cost);
             }
             damping *= growth;
@@ -300,7 +296,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
         };
         match outcome {
             Err(end) => break end,
-            Ok((trial, brought, promised)) => {
+            Ok((trial, reduction, predicted)) => {
                 evaluations += 1;
                 let before = normal.cost;
                 let Some(next) = problem.linearise(&trial).filter(Normal::is_finite) else {
@@ -310,11 +306,11 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 normal = next;
                 iterations += 1;
                 problem.progress(iterations, normal.cost, &p);
-                if options.hopeless.iter().any(|(steps, bar)| iterations == *steps && normal.cost > *bar) {
-                    break Termination::Hopeless;
+                if options.abort_bounds.iter().any(|(steps, bar)| iterations == *steps && normal.cost > *bar) {
+                    break Termination::AbortBound;
                 }
                 // A step that the damping holds short promises little wherever it stands.
-                let little = brought.max(promised) <= options.cost * before && damping <= HELD_SHORT;
+                let little = reduction.max(predicted) <= options.cost * before && damping <= HELD_SHORT;
                 calm = if little { calm + 1 } else { 0 };
                 if calm >= 2 {
                     break Termination::Cost;
@@ -386,12 +382,12 @@ mod tests {
             minimise(
                 &rosenbrock(),
                 &start,
-                &Options { hopeless: vec![(1, f64::INFINITY), (2, bar)], ..Options::default() },
+                &Options { abort_bounds: vec![(1, f64::INFINITY), (2, bar)], ..Options::default() },
             )
         };
         // Rosenbrock's cost at the start is 12.1; the valley is reached in a step, its end in some fifteen.
         let given_up = after_two(1e-3);
-        assert_eq!((given_up.termination, given_up.iterations), (Termination::Hopeless, 2));
+        assert_eq!((given_up.termination, given_up.iterations), (Termination::AbortBound, 2));
         assert!(given_up.cost < 12.1 && !given_up.termination.is_converged());
         assert!(after_two(12.1).termination.is_converged());
     }

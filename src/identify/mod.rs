@@ -1,11 +1,11 @@
 //! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
 
-pub mod earned;
+mod assessment;
 pub mod excitation;
 pub mod frequency;
+pub mod identifiability;
 pub mod instrumental;
 pub mod joined;
-mod judge;
 mod known;
 pub mod levenberg;
 mod long_run;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::earned::Earned;
+use super::identifiability::Identifiability;
 use super::levenberg::Termination;
 use super::parameters::Estimated;
 use super::run::NOISE_FREE;
@@ -28,7 +28,8 @@ pub struct Identification {
     /// Index of the method to trust, and why.
     pub recommended: Option<Recommendation>,
     /// Whether the record identifies the axis, and what speaks against it.
-    pub earned: Earned,
+    #[serde(rename = "earned")]
+    pub identifiability: Identifiability,
     /// The measured torque, for plotting, and its spectrum.
     pub torque: Series,
     /// Amplitude spectrum of the measured torque.
@@ -257,7 +258,7 @@ impl MethodResult {
     }
 
     /// Takes the estimates in, against a reference where there is one, with what is to be said of them.
-    pub(super) fn judge(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion) {
+    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion) {
         self.parameters = estimated.estimates(reference, motion);
         if !estimated.is_physical() {
             // Numbers of no axis are not shown: they would be read.

@@ -19,9 +19,9 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector4};
 
-use super::earned::{Earned, Evidence, SMALL_TORQUE};
+use super::assessment::output_fit;
+use super::identifiability::{Evidence, Identifiability, SMALL_TORQUE};
 use super::joined::Joined;
-use super::judge::output_fit;
 use super::known::Known;
 use super::lsq::triangularise;
 use super::result::{
@@ -354,7 +354,7 @@ pub(super) fn identify(
         }
         Err(why) => result.failure = Some(why),
     }
-    let earned = Earned::of(recommended.as_ref().map(|_| &result), evidence);
+    let identifiability = Identifiability::of(recommended.as_ref().map(|_| &result), evidence);
     let torque = trace.require(Signal::T)?;
     Ok(Identification {
         schema: SCHEMA,
@@ -363,7 +363,7 @@ pub(super) fn identify(
         trace: summary(joined, file, None),
         methods: vec![result],
         recommended,
-        earned,
+        identifiability,
         torque: Series::over("T", unit, |k| joined.time(k), torque),
         torque_spectrum: spectrum("T", unit, trace.dt, &torque[joined.longest()]),
         frequency_response: None,

@@ -1,7 +1,7 @@
 //! One identification from start to finish: every method asked for, its fit, and which one to trust.
 
-use super::earned::{Earned, Evidence};
 use super::frequency;
+use super::identifiability::{Evidence, Identifiability};
 use super::joined::{Joined, noise_in_pieces};
 use super::known::Known;
 use super::methods::Run;
@@ -238,7 +238,7 @@ pub fn identify_joined(
     progress("fits of the estimates");
     let scheme = run.scheme();
     for result in &mut methods {
-        run.judge(result, scheme);
+        run.assess(result, scheme);
     }
     let recommended = recommend(&methods, record.omega.is_some());
     progress("held-out part");
@@ -249,7 +249,7 @@ pub fn identify_joined(
             run.held_out(&p, scheme)
         });
     let best = recommended.as_ref().map(|r| &methods[r.method]);
-    let earned = Earned::of(best, Evidence { held_out, ..Evidence::default() });
+    let identifiability = Identifiability::of(best, Evidence { held_out, ..Evidence::default() });
     let frequency_response = measured.as_ref().and_then(|m| {
         let index = recommended.as_ref()?.method;
         let p = run.estimates.iter().find(|(name, _)| *name == methods[index].method)?.1.parameters(1.0);
@@ -264,7 +264,7 @@ pub fn identify_joined(
         trace: summary(joined, file, samples.filter(|_| measured.is_some())),
         methods,
         recommended,
-        earned,
+        identifiability,
         torque: Series::over("T", unit, |k| joined.time(k), torque),
         torque_spectrum: spectrum("T", unit, joined.samples().dt, &torque[joined.longest()]),
         frequency_response,

@@ -10,7 +10,7 @@
 
 use std::borrow::Cow;
 
-use super::earned::{Earned, Evidence};
+use super::identifiability::{Evidence, Identifiability};
 use super::lsq::BLOCK;
 use super::parameters::Estimated;
 use super::record::{DIFFERENT_ZEROS, Record};
@@ -177,11 +177,11 @@ pub fn identify(
         } else {
             recursive(&frame, &sums, squares.moments(), request)?.map(|(e, h)| (e, Some(h)))
         };
-        methods.push(judged(method, found, machine, request, &frame));
+        methods.push(assessed(method, found, machine, request, &frame));
     }
     let best = methods.iter().position(|m| !m.modal.is_empty());
     let explained = Some(squares.explained());
-    let earned = Earned::of(best.map(|k| &methods[k]), Evidence { explained, ..Evidence::default() });
+    let identifiability = Identifiability::of(best.map(|k| &methods[k]), Evidence { explained, ..Evidence::default() });
     let unit = Signal::T.unit(motion);
     let at = stream.frame();
     Ok(Identification {
@@ -206,7 +206,7 @@ pub fn identify(
                   (--method oe) on a part cut out with --from and --to, without --stream"
                 .to_owned(),
         }),
-        earned,
+        identifiability,
         torque: Series {
             name: "T".to_owned(),
             x_unit: "s",
@@ -289,7 +289,7 @@ fn recursive(frame: &Frame, sums: &Sums, moments: &Moments, request: &Request) -
     Ok(recursion.finish(moments))
 }
 
-fn judged(
+fn assessed(
     method: Method,
     found: Result<(Estimated, Option<History>), RegressionError>,
     machine: &Machine,
@@ -307,7 +307,7 @@ fn judged(
         Err(why) => result.failure = Some(why.to_string()),
         Ok((estimated, history)) => {
             result.history = history;
-            result.judge(&estimated, request.reference.then_some(&machine.parameters), machine.signals.motion);
+            result.assess(&estimated, request.reference.then_some(&machine.parameters), machine.signals.motion);
         }
     }
     result

@@ -2,7 +2,7 @@
 
 use super::estimates::{is_shown, value};
 use super::recommended;
-use crate::identify::earned::FOLLOWS;
+use crate::identify::identifiability::LEAST_FIT;
 use crate::identify::result::Identification;
 use crate::report::format::{self, Medium};
 use crate::report::{Tone, Verdict};
@@ -39,11 +39,11 @@ pub fn verdict(found: &Identification) -> Verdict {
         ),
         None => format!("{} identifies the axis.", best.title),
     };
-    let earned = &found.earned;
-    let tone = if earned.identified { Tone::Neutral } else { Tone::Unsure };
-    let poor = worst.filter(|o| o.fit_percent < FOLLOWS);
+    let identifiability = &found.identifiability;
+    let tone = if identifiability.identified { Tone::Neutral } else { Tone::Unsure };
+    let poor = worst.filter(|o| o.fit_percent < LEAST_FIT);
     let sentence = match poor {
-        _ if earned.identified => sentence,
+        _ if identifiability.identified => sentence,
         Some(o) if o.fit_percent > 0.0 => format!(
             "The model does not follow the machine: with the estimates of {} its simulation follows {} to {} only.",
             best.title,
@@ -58,13 +58,16 @@ pub fn verdict(found: &Identification) -> Verdict {
         None => format!("{} does not identify the axis from this record.", best.title),
     };
     let known = best.modal.iter().chain(best.parameters.iter()).filter(|e| is_shown(e));
-    let figures =
-        if earned.identified { known.take(4).map(|e| (e.name.to_owned(), value(e))).collect() } else { Vec::new() };
-    let detail = if earned.identified {
+    let figures = if identifiability.identified {
+        known.take(4).map(|e| (e.name.to_owned(), value(e))).collect()
+    } else {
+        Vec::new()
+    };
+    let detail = if identifiability.identified {
         found.recommended.as_ref().map_or_else(String::new, |r| sentence_of(&r.why))
     } else {
-        let mut words = earned.doubts.clone();
-        words.push(earned.advice.clone());
+        let mut words = identifiability.doubts.clone();
+        words.push(identifiability.advice.clone());
         words.retain(|w| !w.is_empty());
         words.join(" ")
     };

@@ -29,14 +29,14 @@ pub fn write(text: std::fmt::Arguments<'_>) -> Result<()> {
 }
 
 /// As `print!`, with the result of [`write()`].
-macro_rules! say {
-    ($($text:tt)*) => { $crate::cli::say::write(format_args!($($text)*)) };
+macro_rules! out {
+    ($($text:tt)*) => { $crate::cli::stdout::write(format_args!($($text)*)) };
 }
 
 /// As `println!`, with the result of [`write()`].
-macro_rules! say_line {
-    () => { $crate::cli::say::write(format_args!("\n")) };
-    ($($text:tt)+) => { $crate::cli::say::write(format_args!("{}\n", format_args!($($text)+))) };
+macro_rules! out_line {
+    () => { $crate::cli::stdout::write(format_args!("\n")) };
+    ($($text:tt)+) => { $crate::cli::stdout::write(format_args!("{}\n", format_args!($($text)+))) };
 }
 
-pub(crate) use {say, say_line};
+pub(crate) use {out, out_line};

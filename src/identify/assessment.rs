@@ -19,7 +19,7 @@ impl Run<'_> {
     }
 
     /// Fit, whiteness and excitation estimate of a method's parameters.
-    pub fn judge(&self, result: &mut MethodResult, scheme: Scheme) {
+    pub fn assess(&self, result: &mut MethodResult, scheme: Scheme) {
         let Some((_, estimated)) = self.estimates.iter().find(|(name, _)| *name == result.method) else { return };
         result.excitation = Some(self.excitation(estimated));
         let p = estimated.parameters(self.machine.parameters.rho);
@@ -65,8 +65,8 @@ impl Run<'_> {
         if p.check(Structure::TwoInertia).is_err() {
             return Some(f64::NEG_INFINITY);
         }
-        let judge = OutputError::of(&rest, rho, structure, effects).ok()?;
-        let residuals = judge.residuals(&judge.fit(&p, scheme, Free { parameters: false, ..free }));
+        let model = OutputError::of(&rest, rho, structure, effects).ok()?;
+        let residuals = model.residuals(&model.fit(&p, scheme, Free { parameters: false, ..free }));
         // Against the whole record's size: a part in which one output hardly moves says nothing of the fit.
         let fits = self.outputs.outputs().zip(residuals).map(|((_, measured), (_, r))| {
             let size = deviation(measured);

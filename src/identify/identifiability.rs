@@ -15,11 +15,11 @@ const SMALL_DAMPING: f64 = 0.02;
 /// A friction or load whose two standard errors make less than this share of the torque is known well enough.
 pub(super) const SMALL_TORQUE: f64 = 0.05;
 /// A simulation that follows an output worse than this, per cent, does not follow it.
-pub const FOLLOWS: f64 = 50.0;
+pub const LEAST_FIT: f64 = 50.0;
 
 /// What the record earned.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Earned {
+pub struct Identifiability {
     /// Whether the record identifies the axis.
     pub identified: bool,
     /// What speaks against it, each a sentence.
@@ -48,7 +48,7 @@ fn is_below(figure: f64, bound: f64) -> bool {
     figure.is_nan() || figure < bound
 }
 
-impl Earned {
+impl Identifiability {
     /// The record identifies the axis.
     #[must_use]
     pub fn yes() -> Self {
@@ -99,11 +99,11 @@ impl Earned {
                 .clone_into(&mut advice);
         }
         if let Some(worst) = best.outputs.iter().min_by(|a, b| a.fit_percent.total_cmp(&b.fit_percent))
-            && is_below(worst.fit_percent, FOLLOWS)
+            && is_below(worst.fit_percent, LEAST_FIT)
         {
             doubts.push(format!("Its simulation does not follow {}.", worst.signal.name()));
             "Diagnose the record for what the model leaves out (`eixo diagnose`).".clone_into(&mut advice);
-        } else if let Some(held) = evidence.held_out.filter(|h| is_below(*h, FOLLOWS)) {
+        } else if let Some(held) = evidence.held_out.filter(|h| is_below(*h, LEAST_FIT)) {
             doubts.push(if held.is_finite() && held > 0.0 {
                 format!("A fit to the first two thirds of the record follows the last third to {held:.0} % only.")
             } else {
@@ -114,7 +114,7 @@ impl Earned {
         }
         if let Some(shares) = evidence.explained {
             for (share, side) in shares.into_iter().zip(["motor", "table"]) {
-                if is_below(share, 0.01 * FOLLOWS) {
+                if is_below(share, 0.01 * LEAST_FIT) {
                     doubts.push(format!(
                         "The equations of motion explain {:.0} % of the {side}'s acceleration.",
                         100.0 * share.max(0.0)
