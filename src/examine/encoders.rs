@@ -2,16 +2,16 @@
 
 use rustfft::num_complex::Complex;
 
-use super::balance::{COHERENT, MAIN, T, TABLE};
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
+use super::momentum::{COHERENT, MAIN, T, TABLE};
 use super::pairs::factor;
 use super::spectra::Spectra;
 use super::{Input, Structure};
 
 /// The two encoders against each other: sign, scale, and which one is the motor's.
 pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
-    let together: Vec<usize> =
+    let coherent: Vec<usize> =
         (0..s.lines).filter(|f| s.coherence(MAIN, TABLE, *f) > s.by_chance().max(COHERENT)).collect();
     // At the lines where the torque moves anything: does the table move with the motor, or with the torque? A table that is
     // moved by something else as well (a stop, stick and slip) still does at some, or where most of the motion is.
@@ -31,13 +31,13 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
         ));
         return;
     }
-    if together.is_empty() {
+    if coherent.is_empty() {
         return;
     }
     // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
-    let total: f64 = together.iter().map(|f| s.power(MAIN, *f)).sum();
+    let total: f64 = coherent.iter().map(|f| s.power(MAIN, *f)).sum();
     let mut sum = 0.0;
-    let low: Vec<usize> = together
+    let low: Vec<usize> = coherent
         .iter()
         .copied()
         .take_while(|f| {

@@ -12,11 +12,11 @@
 //!
 //! A finding of severity [`Severity::Refuse`] says that a verdict from this record would be about its defect.
 
-mod balance;
 mod channels;
 mod encoders;
 mod finding;
 mod least;
+mod momentum;
 mod pairs;
 mod robust;
 mod spectra;
@@ -209,7 +209,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let [one, two] = &mended;
         let part = Input { theta1: one.as_deref().or(part.theta1), theta2: two.as_deref().or(part.theta2), ..part };
         pairs::speeds(&part, &mut findings);
-        band = balance::examine(&part, &mut inertia, &mut findings);
+        band = momentum::examine(&part, &mut inertia, &mut findings);
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }

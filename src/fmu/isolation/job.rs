@@ -193,7 +193,7 @@ pub(super) enum Received {
 /// How many bytes are still to come of a whole answer; 0 where that is not known yet.
 pub(super) fn rest(bytes: &[u8], nonce: &Nonce) -> u64 {
     let length = |at: usize| bytes.get(at..at + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_ne_bytes);
-    match judge(bytes, nonce) {
+    match classify(bytes, nonce) {
         Received::Part if bytes.len() >= 32 => {
             length(16).saturating_add(length(24)).saturating_add(32).saturating_sub(bytes.len() as u64)
         }
@@ -202,7 +202,7 @@ pub(super) fn rest(bytes: &[u8], nonce: &Nonce) -> u64 {
 }
 
 /// Judges what has come.
-pub(super) fn judge(bytes: &[u8], nonce: &Nonce) -> Received {
+pub(super) fn classify(bytes: &[u8], nonce: &Nonce) -> Received {
     let head = bytes.len().min(nonce.len());
     if bytes[..head] != nonce[..head] {
         return Received::Forged;
@@ -261,13 +261,13 @@ mod tests {
         let record = Record { time: vec![0.0, 1.0], step: 1.0, columns: vec![column], notes: vec![] };
         let answer = Answer { record: Some(Head::of(&record)), ..Answer::default() };
         let mut bytes = answer.encode(&order.nonce, numbers(&record)).unwrap();
-        assert_eq!(judge(&bytes, &order.nonce), Received::Part);
+        assert_eq!(classify(&bytes, &order.nonce), Received::Part);
         send_numbers(&record, &mut bytes).unwrap();
-        assert_eq!(judge(&bytes, &order.nonce), Received::Whole);
+        assert_eq!(classify(&bytes, &order.nonce), Received::Whole);
         let (answer, rest) = Answer::decode(&bytes).unwrap();
         assert_eq!(answer.record.unwrap().record(rest).unwrap(), record);
         bytes.push(0);
-        assert_eq!(judge(&bytes, &order.nonce), Received::Forged);
-        assert_eq!(judge(b"{}", &order.nonce), Received::Forged);
+        assert_eq!(classify(&bytes, &order.nonce), Received::Forged);
+        assert_eq!(classify(b"{}", &order.nonce), Received::Forged);
     }
 }

@@ -10,7 +10,7 @@ use std::process::Command;
 use std::process::{Child, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use super::job::{Job, Nonce, Order, Received, judge, rest};
+use super::job::{Job, Nonce, Order, Received, classify, rest};
 use super::page::{Mapped, Page};
 use super::sandbox::{Strength, wanted};
 use super::{Ended, Outcome, Place, temporary};
@@ -83,13 +83,13 @@ pub(super) fn run(place: &Place<'_>, job: Job) -> io::Result<Outcome> {
 fn outcome(streams: Streams, ended: Ended, longest: Duration, page: &Page, nonce: &Nonce) -> Outcome {
     let mut ended = ended;
     let mut answer = None;
-    match judge(&streams.answer, nonce) {
+    match classify(&streams.answer, nonce) {
         Received::Whole => answer = Some(streams.answer),
         Received::Forged if ended == Ended::Well => ended = Ended::Forges,
         Received::Part | Received::Forged => {}
     }
     let left = page.take();
-    if answer.is_none() && judge(&left, nonce) == Received::Whole {
+    if answer.is_none() && classify(&left, nonce) == Received::Whole {
         answer = Some(left);
     }
     let (call, last) = page.call();
@@ -218,7 +218,7 @@ impl Streams {
         loop {
             self.wait();
             self.drain();
-            if judge(&self.answer, nonce) == Received::Forged {
+            if classify(&self.answer, nonce) == Received::Forged {
                 return (Some(Ended::Forges), longest);
             }
             // Room for all of it at once, within reason: growing by and by copies it again and again.
@@ -231,7 +231,7 @@ impl Streams {
             if page.call.load(Relaxed) != 0 {
                 longest = longest.max(now - since);
             }
-            if calls != count || page.call.load(Relaxed) == 0 && judge(&self.answer, nonce) == Received::Part {
+            if calls != count || page.call.load(Relaxed) == 0 && classify(&self.answer, nonce) == Received::Part {
                 (count, since) = (calls, now);
             }
             // The answer is on its way, or there is none: what hangs then is the process' end.

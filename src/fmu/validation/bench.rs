@@ -202,12 +202,12 @@ impl<'a> Bench<'a> {
                 *strength = Some(outcome.strength);
             }
         }
-        let (verdict, findings, learned) = self.judge(rule, outcome);
+        let (verdict, findings, learned) = self.verdict_of(rule, outcome);
         (self.progress)(rule.id, self.total);
         Ok(((rule, verdict, findings), learned))
     }
 
-    fn judge(&self, rule: &'static Rule, outcome: Outcome) -> (Verdict, Vec<Finding>, Option<Learned>) {
+    fn verdict_of(&self, rule: &'static Rule, outcome: Outcome) -> (Verdict, Vec<Finding>, Option<Learned>) {
         // The temporary folder's name says nothing, and would differ from run to run.
         let folders = [self.folder, self.scratch.path()].map(|folder| format!("{}/", folder.display()));
         let finding = |message: String, call: Option<String>| Finding {

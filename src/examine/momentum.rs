@@ -77,12 +77,12 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
         }
     }
     let Some((spectra, lines)) = lines else {
-        alone(input, &columns, collocated, inertia, findings);
+        whole_record(input, &columns, collocated, inertia, findings);
         return None;
     };
     // A line that stands alone passed by chance.
-    let together: Vec<usize> = lines.windows(3).filter(|w| w[2] - w[0] == 2).map(|w| w[1]).collect();
-    let [first, last] = match (together.first(), together.last()) {
+    let adjacent: Vec<usize> = lines.windows(3).filter(|w| w[2] - w[0] == 2).map(|w| w[1]).collect();
+    let [first, last] = match (adjacent.first(), adjacent.last()) {
         (Some(first), Some(last)) => [*first, *last],
         _ => [lines[0], lines[lines.len() - 1]],
     };
@@ -97,7 +97,7 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
 
 /// A record without lines that averages could show: too short for its slow motion, or of a foreign torque. The balance is
 /// asked of the record as a whole, at the lines that hold the motion; few lines say nothing.
-fn alone(
+fn whole_record(
     input: &Input<'_>,
     columns: &[&[f64]],
     collocated: bool,
@@ -247,7 +247,7 @@ fn directions(speed: &[f64], findings: &mut Vec<Finding>) {
 }
 
 /// The balance of one record: regressors, lines and what they hold.
-struct Balance<'a> {
+struct MomentumBalance<'a> {
     s: &'a Spectra,
     lines: &'a [usize],
     collocated: bool,
@@ -266,7 +266,7 @@ struct Found {
     inertial: f64,
 }
 
-impl Balance<'_> {
+impl MomentumBalance<'_> {
     /// The regressors at a line: column and factor.
     fn regressors(&self, f: usize) -> [(usize, Complex<f64>); 6] {
         let w = self.s.omega(f);
@@ -337,7 +337,7 @@ fn weigh(
     findings: &mut Vec<Finding>,
 ) -> Option<f64> {
     let total: f64 = lines.iter().map(|f| s.power(T, *f)).sum();
-    let mut balance = Balance { s, lines, collocated, table: None, total };
+    let mut balance = MomentumBalance { s, lines, collocated, table: None, total };
     if total <= 0.0 {
         return None;
     }
