@@ -4,8 +4,9 @@
 use std::ops::Range;
 
 use super::finding::{Finding, Severity, runs};
-use super::robust::{self, deviation, quantile, rms, span, step};
+use super::robust::{self, quantile, span, step};
 use super::{Channel, Input};
+use crate::numerics::level::{deviation, rms};
 
 /// Least samples of a stretch that counts as stuck.
 const STUCK: usize = 20;

@@ -2,7 +2,8 @@
 
 use super::Input;
 use super::finding::{Finding, Severity};
-use super::robust::{rms, step};
+use super::robust::step;
+use crate::numerics::level::rms;
 
 /// Factors between units that are taken for one another, and what to say of them.
 pub(super) const FACTORS: [(f64, &str); 7] = [

@@ -6,18 +6,6 @@ pub(super) fn span(values: &[f64]) -> f64 {
     if high > low { high - low } else { 0.0 }
 }
 
-/// Root mean square about the mean.
-pub(super) fn deviation(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
-}
-
-/// Root mean square.
-pub(super) fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
 /// Most values that a quantile is taken of: of a longer column every so many-th.
 const SAMPLED: usize = 100_000;
 

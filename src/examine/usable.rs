@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::Input;
 use super::finding::{Finding, Severity};
-use super::robust::{deviation, quantile, span, step};
+use super::robust::{quantile, span, step};
+use crate::numerics::level::deviation;
 
 /// Blocks that a record is cut into to look for stretches without drive.
 const BLOCKS: usize = 100;

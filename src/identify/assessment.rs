@@ -5,8 +5,9 @@ use super::output_error::{Free, OutputError};
 use super::parameters::Estimated;
 use super::result::{ExcitationEstimate, MethodResult, OutputFit, Series};
 use super::run::{Method, NOISE_FREE, torque_unit};
-use super::statistics::{deviation, rms, spectrum, whiteness};
+use super::statistics::{spectrum, whiteness};
 use crate::axis::{Parameters, Scheme, Structure};
+use crate::numerics::level::{deviation, rms};
 use crate::trace::{Motion, Signal};
 
 /// Least samples of a record of which a part is held out.

@@ -22,9 +22,9 @@ use rustfft::num_complex::Complex;
 use super::levenberg::{self, Normal, Problem, Termination};
 use super::parameters::Estimated;
 use super::result::{FrequencyResponse, ResponseOf};
-use super::statistics::dft;
 use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use crate::effects::Settings;
+use crate::numerics::spectrum::dft;
 use crate::trace::{Signal, Trace, TraceError};
 
 type C = Complex<f64>;

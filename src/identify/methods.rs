@@ -10,8 +10,9 @@ use super::record::Record;
 use super::regression::{NOISE_ORDER, RegressionError, extended_batch, extended_recursive, least_squares, recursive};
 use super::result::{History, MethodResult};
 use super::run::{Method, Request, hold_name, torque_unit};
-use super::statistics::{rms, whiteness};
+use super::statistics::whiteness;
 use crate::axis::{Parameters, Scheme, Structure};
+use crate::numerics::level::rms;
 use crate::trace::Machine;
 
 /// One record with what the methods share.

@@ -22,9 +22,9 @@ use super::joined::{Joined, noise_in_pieces};
 use super::levenberg::{self, Normal, Problem, Termination};
 use super::lsq::triangularise;
 use super::parameters::Estimated;
-use super::statistics::rms;
 use crate::axis::{Parameters, Response, Scheme, SimulateOptions, Structure, simulate, substeps};
 use crate::effects::{Reading, Settings};
+use crate::numerics::level::rms;
 use crate::scalar::{Dual, Scalar};
 use crate::trace::{Signal, Trace, TraceError};
 

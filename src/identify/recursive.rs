@@ -94,13 +94,7 @@ impl<const P: usize> Els<P> {
 mod tests {
     use super::*;
     use crate::identify::lsq::triangularise;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-
-    fn noise(n: usize, seed: u64) -> Vec<f64> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
-    }
+    use crate::numerics::level::noise;
 
     #[test]
     fn without_forgetting_it_is_least_squares_up_to_the_bias_of_p0() {

@@ -634,10 +634,10 @@ fn batch<const P: usize>(
         })
         .collect();
     let mut fitted = Fitted { phi: plain, covariance: plain_covariance, coefficients: Vec::new() };
-    let left = super::statistics::rms(&(0..n).map(|k| row(k).1).collect::<Vec<_>>());
+    let left = crate::numerics::level::rms(&(0..n).map(|k| row(k).1).collect::<Vec<_>>());
     for round in 1..=ROUNDS {
         // Without a residual beyond rounding there is no noise to model.
-        if super::statistics::rms(&residual) <= 1e-11 * left {
+        if crate::numerics::level::rms(&residual) <= 1e-11 * left {
             return Ok(fitted);
         }
         let past = |k: usize, lag: usize| if place(k) >= lag { residual[k - lag] } else { 0.0 };

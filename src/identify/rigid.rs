@@ -28,7 +28,8 @@ use super::result::{
     Estimate, ExcitationEstimate, Identification, MethodResult, OutputFit, Recommendation, SCHEMA, Series,
 };
 use super::run::{Request, summary};
-use super::statistics::{rms, spectrum};
+use super::statistics::spectrum;
+use crate::numerics::level::rms;
 use crate::trace::{Machine, Motion, Signal, TraceError};
 
 /// Least samples of half a window.

@@ -9,8 +9,9 @@ use super::output_error::OutputError;
 use super::record::{Record, period};
 use super::result::{Identification, MethodResult, Recommendation, SCHEMA, Series, TraceSummary};
 use super::rigid;
-use super::statistics::{rms, spectrum};
+use super::statistics::spectrum;
 use crate::axis::{Hold, Scheme, Structure};
+use crate::numerics::level::rms;
 use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
 
 /// An estimator.

@@ -171,7 +171,7 @@ fn under_noise_iv_and_oe_stay_within_their_standard_errors_where_ls_is_biased() 
     let mut noisy = paper(Hold::Linear);
     let sizes: Vec<f64> = [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2]
         .iter()
-        .map(|s| super::statistics::rms(noisy.get(*s).unwrap()))
+        .map(|s| crate::numerics::level::rms(noisy.get(*s).unwrap()))
         .collect();
     // 40 dB on every channel (PAPER.md, table of noise).
     disturb(&mut noisy, |i, n| {
