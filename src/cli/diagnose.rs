@@ -328,7 +328,16 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
         let span = channels[i].as_ref().map_or(0.0, |v| v.iter().fold(0.0_f64, |m, x| m.max(x.abs())));
         noise.std[i].max(1e-9 * span).max(1e-12)
     });
-    let record = Record { start: trace.start, dt: trace.dt, hold: trace.hold, torque, between: None, channels, noise: std, idle };
+    let record = Record {
+        start: trace.start,
+        dt: trace.dt,
+        hold: trace.hold,
+        torque,
+        between: None,
+        channels,
+        noise: std,
+        idle,
+    };
     let [reference, command] = [Signal::Reference, Signal::Command].map(|s| trace.get(s).map(<[f64]>::to_vec));
     Ok(Recorded { record, noise, warnings, reference, command })
 }

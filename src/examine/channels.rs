@@ -179,7 +179,9 @@ fn stuck_torque(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     let Some(motion) = input.channels().find(|c| c.name != "T" && span(c.values) > 0.0) else { return Vec::new() };
     let speed: Vec<f64> = if motion.name.starts_with("theta") {
-        motion.values.windows(2).map(|w| w[1] - w[0]).collect()
+        // Over several samples, so that a slow motion stands out of the encoder's noise.
+        let apart = STUCK / 2;
+        motion.values.windows(apart + 1).map(|w| w[apart] - w[0]).collect()
     } else {
         motion.values.to_vec()
     };

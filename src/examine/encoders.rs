@@ -8,6 +8,17 @@ use super::momentum::{COHERENT, MAIN, T, TABLE};
 use super::pairs::factor;
 use super::spectra::Spectra;
 use super::{Input, Structure};
+use crate::numerics::level::deviation;
+
+/// Twist over motion, both about their means, up to which the table goes along with the motor whatever their spectra say: of a slow
+/// motion the spectra of the speed hold little but noise.
+const ALONG: f64 = 0.05;
+
+fn goes_along(input: &Input<'_>) -> bool {
+    let (Some(x1), Some(x2)) = (input.theta1, input.theta2) else { return false };
+    let twist: Vec<f64> = x1.iter().zip(x2).map(|(a, b)| a - b).collect();
+    deviation(&twist) < ALONG * deviation(x1)
+}
 
 /// The two encoders against each other: sign, scale, and which one is the motor's.
 pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
@@ -20,7 +31,7 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     let driven = || 0..=lines[lines.len() - 1];
     let common: f64 = driven().map(|f| s.power(MAIN, f) * s.coherence(MAIN, TABLE, f)).sum();
     let motion: f64 = driven().map(|f| s.power(MAIN, f)).sum();
-    if (own as f64) < 0.1 * lines.len() as f64 && common < chance.max(0.3) * motion {
+    if (own as f64) < 0.1 * lines.len() as f64 && common < chance.max(0.3) * motion && !goes_along(input) {
         findings.push(Finding::new(
             "foreign",
             Severity::Refuse,

@@ -177,6 +177,31 @@ fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
     assert!(longest.start == 0 && (7900..8600).contains(&longest.end), "{longest:?}");
 }
 
+/// Slow triangles under control, with an encoder whose noise from sample to sample is as large as the motion.
+#[test]
+fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_no_foreign_one() {
+    let (dt, n) = (1e-3, 3000);
+    let (mut e1, mut e2) = (noise(1, 6e-4), noise(2, 6e-4));
+    let inertia = Parameters::PAPER.i1 + Parameters::PAPER.i2;
+    let (gain, damping) = (inertia * 900.0, inertia * 42.0);
+    let wanted = |k: usize| 0.2 * ((k.min(2 * n / 3) as f64 * dt).rem_euclid(1.0) - 0.5).abs();
+    let (mut x, mut v, mut before) = (wanted(0), 0.0, wanted(0));
+    let (mut torque, mut x1, mut x2) = (vec![], vec![], vec![]);
+    for k in 0..n {
+        let seen = x + e1();
+        x1.push(seen);
+        x2.push(x + e2());
+        let t = if k < 2 * n / 3 { gain * (wanted(k) - seen) - damping * (seen - before) / dt } else { 0.0 };
+        before = seen;
+        torque.push(t);
+        v = if k < 2 * n / 3 { v + t / inertia * dt } else { 0.9 * v };
+        x += v * dt;
+    }
+    let input = Input { dt, torque: Some(&torque), theta1: Some(&x1), theta2: Some(&x2), ..Input::default() };
+    let found = examine(&input);
+    assert!(found.find("stuck").is_none() && found.find("foreign").is_none(), "{:#?}", found.findings);
+}
+
 #[test]
 fn real_records_are_sound() {
     let Some(data) = crate::skip::traces("") else { return };
