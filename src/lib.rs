@@ -2,7 +2,7 @@
 //! and the diagnosis of the gap between the model and the machine.
 //!
 //! Imports run downward only: `cli -> fleet -> report -> diagnose -> identify -> trace -> axis -> effects`,
-//! `cli -> examine -> trace`, `diagnose, identify, examine -> numerics`, `cli -> fmu -> variables -> axis`, `fmi2 -> variables` and `fmi3 -> fmi2`.
+//! `cli -> examine -> trace`, `diagnose, identify, examine -> numerics`, `cli -> serve -> trace`, `cli -> fmu -> variables -> axis`, `fmi2 -> variables` and `fmi3 -> fmi2`.
 
 pub mod axis;
 pub mod drive;
@@ -30,6 +30,8 @@ pub mod identify;
 pub mod numerics;
 #[cfg(feature = "cli")]
 pub mod report;
+#[cfg(feature = "cli")]
+pub mod serve;
 #[cfg(feature = "cli")]
 pub mod trace;
 

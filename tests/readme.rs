@@ -22,6 +22,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("- uses: OWNER/eixo@main", "a pipeline's file; tests/validate/pipeline.rs runs the action's steps"),
     ("[controller]", "part of a file: that of tests/data/emps.toml"),
     ("name = \"X axis\"", "a file; the next test reads it"),
+    ("$ eixo serve", "runs until it is ended; tests/serve.rs and scripts/serve_in_chromium.py drive it"),
     ("$ .venv/bin/python scripts/dask_fleet.py", "a scheduler on another computer; tests/dask.rs runs it on this one"),
     ("$ scripts/venv.sh", "installs from the network; tests/importers.rs runs what it shows"),
     ("importer               difference", "the output of scripts/table.py, which tests/table.rs runs"),

@@ -1,7 +1,6 @@
 //! `eixo circle`: the circular test of machine tools (ISO 230-4), in simulation and as measured.
 
 use std::f64::consts::TAU;
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -134,8 +133,7 @@ fn tell(
     if let Some(file) = &args.report {
         write_text(file, html::page(&page()).as_bytes())?;
     }
-    let colour = std::io::stdout().is_terminal();
-    out!("{}", terminal::blocks(short, terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(short, super::stdout::layout(super::stdout::WIDTH)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -102,7 +102,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write_text(&file("report.html"), html::page(&report(&findings, &found, &circle)).as_bytes())?;
     steps.finish();
 
-    let layout = terminal::Layout { colour: std::io::stdout().is_terminal(), ..terminal::Layout::default() };
+    let layout = super::stdout::layout(super::stdout::WIDTH);
     out!("{}", terminal::blocks(&short(&findings), layout))?;
     out_line!(
         "\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n"
@@ -206,7 +206,7 @@ struct Steps(ProgressBar);
 
 impl Steps {
     fn new() -> Self {
-        if !std::io::stderr().is_terminal() {
+        if super::stdout::is_quiet() || !std::io::stderr().is_terminal() {
             return Self(ProgressBar::hidden());
         }
         let bar = ProgressBar::new_spinner();

@@ -1,17 +1,16 @@
 //! `eixo diagnose`.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::examined::{Believed, Examined, examined};
 use super::many::Many;
 use super::outputs;
-use super::stdout::{out, out_line};
+use super::progress::Progress;
+use super::stdout::{WIDTH, layout, out, out_line};
 use crate::axis::Structure;
 use crate::diagnose::{
     CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise,
@@ -43,7 +42,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "output")]
     holdout: Option<PathBuf>,
     /// Effects that must not be named, separated by commas
-    #[arg(long, value_delimiter = ',', value_name = "EFFECT")]
+    #[arg(long, value_delimiter = ',', value_name = "EFFECT", value_parser = super::names::effect(), hide_possible_values = true)]
     without: Vec<String>,
     /// Write the diagnosis as JSON (schema eixo.diagnosis/1)
     #[arg(long, value_name = "FILE", conflicts_with = "output")]
@@ -58,6 +57,8 @@ pub struct Args {
     believed: Believed,
     #[command(flatten)]
     many: Many,
+    #[command(flatten)]
+    progress: Progress,
 }
 
 /// What the summary of many traces says of each beside its parameters.
@@ -174,17 +175,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     outputs::check(inputs, [args.json.as_ref(), args.report.as_ref(), args.fmu.as_ref()])?;
     let trace = args.traces.first().context("no trace given")?;
     let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
-    let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{spinner} {elapsed} {msg}")?);
-    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| {
-        bar.set_message(what.to_owned());
-        bar.tick();
-    })?;
-    bar.finish_and_clear();
+    let steps = args.progress.steps();
+    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| steps.say(what))?;
+    steps.end();
     diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
     let findings = diagnosed.findings();
     let outcome = &diagnosed.outcome;
-    let colour = std::io::stdout().is_terminal();
-    out!("{}", terminal::blocks(&short(&findings), terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(&short(&findings), layout(WIDTH)))?;
     if let Some(path) = &args.json {
         let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis))?;
         text.push('\n');

@@ -11,6 +11,7 @@ use crate::effects::{EFFECTS, Effect, EffectInfo, Role};
 #[command(after_help = "Example: eixo effects\n         eixo effects backlash")]
 pub struct Args {
     /// Tell all of this effect: equation, parameters, signature, literature
+    #[arg(value_parser = super::names::effect(), hide_possible_values = true)]
     effect: Option<String>,
     /// Write the list as a Markdown table
     #[arg(long, conflicts_with = "effect")]

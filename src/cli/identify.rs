@@ -275,7 +275,7 @@ fn found(result: &Identification, record: Option<&Joined>) -> anyhow::Result<Fou
 }
 
 fn progress() -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
+    if super::stdout::is_quiet() || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new_spinner();
@@ -363,7 +363,7 @@ fn paper_tables(json: Option<&Path>) -> anyhow::Result<ExitCode> {
         blocks.push(Block::Paragraph(t.verdict.clone()));
     }
     blocks.extend(tables.words.iter().cloned().map(Block::Paragraph));
-    out!("{}", terminal::blocks(&blocks, terminal::Layout { width: 120, colour: false }))?;
+    out!("{}", terminal::blocks(&blocks, terminal::Layout { colour: false, ..super::stdout::layout(120) }))?;
     if let Some(path) = json {
         write_text(path, &serde_json::to_vec_pretty(&tables)?)?;
     }

@@ -1,22 +1,23 @@
 //! `eixo init`: from a foreign log to the axis.toml that reads it.
 
 use std::fmt::Write as _;
-use std::io::{BufRead, IsTerminal, Write as _};
+use std::io::{BufRead, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
 
 use super::examined::Part;
+use super::names::{offering, signals_equal};
 use super::outputs;
-use super::stdout::{out, out_line};
+use super::stdout::{WIDTH, layout, out, out_line};
 use crate::axis::Structure;
 use crate::examine::{Examination, Input, examine};
 use crate::identify::run::{Request, identify};
 use crate::report::examine::{Inspected, findings, report, verdict};
 use crate::report::{Block, Cell, Table as Shown, html, terminal};
 use crate::trace::guess::{Guess, Role, SURE, guess};
-use crate::trace::{Machine, Motion, Quantity, Signal, Table, Trace, from_table, write_text};
+use crate::trace::{Machine, Motion, Quantity, Signal, Table, Trace, Unit, from_table, nearest, write_text};
 
 /// Arguments of `eixo init`.
 #[derive(Debug, clap::Args)]
@@ -35,6 +36,19 @@ pub struct Args {
     /// Ask nothing: take what the names, units and numbers say
     #[arg(long, short)]
     yes: bool,
+    /// What a column is: time, T, theta1, theta2, x2, omega1, omega2 or reference; nothing behind the = for none. May be given many
+    /// times; what is not given is guessed
+    #[arg(long, value_name = "SIGNAL=COLUMN", value_parser = offering(pair, signals_equal), hide_possible_values = true)]
+    column: Vec<(String, String)>,
+    /// The unit of a signal whose column has none in its header, as in theta1=deg
+    #[arg(long, value_name = "SIGNAL=UNIT", value_parser = offering(pair, signals_equal), hide_possible_values = true)]
+    unit: Vec<(String, String)>,
+    /// How many N.m (N on a linear axis) one of the torque's column is, where that is a current or counts
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = super::examined::finite)]
+    torque_constant: Option<f64>,
+    /// The sampling interval of a log without a column of time, s
+    #[arg(long, value_name = "S", value_parser = super::examined::positive)]
+    dt: Option<f64>,
     /// Write over files that are there
     #[arg(long)]
     force: bool,
@@ -80,7 +94,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let table = Table::read(&args.log)?;
     let file = args.log.display().to_string();
     let mut asker = Asker { yes: args.yes };
-    let made = make(&table, &mut asker)?;
+    let made = make(&table, &args, &mut asker)?;
     let text = write(&made, &table, None, &file);
     let machine =
         Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
@@ -104,8 +118,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Verdict(verdict(&examination))];
     blocks.extend(loaded.warnings.iter().cloned().map(Block::Warning));
     blocks.extend(findings(&examination).into_iter().filter(|b| !matches!(b, Block::Table(_))));
-    let colour = std::io::stdout().is_terminal();
-    out!("{}", terminal::blocks(&blocks, terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(&blocks, layout(WIDTH)))?;
     out_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
     out_line!("{}: the log, drawn", page.display())?;
     out_line!("next: eixo identify {} --axis {}", quoted(&file), quoted(&axis.display().to_string()))?;
@@ -167,15 +180,18 @@ impl Asker {
 }
 
 /// What the columns are, asking where names and units do not say it.
-fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
+fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
     let mut guesses = guess(table);
+    given(table, args, &mut guesses)?;
+    let told = |role: Role| args.column.iter().any(|(s, _)| role_of(s).ok() == Some(role));
     for (role, question) in [
         (Role::Signal(Signal::T), "Which column is the torque, force or motor current?"),
         (Role::Signal(Signal::Theta1), "Which column is the position of the motor?"),
     ] {
         let there = guesses.iter().position(|g| g.role == role);
         let table_side = guesses.iter().any(|g| matches!(g.role, Role::Signal(Signal::Theta2 | Signal::X2)));
-        if there.is_some_and(|k| guesses[k].score >= SURE)
+        if told(role)
+            || there.is_some_and(|k| guesses[k].score >= SURE)
             || (role == Role::Signal(Signal::Theta1) && there.is_none() && table_side)
         {
             continue;
@@ -232,7 +248,10 @@ fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
     guesses.retain(fits);
     let mut dt = None;
     if !guesses.iter().any(|g| g.role == Role::Time) {
-        let answer = asker.ask("No column is a time. What is the sampling interval in seconds?", "0.001");
+        let answer = args.dt.map_or_else(
+            || asker.ask("No column is a time. What is the sampling interval in seconds?", "0.001"),
+            |s| s.to_string(),
+        );
         let given = answer.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
         dt = Some(given.with_context(|| format!("the sampling interval is {answer:?}: give seconds, as in 0.001"))?);
     }
@@ -240,15 +259,74 @@ fn make(table: &Table, asker: &mut Asker) -> anyhow::Result<Made> {
     let torque = guesses.iter().find(|g| g.role == Role::Signal(Signal::T)).context("no torque")?;
     if !torque.unit.is_some_and(|u| matches!(u.quantity, Quantity::Torque | Quantity::Force)) {
         let unit = Signal::T.unit(motion);
-        let answer = asker.ask(
-            &format!("{} is no torque by its unit. How many {unit} is one of it (the torque constant)?", torque.column),
-            "1",
-        );
+        let question =
+            format!("{} is no torque by its unit. How many {unit} is one of it (the torque constant)?", torque.column);
+        let answer = args.torque_constant.map_or_else(|| asker.ask(&question, "1"), |k| k.to_string());
         let given = answer.parse::<f64>().ok().filter(|v| v.is_finite() && *v != 0.0);
         torque_scale =
             given.with_context(|| format!("the torque constant is {answer:?}: give a number, as in 0.52"))?;
     }
     Ok(Made { guesses, motion, dt, torque_scale })
+}
+
+/// `NAME=VALUE` as two words.
+fn pair(text: &str) -> Result<(String, String), String> {
+    let cut = text.split_once('=').map(|(a, b)| (a.trim().to_owned(), b.trim().to_owned()));
+    cut.filter(|(a, _)| !a.is_empty()).ok_or_else(|| "give NAME=VALUE".to_owned())
+}
+
+/// The role that a name stands for.
+fn role_of(name: &str) -> anyhow::Result<Role> {
+    if name == "time" {
+        return Ok(Role::Time);
+    }
+    let all = || std::iter::once("time").chain(Signal::ALL.iter().map(|s| s.name()));
+    let near = || {
+        format!("there is no such signal{}; they are {}", nearest(name, all()), all().collect::<Vec<_>>().join(", "))
+    };
+    Signal::from_name(name).map(Role::Signal).with_context(|| format!("{name}: {}", near()))
+}
+
+/// Puts what the user says in the place of what was guessed.
+fn given(table: &Table, args: &Args, guesses: &mut Vec<Guess>) -> anyhow::Result<()> {
+    for (name, column) in &args.column {
+        let role = role_of(name).context("--column")?;
+        guesses.retain(|g| g.role != role && g.column != *column);
+        if column.is_empty() {
+            continue;
+        }
+        let at = table.position(column).with_context(|| {
+            let near = nearest(column, table.headers.iter().map(|h| h.name.as_str()));
+            format!(
+                "--column {name}={column}: {} has no such column{near}; its columns are: {}",
+                table.file,
+                table.names()
+            )
+        })?;
+        let header = &table.headers[at];
+        let unit = header
+            .unit
+            .as_deref()
+            .and_then(Unit::parse)
+            .or_else(|| crate::trace::guess::suffix(&header.name).map(|(_, u)| u));
+        guesses.push(Guess { role, column: header.name.clone(), unit, score: SURE });
+    }
+    for (name, symbol) in &args.unit {
+        let role = role_of(name).context("--unit")?;
+        let unit = Unit::parse(symbol)
+            .with_context(|| format!("--unit {name}={symbol}: the unit is not known, as rad, deg, N.m, A or ms are"))?;
+        let guess = guesses.iter_mut().find(|g| g.role == role);
+        let guess =
+            guess.with_context(|| format!("--unit {name}: no column is taken for it; name one with --column"))?;
+        let own = table.position(&guess.column).and_then(|k| table.headers[k].unit.as_deref()).and_then(Unit::parse);
+        anyhow::ensure!(
+            own.is_none_or(|u| u == unit),
+            "--unit {name}={symbol}: the header says {}; where that is wrong, mend it there",
+            own.map_or("", |u| u.symbol)
+        );
+        guess.unit = Some(unit);
+    }
+    Ok(())
 }
 
 /// Inertias, damping and stiffness as the log has them, roughly; None where it says nothing.

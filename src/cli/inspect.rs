@@ -1,13 +1,12 @@
 //! `eixo inspect`: what is to be known of a record before it is believed.
 
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use super::FINDINGS;
 use super::examined::Part;
 use super::outputs;
-use super::stdout::out;
+use super::stdout::{WIDTH, layout, out};
 use crate::examine::{Input, examine};
 use crate::report::examine::{Inspected, report, short};
 use crate::report::{html, terminal};
@@ -72,7 +71,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.report {
         write_text(path, html::page(&report(&seen)).as_bytes())?;
     }
-    let colour = std::io::stdout().is_terminal();
-    out!("{}", terminal::blocks(&short(&seen), terminal::Layout { colour, ..terminal::Layout::default() }))?;
+    out!("{}", terminal::blocks(&short(&seen), layout(WIDTH)))?;
     Ok(if examination.refuses() { ExitCode::from(FINDINGS) } else { ExitCode::SUCCESS })
 }

@@ -111,8 +111,7 @@ impl Many {
         bar.finish_and_clear();
         let outcome = done?;
         if self.part.is_empty() {
-            let colour = std::io::stdout().is_terminal();
-            out!("{}", terminal::blocks(&outcome.short, terminal::Layout { colour, width: 120 }))?;
+            out!("{}", terminal::blocks(&outcome.short, super::stdout::layout(120)))?;
             out_line!("\n{}", output.join("index.html").display())?;
         }
         if outcome.reused > 0 {
@@ -147,7 +146,7 @@ fn is_summary(path: &Path) -> bool {
 }
 
 fn progress(traces: u64) -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
+    if super::stdout::is_quiet() || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new(traces);

@@ -21,6 +21,9 @@ Examples:
   eixo identify trace.csv --report identification.html
   eixo diagnose log.csv --axis axis.toml --report diagnosis.html")]
 pub struct Cli {
+    /// Print no results and no progress: only warnings and errors; files are written and the exit code tells
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -48,7 +51,10 @@ mod inspect;
 mod limits;
 mod man;
 mod many;
+mod names;
 mod outputs;
+mod progress;
+mod serve;
 mod simulate;
 mod stdout;
 mod validate;
@@ -94,6 +100,8 @@ commands! {
     Diagnose => diagnose,
     /// Circular test (ISO 230-4), measured or in simulation: what deviates, and what each takes of the circularity
     Circle => circle,
+    /// Serve a page on this computer alone: bring a log, confirm its columns, diagnose it, open the report
+    Serve => serve,
     /// List the effects that a nominal axis leaves out: place, equation, parameters, signature
     Effects => effects,
     /// Write a completion script for a shell
@@ -106,14 +114,18 @@ commands! {
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    if cli.quiet {
+        stdout::be_quiet();
+    }
     outputs::survive_limits();
     match cli.command.run() {
         Ok(code) => code,
         Err(error) => {
             if let Some(refused) = error.downcast_ref::<examined::Refused>() {
-                let colour = std::io::IsTerminal::is_terminal(&std::io::stdout());
-                let layout = crate::report::terminal::Layout { colour, ..Default::default() };
-                let said = stdout::out!("{}", crate::report::terminal::blocks(&refused.blocks(), layout));
+                let said = stdout::out!(
+                    "{}",
+                    crate::report::terminal::blocks(&refused.blocks(), stdout::layout(stdout::WIDTH))
+                );
                 return ExitCode::from(if said.is_ok() { FINDINGS } else { COULD_NOT_RUN });
             }
             eprintln!("error: {}", crate::report::format::printable(&format!("{error:#}")));

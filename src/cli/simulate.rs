@@ -11,6 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::examined::Part;
 use super::limits;
+use super::names::{offering, settings, signals, signals_equal, text};
 use super::outputs;
 use super::stdout::out_line;
 use crate::fmu::contained::{self, Host, simulate};
@@ -18,7 +19,7 @@ use crate::fmu::isolation;
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting};
 use crate::report::format::printable;
-use crate::trace::{Hold, Machine, Table, load, write_columns};
+use crate::trace::{Hold, Machine, Table, load, nearest, write_columns};
 
 /// Arguments of `eixo simulate`.
 #[derive(Debug, clap::Args)]
@@ -35,13 +36,13 @@ pub struct Args {
     #[arg(short, long, value_name = "CSV")]
     pub output: PathBuf,
     /// A parameter or start value, as in coulomb_motor.level=0.01; may be given many times
-    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting)]
+    #[arg(long, visible_alias = "start-value", value_name = "NAME=VALUE", value_parser = offering(parse_setting, settings), hide_possible_values = true)]
     pub set: Vec<Setting>,
     /// Outputs to record, separated by commas; all by default
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = text(signals), hide_possible_values = true)]
     pub outputs: Vec<String>,
     /// White noise on the recorded outputs: NAME=STANDARD_DEVIATION, or a signal-to-noise ratio for all of them, as in 60dB
-    #[arg(long, value_name = "NOISE", value_delimiter = ',', value_parser = parse_noise)]
+    #[arg(long, value_name = "NOISE", value_delimiter = ',', value_parser = offering(parse_noise, signals_equal), hide_possible_values = true)]
     pub noise: Vec<Noise>,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
@@ -50,13 +51,13 @@ pub struct Args {
     #[arg(long, value_enum)]
     pub hold: Option<HoldArg>,
     /// Start, s; by default the input's
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, visible_alias = "start-time", allow_negative_numbers = true)]
     pub start: Option<f64>,
     /// End, s; by default the input's
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, visible_alias = "stop-time", allow_negative_numbers = true)]
     pub stop: Option<f64>,
     /// Communication step, s; by default the input's sampling interval
-    #[arg(long)]
+    #[arg(long, visible_alias = "output-interval")]
     pub step: Option<f64>,
     /// Close the drive's loop of the axis.toml's `[controller]`: the input is the trace of the reference, T what the drive commands
     #[arg(long, requires = "input", conflicts_with_all = ["start", "stop", "step", "step_end", "hold"])]
@@ -130,7 +131,8 @@ fn add_noise(record: &mut Record, noise: &[Noise], seed: u64) -> anyhow::Result<
             && !record.columns.iter().any(|c| c.name == *name)
         {
             let names: Vec<&str> = record.columns.iter().map(|c| c.name.as_str()).collect();
-            bail!("--noise {name}: no such column is recorded; the columns are: {}", names.join(", "));
+            let near = nearest(name, names.iter().copied());
+            bail!("--noise {name}: no such column is recorded{near}; the columns are: {}", names.join(", "));
         }
     }
     for (stream, column) in record.columns.iter_mut().enumerate() {

@@ -1,15 +1,41 @@
 //! Writing to standard output, which a reader such as `head` may close before the end: what a command was asked to do goes
 //! on, its files are written, its exit code stays.
 
-use std::io::{ErrorKind, Result, Write};
+use std::io::{ErrorKind, IsTerminal, Result, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::report::terminal::Layout;
 
 /// Whether a result goes to standard output: what is said to people then goes to standard error.
 static RESULT_ON_OUTPUT: AtomicBool = AtomicBool::new(false);
 
+/// Whether nothing is said to people.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From here on nothing is said.
+pub fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether nothing is said to people.
+pub fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
 /// From here on what is said goes to standard error.
 pub fn to_stderr() {
     RESULT_ON_OUTPUT.store(true, Ordering::Relaxed);
+}
+
+/// Characters a line where nobody says how many there are.
+pub const WIDTH: u16 = 100;
+
+/// How tables are laid out: as wide as the terminal or `COLUMNS` says, 60 to 200 characters; `otherwise` where output goes elsewhere.
+pub fn layout(otherwise: u16) -> Layout {
+    let given = std::env::var("COLUMNS").ok().and_then(|c| c.trim().parse().ok());
+    let seen = || terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| width.0);
+    let width = given.or_else(seen).map_or(otherwise, |w: u16| w.clamp(60, 200));
+    Layout { width, colour: std::io::stdout().is_terminal() }
 }
 
 /// Writes to standard output; a reader that has gone is no error.
@@ -17,6 +43,9 @@ pub fn to_stderr() {
 /// # Errors
 /// When the output cannot be written for another reason, as to a full disk.
 pub fn write(text: std::fmt::Arguments<'_>) -> Result<()> {
+    if is_quiet() {
+        return Ok(());
+    }
     let written = if RESULT_ON_OUTPUT.load(Ordering::Relaxed) {
         std::io::stderr().write_fmt(text)
     } else {

@@ -152,7 +152,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         allow: args.allow.clone(),
         ..defaults
     };
-    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(
+        None,
+        if super::stdout::is_quiet() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() },
+    );
     bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")?);
     isolation::adopt_orphans();
     let report = validate(fmu, &options, &|rule, total| {

@@ -1,0 +1,254 @@
+//! A diagnosis in a process of its own, this program again: so that it can be stopped, and that what it does cannot end the page.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What stands before a line of progress.
+pub const PROGRESS: &str = "progress: ";
+/// Between two looks at a process.
+const LOOK: Duration = Duration::from_millis(40);
+/// From asking a process to end to ending it.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// How far a diagnosis is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// It works.
+    Running,
+    /// It has an answer.
+    Done,
+    /// The record cannot carry one.
+    Refused,
+    /// It could not run.
+    Failed,
+    /// It was stopped.
+    Stopped,
+}
+
+impl State {
+    /// Its name.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Refused => "refused",
+            Self::Failed => "failed",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// What is known of it.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// How far it is.
+    pub state: State,
+    /// The steps behind it, the present one last: what the diagnosis itself says it does.
+    pub steps: Vec<String>,
+    /// What it printed, or why it could not run.
+    pub said: String,
+    /// What went wrong beside the diagnosis, as a circle that could not be drawn.
+    pub aside: Option<String>,
+    /// How long it took, s.
+    pub seconds: f64,
+}
+
+/// A diagnosis.
+#[derive(Debug)]
+pub struct Job {
+    told: Mutex<Told>,
+    stop: AtomicBool,
+    began: Instant,
+}
+
+impl Job {
+    /// Starts one in a folder that holds `axis.toml` and the log.
+    pub fn start(folder: PathBuf, log: String, trust: bool) -> Arc<Self> {
+        let told = Told {
+            state: State::Running,
+            steps: vec!["reading the log".to_owned()],
+            said: String::new(),
+            aside: None,
+            seconds: 0.0,
+        };
+        let job = Arc::new(Self { told: Mutex::new(told), stop: AtomicBool::new(false), began: Instant::now() });
+        let own = Arc::clone(&job);
+        std::thread::spawn(move || {
+            let state = own.work(&folder, &log, trust);
+            let mut told = own.lock();
+            told.seconds = own.began.elapsed().as_secs_f64();
+            told.state = state;
+        });
+        job
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Told> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What is known of it now.
+    pub fn told(&self) -> Told {
+        let mut told = self.lock().clone();
+        if told.state == State::Running {
+            told.seconds = self.began.elapsed().as_secs_f64();
+        }
+        told
+    }
+
+    /// Ends it.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::SeqCst);
+    }
+
+    /// Waits until its process has ended.
+    pub fn join(&self) {
+        while self.lock().state == State::Running {
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    fn work(&self, folder: &Path, log: &str, trust: bool) -> State {
+        let mut diagnose =
+            vec!["diagnose", log, "--axis", "axis.toml", "--json", "diagnosis.json", "--report", "report.html"];
+        diagnose.extend(["--fmu", "improved.fmu", "--progress", "lines"]);
+        if trust {
+            diagnose.push("--trust");
+        }
+        for old in ["diagnosis.json", "report.html", "improved.fmu", "circle.html"] {
+            let _ = std::fs::remove_file(folder.join(old));
+        }
+        let ended = self.run(folder, &diagnose);
+        if self.stop.load(Ordering::SeqCst) {
+            return State::Stopped;
+        }
+        match ended {
+            Ok((Some(0), said, _)) => self.lock().said = said,
+            Ok((Some(1), said, _)) => {
+                self.lock().said = said;
+                return State::Refused;
+            }
+            Ok((_, _, errors)) => {
+                self.lock().said = errors;
+                return State::Failed;
+            }
+            Err(error) => {
+                self.lock().said = error.to_string();
+                return State::Failed;
+            }
+        }
+        self.lock().steps.push("the circular test".to_owned());
+        let circle = ["circle", "axis.toml", "--diagnosed", "diagnosis.json", "--report", "circle.html"];
+        match self.run(folder, &circle) {
+            _ if self.stop.load(Ordering::SeqCst) => return State::Stopped,
+            Ok((Some(0 | 1), _, _)) => {}
+            Ok((_, _, errors)) => self.lock().aside = Some(errors),
+            Err(error) => self.lock().aside = Some(error.to_string()),
+        }
+        State::Done
+    }
+
+    /// Runs this program for the diagnosis.
+    fn run(&self, folder: &Path, arguments: &[&str]) -> std::io::Result<Ended> {
+        run(folder, arguments, &self.stop, &|step| self.step(step))
+    }
+
+    /// The next step.
+    fn step(&self, step: &str) {
+        // A count that goes on is one step.
+        let counted =
+            |s: &str| s.split_once(' ').filter(|(n, _)| n.parse::<u64>().is_ok()).map(|(_, what)| what.to_owned());
+        let mut told = self.lock();
+        if told.steps.last().is_some_and(|last| counted(last).is_some() && counted(last) == counted(step)) {
+            told.steps.pop();
+        }
+        if told.steps.last().is_none_or(|last| last != step) {
+            told.steps.push(step.to_owned());
+        }
+    }
+}
+
+/// How a process ended: exit code, what it printed, its errors.
+pub type Ended = (Option<i32>, String, String);
+
+/// Runs this program in a folder until it ends or is to stop; `step` gets its lines of progress.
+///
+/// # Errors
+/// When it cannot be started, or what it prints not be kept.
+pub fn run(
+    folder: &Path,
+    arguments: &[&str],
+    stop: &AtomicBool,
+    step: &(dyn Fn(&str) + Sync),
+) -> std::io::Result<Ended> {
+    let printed = folder.join("printed.txt");
+    let mut command = Command::new(std::env::current_exe()?);
+    command.args(arguments).current_dir(folder).stdin(Stdio::null());
+    command.stdout(File::create(&printed)?).stderr(Stdio::piped());
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt;
+        command.process_group(0);
+    }
+    let mut child = command.spawn()?;
+    let errors = child.stderr.take();
+    let (status, errors) = std::thread::scope(|scope| {
+        let reader = scope.spawn(|| listen(errors, step));
+        let status = wait(&mut child, stop);
+        (status, reader.join().unwrap_or_default())
+    });
+    Ok((status?.code(), std::fs::read_to_string(&printed)?, errors))
+}
+
+/// Hands on the lines of progress, keeps the others.
+fn listen(errors: Option<std::process::ChildStderr>, step: &(dyn Fn(&str) + Sync)) -> String {
+    let mut kept = String::new();
+    for line in errors.into_iter().flat_map(|e| BufReader::new(e).lines()).map_while(Result::ok) {
+        if let Some(what) = line.strip_prefix(PROGRESS) {
+            step(what);
+        } else if kept.len() < 16 << 10 {
+            kept.push_str(&line);
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
+/// Waits for the process, or ends it when that is asked for.
+fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<ExitStatus> {
+    let mut asked: Option<Instant> = None;
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(status);
+        }
+        if stop.load(Ordering::SeqCst) {
+            match asked {
+                None => {
+                    end(child, false);
+                    asked = Some(Instant::now());
+                }
+                Some(at) if at.elapsed() > GRACE => end(child, true),
+                Some(_) => {}
+            }
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Ends a process and those of its group: first so that it can clear up, then at once.
+fn end(child: &mut Child, at_once: bool) {
+    #[cfg(unix)]
+    if let Ok(id) = i32::try_from(child.id()) {
+        use nix::sys::signal::{Signal, killpg};
+        let signal = if at_once { Signal::SIGKILL } else { Signal::SIGTERM };
+        if killpg(nix::unistd::Pid::from_raw(id), signal).is_ok() {
+            return;
+        }
+    }
+    let _ = at_once;
+    let _ = child.kill();
+}
