@@ -36,7 +36,7 @@ fn tables_fit_every_width_from_60_to_200() {
     let folder = tempfile::tempdir().unwrap();
     prepare(folder.path());
     let mut widest = Vec::new();
-    for columns in [60, 72, 80, 100, 132, 200] {
+    for columns in [60, 80, 200] {
         let mut most = 0;
         for arguments in [
             &["identify", "trace.csv", "--axis", "axis.toml"][..],
@@ -58,7 +58,7 @@ fn tables_fit_every_width_from_60_to_200() {
         widest.push(most);
     }
     // What is wide is used where it is there.
-    assert!(widest[5] > 100, "{widest:?}");
+    assert!(widest[2] > 100, "{widest:?}");
     // Less than 60 is not laid out for: as for 60.
     assert_eq!(
         wide(folder.path(), 20, &["identify", "trace.csv", "--axis", "axis.toml"]).stdout,
