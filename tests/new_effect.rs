@@ -67,7 +67,7 @@ fn copied(target: &Path) -> PathBuf {
         std::fs::remove_dir_all(&copied).unwrap();
     }
     std::fs::create_dir_all(&copied).unwrap();
-    for name in ["Cargo.toml", "Cargo.lock", "build.rs", "src", "benches"] {
+    for name in ["Cargo.toml", "Cargo.lock", "build.rs", "src", "benches", "modelDescription", "LICENSE"] {
         copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join(name), &copied.join(name));
     }
     copied

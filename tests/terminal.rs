@@ -77,7 +77,7 @@ fn quiet_is_quiet_and_writes_all_the_same() {
     let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
     assert_eq!(read("one.json"), read("two.json"));
     // A result on standard output is a file; an error is told.
-    let piped = eixo_in(folder.path(), &["excite", "-o", "-", "--samples", "64", "--quiet"]);
+    let piped = eixo_in(folder.path(), &["excite", "-o", "-", "--samples", "256", "--quiet"]);
     assert!(String::from_utf8_lossy(&piped.stdout).starts_with("time"), "{}", String::from_utf8_lossy(&piped.stdout));
     let failed = eixo_in(folder.path(), &["identify", "nothing.csv", "--quiet"]);
     assert!(failed.status.code() == Some(2) && !failed.stderr.is_empty());

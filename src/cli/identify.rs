@@ -166,7 +166,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if machine.controller.is_some() && result.recommended.is_some() {
         said.extend(super::controlled::identified(path, args.believed.part, &machine, &improved(&machine, &result)?)?);
     }
-    out!("{}", terminal::blocks(&said, terminal::Layout::default()))?;
+    out!("{}", terminal::blocks(&said, super::stdout::layout(super::stdout::WIDTH)))?;
     if let Some(path) = &args.json {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }

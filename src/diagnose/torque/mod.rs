@@ -45,6 +45,8 @@ use tracking::{Resolution, Tracked, track};
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
 const SEARCHED: usize = 16_384;
 
+/// Noises that an account at the rate of the band may leave for it to be settled at the record's own.
+const NEAR: f64 = 30.0;
 /// Steps of the fit through which a band sees its noise.
 const REFERRED: usize = 24;
 
@@ -61,11 +63,19 @@ struct Prepared {
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
-    let searched = prepared(&train, &case.nominal);
+    let mut searched = prepared(&train, &case.nominal);
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects = case.suspects.iter().copied().filter(may).collect();
-    let problem = Problem::new(&searched.record, &searched.band, case.nominal);
-    let decision = decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress });
+    let decided = |p: &Prepared, suspects: Vec<Effect>| {
+        let problem = Problem::new(&p.record, &p.band, case.nominal);
+        decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress })
+    };
+    let mut decision = decided(&searched, suspects);
+    if let Some(own) = settled_at_its_own_rate(&train, &searched, &decision, case.nominal) {
+        progress("at the record's own rate");
+        decision = decided(&own, likely(&decision));
+        searched = own;
+    }
     progress("held-out data");
     let models = [decision.given.model, decision.parameters.model, decision.chosen.model];
     let on_train = gap::measure(&searched.record, &models);
@@ -134,6 +144,26 @@ fn prepared(record: &Record, nominal: &Model) -> Prepared {
     }
     let slow = band::decimate(&whole, limit);
     referred(slow.part(0..band::smooth(slow.len().min(SEARCHED))), nominal, limit).0
+}
+
+/// The record at its own rate, where what was found at that of its band leaves so little that the rate's own error counts.
+fn settled_at_its_own_rate(record: &Record, slow: &Prepared, found: &Decision, nominal: Model) -> Option<Prepared> {
+    let thinned = slow.record.instants() > 1 && nominal.structure == Structure::TwoInertia;
+    let near = !found.chosen.terms.is_empty() && slow.band.noise_multiple(&found.chosen.rows) < NEAR;
+    (thinned && near).then(|| {
+        let whole = record.part(0..band::smooth(record.len()));
+        let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
+        referred(whole.part(0..band::smooth(whole.len().min(SEARCHED))), &nominal, limit).0
+    })
+}
+
+/// The effects of the likeliest hypotheses.
+fn likely(decision: &Decision) -> Vec<Effect> {
+    let mut effects: Vec<Effect> =
+        decision.ranking.iter().take(TOLD).flat_map(|w| w.fit.terms.iter().map(|t| t.0)).collect();
+    effects.sort_unstable();
+    effects.dedup();
+    effects
 }
 
 /// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,

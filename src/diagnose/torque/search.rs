@@ -341,12 +341,7 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.
     fn leaves_little(&self, fit: &Fit) -> bool {
-        self.total(fit.discrepancy) < MINOR * self.total(self.gap)
-    }
-
-    /// Variance of the torque lacking in all equations.
-    fn total(&self, s: Discrepancy) -> f64 {
-        s.iter().take(self.band().equations()).sum()
+        (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
     }
 
     /// Whether what a fit leaves is less than a log's torque is true to.
@@ -369,7 +364,7 @@ impl Search<'_> {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
         (0..self.band().equations())
-            .any(|i| after[i] <= (1.0 - share) * before[i] && before[i] - after[i] >= MINOR * self.total(self.gap))
+            .any(|i| after[i] <= (1.0 - share) * before[i] && before[i] - after[i] >= MINOR * self.gap[i])
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
