@@ -53,7 +53,8 @@ pub fn blocks(blocks: &[Block], layout: Layout) -> String {
             Block::Verdict(v) => verdict(v, layout),
             Block::Paragraph(text) => wrapped(text, layout.width, ""),
             Block::Warning(text) => {
-                format!("{} {}", painted("warning:", Tone::Finding, layout), wrapped(text, layout.width, "  "))
+                let lines = wrapped(&format!("warning: {text}"), layout.width, "  ");
+                lines.replacen("warning:", &painted("warning:", Tone::Finding, layout), 1)
             }
             Block::Steps(steps) => steps
                 .iter()
