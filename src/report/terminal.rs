@@ -53,7 +53,7 @@ pub fn blocks(blocks: &[Block], layout: Layout) -> String {
             Block::Verdict(v) => verdict(v, layout),
             Block::Paragraph(text) => wrapped(text, layout.width, ""),
             Block::Warning(text) => {
-                let lines = wrapped(&format!("warning: {text}"), layout.width, "  ");
+                let lines = wrapped(&format!("warning: {text}"), layout.width.saturating_sub(2), "  ");
                 lines.replacen("warning:", &painted("warning:", Tone::Finding, layout), 1)
             }
             Block::Steps(steps) => steps
