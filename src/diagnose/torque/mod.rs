@@ -1,6 +1,6 @@
 //! A rigid axis diagnosed by the torque that its model lacks to follow the record.
 //!
-//! [`search`] is the procedure, top to bottom; [`likelihood`] the one evidence, with sensor noise and model discrepancy in it;
+//! [`search`] is the procedure, top to bottom, [`conclusion`] its end; [`likelihood`] the one evidence, with sensor noise and model discrepancy in it;
 //! [`tracking`] what a model lacks; [`fit`] a hypothesis fitted; [`gap`] how far the gap shrinks on data that no fit has seen. A
 //! machine's log is made under control, its model never complete: its verdict must not be sought at the noise floor of a simulation
 //! (Gautier, Khalil, and the inverse dynamics of robot identification; Kennedy, O'Hagan, JRSS B 63(3), 2001, for the discrepancy).
@@ -8,6 +8,7 @@
 //! On a rigid axis motor, coupling and table are one place, called `axis`.
 
 mod band;
+mod conclusion;
 mod descent;
 mod fit;
 mod gap;
@@ -34,12 +35,13 @@ use super::repair::bridged;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
+use conclusion::LIKELY;
+pub use conclusion::{Confusable, Decision, Weighed};
 pub use fit::Fit;
 use fit::Problem;
 use gap::Gap;
 use likelihood::Band;
-pub use search::{Confusable, Decision, Weighed};
-use search::{LIKELY, Search, decide};
+use search::{Search, decide};
 use tracking::{Resolution, Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
@@ -63,7 +65,7 @@ struct Prepared {
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
-    let mut searched = prepared(&train, &case.nominal);
+    let (mut searched, own) = prepared(&train, &case.nominal);
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects = case.suspects.iter().copied().filter(may).collect();
     let decided = |p: &Prepared, suspects: Vec<Effect>| {
@@ -71,7 +73,9 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress })
     };
     let mut decision = decided(&searched, suspects);
-    if let Some(own) = settled_at_its_own_rate(&train, &searched, &decision, case.nominal) {
+    // What leaves so little that the error of the band's rate counts is settled at the record's own.
+    let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
+    if let Some(own) = own.filter(|_| near(&decision, &searched)) {
         progress("at the record's own rate");
         decision = decided(&own, likely(&decision));
         searched = own;
@@ -131,30 +135,17 @@ fn split(case: &Case<'_>) -> (Record, Record) {
 /// Noises up to which the parameters alone follow a record that is searched at its own rate: the one of the band is not that exact.
 const EXACT: f64 = 10.0;
 
-/// The record in the band of its motion.
-fn prepared(record: &Record, nominal: &Model) -> Prepared {
+/// The record in the band of its motion; and at its own rate, where that of its band is another and accounts near the noise are settled.
+fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
     let whole = record.part(0..band::smooth(record.len()));
-    let mask = band::mask(&whole);
-    let limit = band::limit(&whole, &mask, nominal.structure);
-    if nominal.structure == Structure::TwoInertia {
-        let (own, left) = referred(whole.part(0..band::smooth(whole.len().min(SEARCHED))), nominal, limit);
-        if left < EXACT {
-            return own;
-        }
+    let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
+    let searched = |r: &Record| referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit);
+    if nominal.structure == Structure::Rigid {
+        return (searched(&band::decimate(&whole, limit)).0, None);
     }
+    let (own, left) = searched(&whole);
     let slow = band::decimate(&whole, limit);
-    referred(slow.part(0..band::smooth(slow.len().min(SEARCHED))), nominal, limit).0
-}
-
-/// The record at its own rate, where what was found at that of its band leaves so little that the rate's own error counts.
-fn settled_at_its_own_rate(record: &Record, slow: &Prepared, found: &Decision, nominal: Model) -> Option<Prepared> {
-    let thinned = slow.record.instants() > 1 && nominal.structure == Structure::TwoInertia;
-    let near = !found.chosen.terms.is_empty() && slow.band.noise_multiple(&found.chosen.rows) < NEAR;
-    (thinned && near).then(|| {
-        let whole = record.part(0..band::smooth(record.len()));
-        let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
-        referred(whole.part(0..band::smooth(whole.len().min(SEARCHED))), &nominal, limit).0
-    })
+    if left < EXACT || slow.instants() == 1 { (own, None) } else { (searched(&slow).0, Some(own)) }
 }
 
 /// The effects of the likeliest hypotheses.

@@ -12,12 +12,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::super::model::{Coordinate, Free};
-use super::super::verdict::Verdict;
+use super::conclusion::Decision;
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
 use super::pool::Pool;
 use super::scales::Scales;
-use super::starts::{Regression, StartPoint, starts};
+use super::starts::{Look, StartPoint};
 use crate::axis::Structure;
 use crate::effects::Effect;
 
@@ -31,10 +31,6 @@ const MINOR: f64 = 0.0025;
 /// less of it in its twist.
 const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
-/// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
-const GAIN_LIKENESS: f64 = 0.25;
-/// Smallest relative change of the parameters that is called one.
-const GAIN_SEEN: f64 = 0.02;
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
 /// Effects whose richer forms are looked at, too.
@@ -48,100 +44,9 @@ const AGAIN: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
 /// Steps of a fit that is looked at.
-const PROBE: usize = 5;
-/// Share of the gap's power that the causes must explain together to be called its causes.
-const EXPLAINED: f64 = 0.75;
-/// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
-/// suspect.
-const LEFT: f64 = 0.25;
-/// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
-/// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
-const DOUBT: f64 = 0.5;
-/// Probability from which an effect may be named: as likely as one of two that the record cannot tell, and a remainder beside them.
-pub const LIKELY: f64 = 0.35;
-/// The same where no cause is named, white or not: more than the error of a measured current (one to five per cent).
-const UNCAUSED: f64 = 0.08;
-/// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
-const WHITE: f64 = 0.6;
+pub const PROBE: usize = 5;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
-
-/// A hypothesis with its evidence.
-#[derive(Debug, Clone)]
-pub struct Weighed {
-    /// What was fitted.
-    pub fit: Fit,
-    /// Log evidence.
-    pub evidence: f64,
-    /// Posterior probability among the hypotheses tried.
-    pub probability: f64,
-}
-
-/// An effect named, and another that explains the record as well in its place.
-#[derive(Debug, Clone, Copy)]
-pub struct Confusable {
-    /// The one named.
-    pub named: Effect,
-    /// The other.
-    pub other: Effect,
-    /// Log evidence with the named one less that with the other.
-    pub difference: f64,
-}
-
-/// The decision.
-#[derive(Debug, Clone)]
-pub struct Decision {
-    /// The verdict.
-    pub verdict: Verdict,
-    /// Whether the search ended before every exchange was tried.
-    pub cut_short: bool,
-    /// Model as given.
-    pub given: Fit,
-    /// Its parameters fitted.
-    pub parameters: Fit,
-    /// The hypothesis decided for.
-    pub chosen: Fit,
-    /// Every hypothesis that was fitted, best first.
-    pub ranking: Vec<Weighed>,
-    /// Share of the gap of each effect of the chosen hypothesis.
-    pub shares: Vec<f64>,
-    /// Probability of each.
-    pub probabilities: Vec<f64>,
-    /// Share of the values that are independent.
-    pub independent: f64,
-    /// Effects that the record cannot tell from chosen ones.
-    pub confusable: Vec<Confusable>,
-}
-
-impl Confusable {
-    /// Whether the two are the same but for where they act.
-    #[must_use]
-    pub fn is_of_place(&self) -> bool {
-        let (named, other) = (self.named.info(), self.other.info());
-        named.family == other.family && named.place != other.place
-    }
-}
-
-impl Decision {
-    /// True if the parameters all changed by one factor: a wrong torque constant.
-    #[must_use]
-    pub fn torque_gain(&self) -> Option<(f64, f64)> {
-        let f = &self.parameters;
-        if f.coordinates.is_empty() {
-            return None;
-        }
-        let change = |i: usize| (f.coordinates[i].value(&f.model) / f.coordinates[i].unit).ln();
-        let first = change(0);
-        // A rigid axis has one parameter: its change and a gain are the same thing.
-        let alike = f.coordinates.len() > 1
-            && (1..f.coordinates.len()).all(|i| {
-                let std = f.std[i] / f.coordinates[i].value(&f.model);
-                (change(i) - first).abs() <= GAIN_LIKENESS * first.abs() + 2.0 * std.min(0.2)
-            });
-        let std = f.std[0] / f.coordinates[0].value(&f.model);
-        (alike && first.abs() > GAIN_SEEN).then(|| ((-first).exp(), (-first).exp() * std))
-    }
-}
 
 /// A search over hypotheses.
 pub struct Search<'a> {
@@ -227,7 +132,7 @@ impl Search<'_> {
         admitted.max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
     }
 
-    fn at_floor(&self, fit: &Fit) -> bool {
+    pub fn at_floor(&self, fit: &Fit) -> bool {
         self.band().at_floor(&fit.rows)
     }
 
@@ -245,25 +150,20 @@ impl Search<'_> {
         while !shorter.is_empty() {
             let longer: Vec<(Fit, usize)> = shorter
                 .par_iter()
-                .flat_map_iter(|(fit, next)| own[*next..].iter().zip(*next..).map(move |(term, i)| (fit, *term, i)))
-                .filter(|(fit, term, _)| self.may_join(&fit.terms, term.0))
-                .filter_map(|(fit, term, i)| {
-                    let start = self.starts_of(fit, term).into_iter().next()?;
-                    let terms: Vec<Term> = fit.terms.iter().copied().chain([term]).collect();
-                    Some((self.problem.coarse().fit(&start.model, &terms, fit.discrepancy, PROBE)?, i + 1))
+                .filter_map(|(fit, next)| Some((fit, next, Look::beside(&self.problem, fit)?)))
+                .flat_map(|(fit, next, look)| {
+                    let begun = |(i, term): (usize, &Term)| -> Option<(Fit, usize)> {
+                        let start = look.starts(*term).into_iter().next()?;
+                        Some((look.fitted(&start, fit.terms.len(), fit.discrepancy)?, i + 1))
+                    };
+                    let joining = own.par_iter().enumerate().skip(*next);
+                    joining.filter(|(_, t)| self.may_join(&fit.terms, t.0)).filter_map(begun).collect::<Vec<_>>()
                 })
                 .collect();
             all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
             shorter = longer;
         }
         self.raced(all, Some(chosen))
-    }
-
-    fn starts_of(&self, fit: &Fit, term: Term) -> Vec<StartPoint> {
-        let problem = &self.problem.coarse();
-        let Some(scales) = &problem.scales else { return Vec::new() };
-        let fit = &problem.along_the_record(fit);
-        starts(problem, fit, &Regression::new(problem, fit), scales, term)
     }
 
     /// Whether an effect may stand beside these.
@@ -340,7 +240,7 @@ impl Search<'_> {
     }
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.
-    fn leaves_little(&self, fit: &Fit) -> bool {
+    pub fn leaves_little(&self, fit: &Fit) -> bool {
         (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
     }
 
@@ -369,16 +269,10 @@ impl Search<'_> {
 
     /// The fit with each effect that may join it, the best starts of all fitted.
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
-        let problem = &self.problem.coarse();
-        let Some(scales) = &problem.scales else { return Vec::new() };
-        let fit = &problem.along_the_record(fit);
-        let regression = Regression::new(problem, fit);
+        let Some(look) = Look::beside(&self.problem, fit) else { return Vec::new() };
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
         let of = |terms: Vec<Term>| -> Vec<StartPoint> {
-            terms
-                .par_iter()
-                .flat_map_iter(|t| starts(problem, fit, &regression, scales, *t).into_iter().take(2))
-                .collect()
+            terms.par_iter().flat_map_iter(|t| look.starts(*t).into_iter().take(2)).collect()
         };
         // Forms that free more than another are looked at where that other is among the best.
         let mut points = of(suspects.iter().flat_map(|e| forms(*e, false)).collect());
@@ -394,14 +288,8 @@ impl Search<'_> {
         points.extend(richer);
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         points.truncate(FITTED);
-        let probed = points
-            .par_iter()
-            .filter_map(|s| {
-                let mut terms = fit.terms.clone();
-                terms.insert(keep, s.term);
-                problem.fit(&s.model, &terms, fit.discrepancy, PROBE)
-            })
-            .collect();
+        let from = look.fit.discrepancy;
+        let probed = points.par_iter().filter_map(|start| look.fitted(start, keep, from)).collect();
         self.raced(probed, None)
     }
 
@@ -413,7 +301,7 @@ impl Search<'_> {
     }
 
     /// The fit without one of its effects, from where it stands.
-    fn refitted(&self, fit: &Fit, i: usize) -> Option<Fit> {
+    pub fn refitted(&self, fit: &Fit, i: usize) -> Option<Fit> {
         let mut terms = fit.terms.clone();
         let (gone, _) = terms.remove(i);
         let mut start = fit.model;
@@ -461,168 +349,11 @@ impl Search<'_> {
         }
         best
     }
-
-    /// The verdict on the hypothesis at the end.
-    fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, mut pool: Vec<Fit>) -> Decision {
-        pool.push(chosen.clone());
-        let independent = self.independent(std::slice::from_ref(&chosen));
-        let plain = if self.evidence(&parameters, independent) > self.evidence(&given, independent) {
-            &parameters
-        } else {
-            &given
-        };
-        let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
-        let explained = self.explained(&parameters, &chosen);
-        let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
-        let settled = self.at_floor(&chosen) || white;
-        let left = self.band().torque_share(chosen.discrepancy, self.problem.record);
-        // What the chosen hypothesis lacks no material part of is no rival of it, only itself and something small.
-        // Of accounts that leave next to nothing of the gap the shorter is told.
-        let little = self.leaves_little(&chosen);
-        let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
-        pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
-        let decisive: Vec<f64> =
-            (0..chosen.terms.len()).map(|i| self.decisive(&chosen, i, &parameters, &pool)).collect();
-        let mut ranking = self.weighed(pool, independent);
-        let probabilities: Vec<f64> = chosen
-            .terms
-            .iter()
-            .zip(&decisive)
-            .map(|((e, _), decisive)| {
-                let of: f64 = ranking
-                    .iter()
-                    .filter(|w| w.fit.terms.iter().any(|(o, _)| o.info().family == e.info().family))
-                    .map(|w| w.probability)
-                    .sum();
-                of * decisive * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
-            })
-            .collect();
-        let likely = |p: &f64| *p >= LIKELY;
-        if chosen.terms.len() > 1
-            && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
-            && !likely(&probabilities[least])
-            && let Some(refitted) = self.refitted(&chosen, least)
-        {
-            // What is named without an effect has no rival that has another such effect in it.
-            let pool: Vec<Fit> =
-                ranking.into_iter().map(|w| w.fit).filter(|f| f.terms.len() < chosen.terms.len()).collect();
-            let known = plainer(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
-            let plain = known.cloned().unwrap_or(refitted);
-            return self.conclude(given, parameters, plain, pool);
-        }
-        let likely = probabilities.iter().all(likely);
-        let verdict = match chosen.terms.is_empty() {
-            false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
-            false => Verdict::Unexplained,
-            true if left > UNCAUSED => Verdict::Unexplained,
-            true if chosen.coordinates.is_empty() => Verdict::NoGap,
-            true => Verdict::Parameters,
-        };
-        ranking.truncate(40);
-        let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
-        let shares = self.shares(&chosen);
-        let cut_short = self.cut_short.load(Ordering::Relaxed);
-        Decision {
-            verdict,
-            cut_short,
-            given,
-            parameters,
-            chosen,
-            ranking,
-            shares,
-            probabilities,
-            independent,
-            confusable,
-        }
-    }
-
-    /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
-    /// without it: what no effect explains may be what explains this one, too.
-    fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
-        let plain = if chosen.terms.len() == 1 { Some(parameters) } else { plainer(chosen, i, pool) };
-        let Some(plain) = plain else { return 1.0 };
-        let share = |e: usize| {
-            let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
-            if without > with { (without - with) / without } else { 0.0 }
-        };
-        (0..self.band().equations()).map(share).fold(0.0, f64::max)
-    }
-
-    /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.
-    fn explained(&self, parameters: &Fit, chosen: &Fit) -> f64 {
-        let (before, after) = (self.band().discrepancy(&parameters.rows), self.band().discrepancy(&chosen.rows));
-        let i = (0..self.band().equations())
-            .max_by(|a, b| {
-                let seen = |i: usize| before[i] / self.band().noise_power(i).max(f64::MIN_POSITIVE);
-                seen(*a).total_cmp(&seen(*b))
-            })
-            .unwrap_or(0);
-        if before[i] > 0.0 { (1.0 - after[i] / before[i]).clamp(0.0, 1.0) } else { 1.0 }
-    }
-
-    /// Each set of effects once, in its best forms, best first, with its probability.
-    fn weighed(&self, pool: Vec<Fit>, independent: f64) -> Vec<Weighed> {
-        let mut all: Vec<Weighed> = pool
-            .into_iter()
-            .map(|fit| Weighed { evidence: self.evidence(&fit, independent), fit, probability: 0.0 })
-            .filter(|w| w.evidence.is_finite() && !w.fit.at_bound)
-            .collect();
-        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        let key = |f: &Fit| {
-            let mut ids: Vec<Effect> = f.terms.iter().map(|t| t.0).collect();
-            ids.sort_unstable();
-            (ids, f.coordinates.is_empty())
-        };
-        let mut seen = Vec::new();
-        all.retain(|w| {
-            let k = key(&w.fit);
-            let new = !seen.contains(&k);
-            if new {
-                seen.push(k);
-            }
-            new
-        });
-        let top = all.first().map_or(0.0, |w| w.evidence);
-        let sum: f64 = all.iter().map(|w| (w.evidence - top).exp()).sum();
-        for w in &mut all {
-            w.probability = (w.evidence - top).exp() / sum;
-        }
-        all
-    }
-
-    /// Share of each effect: what comes back without it, everything else as it is.
-    fn shares(&self, fit: &Fit) -> Vec<f64> {
-        let own = self.band().discrepancy(&fit.rows);
-        let lost: Vec<f64> = fit
-            .terms
-            .iter()
-            .map(|(e, _)| {
-                let mut model = fit.model;
-                model.effects.of_mut(*e).copy_from_slice(self.problem.nominal.effects.of(*e));
-                let Some(rows) = self.problem.rows(&model, fit.bandwidth) else { return 1.0 };
-                let without = self.band().discrepancy(&rows);
-                (0..self.band().equations())
-                    .map(|i| (without[i] - own[i]).max(0.0) / self.band().noise_power(i).max(f64::MIN_POSITIVE))
-                    .sum::<f64>()
-            })
-            .collect();
-        let sum: f64 = lost.iter().sum();
-        lost.iter().map(|l| if sum > 0.0 { l / sum } else { 1.0 / lost.len() as f64 }).collect()
-    }
 }
 
 /// Whether a fit has all effects of another, and more.
-fn is_more(fit: &Fit, than: &Fit) -> bool {
+pub fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
-}
-
-/// The likeliest fit of all effects of another but one, each in its form: another form of one may do what the missing one does, and
-/// which of the two it is the evidence says.
-fn plainer<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
-    let mut terms = fit.terms.clone();
-    terms.remove(i);
-    let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
-    pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 /// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
@@ -641,21 +372,4 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
     let all = effect.info().variants;
     let contains = |v: usize| all[..v].iter().any(|p| p.free.iter().all(|i| all[v].free.contains(i)));
     (0..all.len()).filter(|v| contains(*v) == richer).map(|v| (effect, v)).collect()
-}
-
-/// Named effects that another family explains as well.
-fn confusable(chosen: &Fit, ranking: &[Weighed], evidence: f64) -> Vec<Confusable> {
-    let mut out: Vec<Confusable> = Vec::new();
-    for w in ranking.iter().filter(|w| evidence - w.evidence < ALIKE && w.fit.terms.len() == chosen.terms.len()) {
-        let gone: Vec<Effect> =
-            chosen.terms.iter().map(|t| t.0).filter(|e| w.fit.terms.iter().all(|t| t.0 != *e)).collect();
-        let come: Vec<Effect> =
-            w.fit.terms.iter().map(|t| t.0).filter(|e| chosen.terms.iter().all(|t| t.0 != *e)).collect();
-        if let ([named], [other]) = (&gone[..], &come[..])
-            && !out.iter().any(|c| c.named == *named && c.other == *other)
-        {
-            out.push(Confusable { named: *named, other: *other, difference: evidence - w.evidence });
-        }
-    }
-    out
 }

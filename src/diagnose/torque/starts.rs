@@ -2,8 +2,9 @@
 
 use super::super::model::Model;
 use super::fit::{Fit, Problem, Term};
-use super::likelihood::{C, Weight};
+use super::likelihood::{C, Discrepancy, Weight};
 use super::scales::Scales;
+use super::search::PROBE;
 use crate::effects::{Place, Role, Scale, Settings, Start};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -17,8 +18,40 @@ pub struct StartPoint {
     pub gain: f64,
 }
 
+/// A fit beside which effects are looked for: along the motion as measured, stepped coarsely.
+pub struct Look<'a> {
+    problem: Problem<'a>,
+    /// The fit, along the motion as measured.
+    pub fit: Fit,
+    regression: Regression,
+}
+
+impl<'a> Look<'a> {
+    /// `None` before the scales of the record are known.
+    pub fn beside(problem: &Problem<'a>, fit: &Fit) -> Option<Self> {
+        let problem = problem.coarse();
+        problem.scales.as_ref()?;
+        let fit = problem.along_the_record(fit);
+        let regression = Regression::new(&problem, &fit);
+        Some(Self { problem, fit, regression })
+    }
+
+    /// Starts of one form of an effect beside the fit's, the best first.
+    pub fn starts(&self, term: Term) -> Vec<StartPoint> {
+        let scales = self.problem.scales.as_ref();
+        scales.map_or_else(Vec::new, |scales| starts(&self.problem, &self.fit, &self.regression, scales, term))
+    }
+
+    /// A few steps of a fit from a start and a discrepancy, the effect told at place `keep`.
+    pub fn fitted(&self, start: &StartPoint, keep: usize, from: Discrepancy) -> Option<Fit> {
+        let mut terms = self.fit.terms.clone();
+        terms.insert(keep, start.term);
+        self.problem.fit(&start.model, &terms, from, PROBE)
+    }
+}
+
 /// Projects the present columns out, and regresses.
-pub struct Regression {
+struct Regression {
     q: Vec<Vec<f64>>,
     z: Vec<f64>,
     s: [f64; 2],
@@ -26,7 +59,7 @@ pub struct Regression {
 }
 
 impl Regression {
-    pub fn new(p: &Problem<'_>, fit: &Fit) -> Self {
+    fn new(p: &Problem<'_>, fit: &Fit) -> Self {
         let s = fit.discrepancy;
         let mut q: Vec<Vec<f64>> = Vec::new();
         for c in &fit.columns {
@@ -42,7 +75,7 @@ impl Regression {
     }
 
     /// Coefficients of columns for the lacking torque to vanish, and the gain in log likelihood; negative coefficients where not allowed are dropped.
-    pub fn solve(&self, p: &Problem<'_>, columns: &[[Vec<C>; 2]], signed: &[bool]) -> Option<(Vec<f64>, f64)> {
+    fn solve(&self, p: &Problem<'_>, columns: &[[Vec<C>; 2]], signed: &[bool]) -> Option<(Vec<f64>, f64)> {
         let j: Vec<Vec<f64>> = columns
             .iter()
             .map(|c| {
@@ -80,12 +113,12 @@ impl Regression {
         Some((c, gain))
     }
 
-    pub fn residual(&self) -> &[f64] {
+    fn residual(&self) -> &[f64] {
         &self.z
     }
 }
 
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 fn orthogonalise(q: &[Vec<f64>], v: &mut [f64]) {
@@ -174,7 +207,7 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
 }
 
 /// Starts of one form of an effect beside the fit's, the best first.
-pub fn starts(p: &Problem<'_>, fit: &Fit, reg: &Regression, scales: &Scales, term: Term) -> Vec<StartPoint> {
+fn starts(p: &Problem<'_>, fit: &Fit, reg: &Regression, scales: &Scales, term: Term) -> Vec<StartPoint> {
     let (effect, form) = term;
     let info = effect.info();
     let side = usize::from(info.place == Place::Table);
