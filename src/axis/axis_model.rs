@@ -4,7 +4,7 @@ use super::mechanics::Mechanics;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
 use super::propagator::Linear;
-use crate::effects::{ActiveEffects, Effect, Memory, Modes, Reading, Settings};
+use crate::effects::{ActiveEffects, Coordinate, Effect, Memory, Modes, Reading, Settings, memory_of};
 use crate::scalar::Scalar;
 
 /// The axis with its effects, prepared for steps of one length.
@@ -129,13 +129,21 @@ impl<S: Scalar> Axis<S> {
             }
         }
         let p = &self.full.parameters;
-        match self.full.structure {
-            Structure::Rigid => s.linear[1] += (taken[0] + taken[1]) / (p.i1 + p.i2),
-            Structure::TwoInertia => {
-                let (motor, table) = (taken[0] / p.i1, taken[1] / p.i2);
-                s.linear[1] += motor;
-                s.linear[3] += motor - table;
-            }
+        let [motor, table] = match self.full.structure {
+            Structure::Rigid => [(taken[0] + taken[1]) / (p.i1 + p.i2); 2],
+            Structure::TwoInertia => [taken[0] / p.i1, taken[1] / p.i2],
+        };
+        s.linear[1] += motor;
+        if self.full.structure == Structure::TwoInertia {
+            s.linear[3] += motor - table;
+        }
+        for effect in self.full.on.forces().iter().filter(|e| e.info().memory > 0) {
+            let jump = match effect.info().place.coordinate() {
+                Coordinate::Motor => motor,
+                Coordinate::Table => table,
+                Coordinate::Twist => motor - table,
+            };
+            effect.jumped(self.full.effects.of(*effect), &mut s.memory[memory_of(*effect)], jump);
         }
         let moves = [mode(s.omega1()), mode(s.omega2())];
         for i in 0..2 {

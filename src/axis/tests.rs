@@ -360,3 +360,21 @@ fn duals_agree_with_plain_numbers() {
         }
     }
 }
+
+#[test]
+fn an_impulse_leaves_a_third_inertia_its_speed() {
+    let mut effects = Settings::default();
+    effects.of_mut(Effect::FlexibleMode)[..3].copy_from_slice(&[2e-6, 0.02, 1e-5]);
+    let a = axis(effects, Scheme::Exact, 1e-4);
+    let mut s = a.state(0.0, 1.0, 0.0, 0.5, 0.0);
+    for k in 0..50 {
+        s = a.advance(&s, Ramp::held(0.01), f64::from(k) * 1e-4);
+    }
+    // The internal states are relative to the table.
+    let relative = crate::effects::memory_of(Effect::FlexibleMode).start + 1;
+    let third = |s: &State| s.omega2() - s.memory()[relative];
+    let (table, before) = (s.omega2(), third(&s));
+    let taken = a.kick(&mut s, [0.0, 1e-6], 1e-4, 5e-3);
+    assert!((s.omega2() - table - taken[1] / P.i2).abs() < 1e-9 && taken[1] > 0.0);
+    assert!((third(&s) - before).abs() < 1e-9, "{before} {}", third(&s));
+}

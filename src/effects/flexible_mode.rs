@@ -7,7 +7,7 @@
 
 use super::extent::Extent;
 use super::family::Family;
-use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
+use super::info::{EffectInfo, ParameterInfo, Place, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use crate::scalar::Scalar;
 
@@ -25,21 +25,23 @@ fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia that swings")
         .nominal(1e-6)
-        .start(Start::Grid(Scale::Inertia, &[0.03, 0.3])),
-    ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the axis and it").start(
-        Start::Grid(
-            Scale::Mode,
-            &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0],
-        ),
-    ),
-    ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the axis and it")
-        .start(Start::Grid(Scale::One, &[0.05])),
+        .start(Start::Mode),
+    ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the axis and it").start(Start::Mode),
+    ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the axis and it").start(Start::Mode),
 ];
 const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0, 1, 2] }];
 const REFERENCE: &str = "Den Hartog, Mechanical Vibrations, 1956, chapter 3";
 
 fn rate(p: &[f64]) -> f64 {
     if p[0] > 0.0 { (p[1] / p[0]).sqrt() } else { 0.0 }
+}
+
+/// The third inertia keeps its speed when that of its place jumps.
+fn jumped<S: Scalar>(p: &[S], memory: &mut [S], jump: S) {
+    memory[1] += jump;
+    if p[0].re() > 0.0 {
+        memory[2] += p[2] / p[0] * jump;
+    }
 }
 
 #[inline]
@@ -100,6 +102,10 @@ impl Force for FlexibleMode {
         rate(p)
     }
 
+    fn jumped<S: Scalar>(p: &[S], memory: &mut [S], jump: S) {
+        jumped(p, memory, jump);
+    }
+
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
         torque(p, m, memory)
@@ -130,6 +136,10 @@ impl Force for MotorMode {
 
     fn rate(p: &[f64], _inertia: f64) -> f64 {
         rate(p)
+    }
+
+    fn jumped<S: Scalar>(p: &[S], memory: &mut [S], jump: S) {
+        jumped(p, memory, jump);
     }
 
     #[inline]

@@ -31,6 +31,12 @@ impl Effect {
         super::EFFECTS.iter().find_map(|e| Some((*e, e.gain_parameter()?)))
     }
 
+    /// Whether it is a constant torque alone: an amplifier's offset, a weight.
+    #[must_use]
+    pub fn is_bias(self) -> bool {
+        self.info().family == Family::LoadTorque
+    }
+
     /// The effect that rounds the readings, and the parameter that is its step.
     #[must_use]
     pub fn of_rounding() -> Option<(Self, usize)> {

@@ -59,6 +59,8 @@ pub enum Start {
     Share,
     /// Each of these multiples of the scale is tried.
     Grid(Scale, &'static [f64]),
+    /// Inertia, stiffness or damping of a mode: the spectra of motion and residual give all three together.
+    Mode,
     /// Its off value; a variant that frees it starts from there.
     Off,
 }
@@ -78,10 +80,6 @@ pub enum Scale {
     Rotation,
     /// The sampling interval.
     Sample,
-    /// The coupling's natural frequency, in Hz, or a tenth of the sampling rate for a rigid axis.
-    Mode,
-    /// The share of the two inertias together.
-    Inertia,
     /// Periods per radian, as far as the travel and the sampling let them be seen.
     Order,
     /// Frequencies in Hz, as the record lets them be seen.

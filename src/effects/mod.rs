@@ -100,6 +100,12 @@ macro_rules! effects {
                 self.info().memory == 1
             }
 
+            /// Whether it is a third inertia on a spring: inertia, stiffness and damping its first parameters.
+            #[must_use]
+            pub fn is_mode(self) -> bool {
+                self.info().parameters.iter().any(|p| p.start == Start::Mode)
+            }
+
             /// The parameter of a dry friction that is its level's share of the torque transmitted.
             #[must_use]
             pub const fn load_parameter(self) -> Option<usize> {
@@ -161,6 +167,13 @@ macro_rules! effects {
             pub(crate) fn rate(self, p: &[f64], inertia: f64) -> f64 {
                 match self {
                     $(Self::$name => when!(force, $shape, <$law>::rate(p, inertia), { let _ = (p, inertia); 0.0 }),)*
+                }
+            }
+
+            /// Brings its internal states along when the speed at its place jumps: see [`Force::jumped`].
+            pub(crate) fn jumped<S: Scalar>(self, p: &[S], memory: &mut [S], jump: S) {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law>::jumped(p, memory, jump), { let _ = (p, memory, jump); }),)*
                 }
             }
 

@@ -220,6 +220,9 @@ pub trait Force {
         0.0
     }
 
+    /// Brings the internal states along when the speed at its place jumps by `jump` rad/s: those that are relative to it.
+    fn jumped<S: Scalar>(_p: &[S], _memory: &mut [S], _jump: S) {}
+
     /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
 }

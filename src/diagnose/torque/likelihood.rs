@@ -17,7 +17,7 @@ use super::super::model::{BaseParameter, Model};
 use super::super::record::Record;
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
-use crate::effects::{Family, Place};
+use crate::effects::Place;
 
 /// Decades of variance below the residual's that a discrepancy is looked for in.
 const DECADES: i32 = 12;
@@ -95,7 +95,7 @@ pub type Discrepancy = [f64; 2];
 
 /// Dynamic stiffness in central differences: torque on each side over position of each, N.m/rad.
 pub fn stiffness(p: &Parameters, structure: Structure, w: f64, dt: f64) -> [[C; 2]; 2] {
-    let s2 = 2.0 * ((w * dt).cos() - 1.0) / (dt * dt);
+    let s2 = square(w, dt);
     let s1 = C::new(0.0, (w * dt).sin() / dt);
     if structure == Structure::Rigid {
         let z = C::default();
@@ -103,6 +103,17 @@ pub fn stiffness(p: &Parameters, structure: Structure, w: f64, dt: f64) -> [[C; 
     }
     let c = s1 * p.b + p.k;
     [[c + p.i1 * s2, -c], [-c, c + p.i2 * s2]]
+}
+
+/// The square of the differential operator in central differences, 1/s^2.
+fn square(w: f64, dt: f64) -> f64 {
+    2.0 * ((w * dt).cos() - 1.0) / (dt * dt)
+}
+
+/// The inertia that a third inertia on a spring, `[inertia, stiffness, damping]`, adds to its place at a frequency, kg.m2.
+fn mode_inertia([inertia, stiffness, damping]: [f64; 3], w: f64, dt: f64) -> C {
+    let pull = C::new(stiffness, damping * (w * dt).sin() / dt);
+    pull * inertia / (pull + inertia * square(w, dt))
 }
 
 impl Band {
@@ -271,17 +282,14 @@ impl Band {
     pub fn lacking(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> Lacking {
         let torque = &tracked.torque;
         // A mode of its own answers the error, too.
-        let mode = crate::effects::EFFECTS
-            .iter()
-            .copied()
-            .find(|e| e.info().family == Family::FlexibleMode && model.effects.is_on(*e))
-            .map(|effect| {
+        let mode =
+            crate::effects::EFFECTS.iter().copied().find(|e| e.is_mode() && model.effects.is_on(*e)).map(|effect| {
                 let side = usize::from(self.sight != Sight::Rigid && effect.info().place == Place::Table);
                 let mut e: Vec<C> =
                     tracked.error[side].iter().zip(&self.taper).map(|(e, w)| C::new(e * w, 0.0)).collect();
                 planner.plan_fft_forward(self.n).process(&mut e);
                 let p = model.effects.of(effect);
-                (side, e, p[0], p[1], p[2])
+                (side, e, [p[0], p[1], p[2]])
             });
 
         let mut z: Vec<C> = (0..self.n).map(|k| C::new(torque[0][k], torque[1][k]) * self.taper[k]).collect();
@@ -293,11 +301,8 @@ impl Band {
             let (a, b) = (z[m], z[(self.n - m) % self.n].conj());
             let mut one = (a + b) * (0.5 * scale);
             let mut two = (a - b) * C::new(0.0, -0.5 * scale);
-            if let Some((side, e, i3, k, b)) = &mode {
-                let w = self.omega[m];
-                let s2 = 2.0 * ((w * self.dt).cos() - 1.0) / (self.dt * self.dt);
-                let pull = C::new(*k, b * (w * self.dt).sin() / self.dt);
-                let z = pull * (i3 * s2) / (pull + i3 * s2) * e[m] * scale;
+            if let Some((side, e, mode)) = &mode {
+                let z = mode_inertia(*mode, self.omega[m], self.dt) * square(self.omega[m], self.dt) * e[m] * scale;
                 if *side == 0 { one += z } else { two += z }
             }
             if self.sight == Sight::Both {
@@ -328,20 +333,11 @@ impl Band {
             }
             Sight::Motor | Sight::Table => return None,
         };
-        let count = self.omega.len();
-        let spectrum = |f: &dyn Fn(usize) -> f64| -> Vec<C> {
-            let inside = |k: usize| if k == 0 || k + 1 >= self.n { 0.0 } else { f(k) * self.taper[k] };
-            let mut z: Vec<C> = (0..self.n).map(|k| C::new(inside(k), 0.0)).collect();
-            FftPlanner::new().plan_fft_forward(self.n).process(&mut z);
-            z.truncate(count);
-            z
-        };
-        let second = |y: &[f64], k: usize| (y[k + 1] - 2.0 * y[k] + y[k - 1]) / (self.dt * self.dt);
-        let twist = |k: usize| sides[0][k] - sides[1][k];
+        let twist: Vec<f64> = sides[0].iter().zip(sides[1]).map(|(a, b)| a - b).collect();
         Some(Motion {
-            acceleration: sides.map(|y| spectrum(&|k| second(y, k))),
-            twist: spectrum(&twist),
-            rate: spectrum(&|k| (twist(k + 1) - twist(k - 1)) / (2.0 * self.dt)),
+            acceleration: sides.map(|y| self.acceleration(y)),
+            rate: self.spectrum(|k| (twist[k + 1] - twist[k - 1]) / (2.0 * self.dt)),
+            twist: self.spectrum(|k| twist[k]),
         })
     }
 
@@ -357,6 +353,30 @@ impl Band {
             BaseParameter::B => [of(&motion.rate, by), of(&motion.rate, -by)],
             BaseParameter::K => [of(&motion.twist, by), of(&motion.twist, -by)],
         }
+    }
+
+    /// Spectrum of the acceleration of a motion.
+    pub fn acceleration(&self, y: &[f64]) -> Vec<C> {
+        self.spectrum(|k| (y[k + 1] - 2.0 * y[k] + y[k - 1]) / (self.dt * self.dt))
+    }
+
+    /// Spectrum in the band of a series that is told inside the record alone.
+    fn spectrum(&self, inside: impl Fn(usize) -> f64) -> Vec<C> {
+        let at = |k: usize| if k == 0 || k + 1 >= self.n { 0.0 } else { inside(k) * self.taper[k] };
+        let mut z: Vec<C> = (0..self.n).map(|k| C::new(at(k), 0.0)).collect();
+        FftPlanner::new().plan_fft_forward(self.n).process(&mut z);
+        z.truncate(self.omega.len());
+        z
+    }
+
+    /// What a third inertia on a spring, `[inertia, stiffness, damping]`, on one side adds to the rows along an acceleration.
+    pub fn mode_column(&self, side: usize, acceleration: &[C], mode: [f64; 3]) -> [Vec<C>; 2] {
+        let by = 1.0 / (self.n as f64).sqrt();
+        let torque = |m: usize| mode_inertia(mode, self.omega[m], self.dt) * acceleration[m] * by;
+        let seen = |m: usize| if self.sight == Sight::Both { torque(m) } else { self.combine[m][side] * torque(m) };
+        let row: Vec<C> = (0..self.omega.len()).map(seen).collect();
+        let none = vec![C::default(); self.omega.len()];
+        if self.sight == Sight::Both && side == 1 { [none, row] } else { [row, none] }
     }
 
     /// Half the sum of squares of the whitened rows.

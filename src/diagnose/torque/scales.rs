@@ -3,7 +3,7 @@
 use super::super::model::Model;
 use super::fit::{Fit, Problem};
 use crate::axis::Structure;
-use crate::effects::{Effect, Extent, Family, Place, Scale, Settings};
+use crate::effects::{Effect, Extent, Place, Scale};
 
 #[derive(Clone)]
 pub struct Scales {
@@ -15,8 +15,6 @@ pub struct Scales {
     pub travel: [[f64; 2]; 2],
     pub dt: f64,
     pub length: f64,
-    pub mode: f64,
-    pub inertia: f64,
     pub top: f64,
     pub fastest: [f64; 2],
     /// Positions of motor and table, sorted.
@@ -39,7 +37,6 @@ impl Scales {
         let (r2, t2) = side(2);
         let torque = &p.record.torque;
         let mean = torque.iter().sum::<f64>() / n;
-        let q = &p.nominal.parameters;
         Some(Self {
             torque: (torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / n).sqrt(),
             peak: torque.iter().fold(0.0, |m, t| t.abs().max(m)),
@@ -49,12 +46,6 @@ impl Scales {
             travel: [t1, t2],
             dt: p.record.dt,
             length: n * p.record.dt,
-            mode: if p.nominal.structure == Structure::TwoInertia {
-                q.modal().wn
-            } else {
-                0.5 * p.band.omega.last().copied().unwrap_or(1.0)
-            },
-            inertia: q.i1 + q.i2,
             top: p.band.omega.last().copied().unwrap_or(1.0),
             fastest: [1, 3].map(|i| t.motion.iter().fold(0.0_f64, |m, s| m.max(s[i].abs()))),
             positions: [0, 2].map(|i| {
@@ -100,24 +91,15 @@ impl Scales {
     }
 
     /// The value that is a fraction of a scale.
-    pub fn value(&self, effect: Effect, scale: Scale, f: f64, s: &Settings) -> f64 {
+    pub fn value(&self, effect: Effect, scale: Scale, f: f64) -> f64 {
         let side = usize::from(effect.info().place == Place::Table);
         match scale {
-            Scale::One if effect.info().family == Family::FlexibleMode => {
-                let p = s.of(effect);
-                2.0 * f * (p[0] * p[1]).sqrt()
-            }
             Scale::One | Scale::Order | Scale::Frequency => f,
             Scale::Speed => f * self.speed[side],
             Scale::Twist => f * self.twist,
             Scale::Torque => f * self.peak,
             Scale::Rotation => f * self.rotation[side],
             Scale::Sample => f * self.dt,
-            Scale::Mode => {
-                let w = f * self.mode;
-                s.of(effect)[0] * w * w
-            }
-            Scale::Inertia => f * self.inertia,
             Scale::Travel if f > 0.0 => self.travel[1][1] - f * (self.travel[1][1] - self.travel[1][0]),
             Scale::Travel => self.travel[1][0] - f * (self.travel[1][1] - self.travel[1][0]),
         }

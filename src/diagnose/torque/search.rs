@@ -69,12 +69,10 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     let nominal = search.problem.nominal;
     let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
     let parameters = search.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
-    // A model may lack more than the torque itself: what matters is measured by no more than that.
-    let over = search.band().torque_share(parameters.discrepancy, search.problem.record).max(1.0);
-    search.gap = parameters.discrepancy.map(|s| s / (over * over));
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = Pool::default();
     pool.extend([given.clone(), parameters.clone()]);
+    search.gap = search.dynamic_gap(&parameters);
     let mut chosen = search.climb(parameters.clone(), &mut pool);
     // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
     let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
@@ -115,6 +113,19 @@ impl Search<'_> {
         let tired = self.problem.steps() > WORK;
         self.cut_short.fetch_or(tired, Ordering::Relaxed);
         tired
+    }
+
+    /// What causes are measured by: what the axis lacks with its parameters alone, but no more than the torque itself, and without a
+    /// constant torque: beside a weight of many times the moving part everything else would be small.
+    fn dynamic_gap(&self, parameters: &Fit) -> Discrepancy {
+        let over = self.band().torque_share(parameters.discrepancy, self.problem.record).max(1.0);
+        let mut gap = parameters.discrepancy.map(|s| s / (over * over));
+        for bias in self.suspects.iter().filter(|e| e.is_bias()) {
+            let fit = self.problem.fit(&parameters.model, &[(*bias, 0)], parameters.discrepancy, STEPS);
+            let left = fit.map_or(gap, |f| f.discrepancy);
+            gap = [gap[0].min(left[0]), gap[1].min(left[1])];
+        }
+        gap
     }
 
     pub fn evidence(&self, fit: &Fit, independent: f64) -> f64 {

@@ -5,6 +5,7 @@ use super::fit::{Fit, Problem, Term};
 use super::likelihood::{C, Discrepancy, Weight};
 use super::scales::Scales;
 use super::search::PROBE;
+use crate::axis::Structure;
 use crate::effects::{Place, Role, Scale, Settings, Start};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -113,6 +114,14 @@ impl Regression {
         Some((c, gain))
     }
 
+    /// Size of one column for the lacking torque to vanish, and the gain in log likelihood.
+    fn alone(&self, p: &Problem<'_>, column: &[Vec<C>; 2]) -> Option<(f64, f64)> {
+        let v = p.band.whiten(column, &self.weights, self.s);
+        let own = dot(&v, &v) - self.q.iter().map(|q| dot(q, &v).powi(2)).sum::<f64>();
+        let along = -dot(&v, &self.z);
+        (own > 1e-9 * dot(&v, &v)).then(|| (along / own, 0.5 * along * along / own))
+    }
+
     fn residual(&self) -> &[f64] {
         &self.z
     }
@@ -206,17 +215,58 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
     Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
 }
 
+/// Natural frequency of a mode over that of the next one looked at, and damping ratios looked at; the same about the best of them.
+const COARSE: (f64, &[f64]) = (1.03, &[0.03]);
+const FINE: (f64, &[f64]) = (1.005, &[0.005, 0.02, 0.08]);
+/// Modes that are gone on from.
+const MODES: usize = 3;
+
+/// Third inertias on a spring at a side whose torque, along the motion, follows the residual best: inertia, stiffness, damping.
+fn modes(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Vec<[f64; 3]>> {
+    let t = p.track(&fit.model, fit.bandwidth)?;
+    let side = if p.nominal.structure == Structure::Rigid { 0 } else { side };
+    let acceleration = p.band.acceleration(&t.motion.iter().map(|m| m[2 * side]).collect::<Vec<f64>>());
+    let looked_at = |w: f64, ratio: f64| -> Option<(f64, f64, [f64; 3])> {
+        let column = p.band.mode_column(side, &acceleration, [1.0, w * w, 2.0 * ratio * w]);
+        let (size, gain) = reg.alone(p, &column)?;
+        (size > 0.0).then_some((gain, w, [size, size * w * w, size * 2.0 * ratio * w]))
+    };
+    let best_of = |frequencies: Vec<f64>, ratios: &[f64]| -> Vec<(f64, f64, [f64; 3])> {
+        frequencies
+            .par_iter()
+            .filter_map(|&w| ratios.iter().filter_map(|r| looked_at(w, *r)).max_by(|a, b| a.0.total_cmp(&b.0)))
+            .collect()
+    };
+    let top = 2.0 * p.band.omega.last()?;
+    let rungs = (top / p.band.omega[2]).ln() / COARSE.0.ln();
+    let coarse = best_of((0..=rungs as i32).map(|i| top / COARSE.0.powi(i)).collect(), COARSE.1);
+    let gains: Vec<f64> = coarse.iter().map(|c| c.0).collect();
+    let about = (COARSE.0.ln() / FINE.0.ln()) as i32;
+    let fine = peaks(&gains, MODES).into_iter().filter_map(|m| {
+        let near = (-about..=about).map(|i| coarse[m].1 * FINE.0.powi(i)).collect();
+        best_of(near, FINE.1).into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    });
+    Some(fine.map(|(.., mode)| mode).collect())
+}
+
 /// Starts of one form of an effect beside the fit's, the best first.
 fn starts(p: &Problem<'_>, fit: &Fit, reg: &Regression, scales: &Scales, term: Term) -> Vec<StartPoint> {
     let (effect, form) = term;
     let info = effect.info();
     let side = usize::from(info.place == Place::Table);
     let free = info.variants[form].free;
-    let mut grid: Vec<Settings> = vec![fit.model.effects];
-    let off = Settings::default();
-    for s in &mut grid {
-        s.of_mut(effect).copy_from_slice(off.of(effect));
-    }
+    let mut off = fit.model.effects;
+    off.of_mut(effect).copy_from_slice(Settings::default().of(effect));
+    let mut grid: Vec<Settings> = if effect.is_mode() {
+        let with = |mode: [f64; 3]| {
+            let mut s = off;
+            s.of_mut(effect)[..3].copy_from_slice(&mode);
+            s
+        };
+        modes(p, fit, reg, side).unwrap_or_default().into_iter().map(with).collect()
+    } else {
+        vec![off]
+    };
     let mut order: Vec<usize> = free.to_vec();
     order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
     for &i in &order {
@@ -237,7 +287,7 @@ fn starts(p: &Problem<'_>, fit: &Fit, reg: &Regression, scales: &Scales, term: T
         for s in &grid {
             for &f in fractions {
                 let mut t = *s;
-                let v = scales.value(effect, scale, f, &t);
+                let v = scales.value(effect, scale, f);
                 if !(v >= info.parameters[i].min && v <= info.parameters[i].max) {
                     continue;
                 }

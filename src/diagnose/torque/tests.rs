@@ -130,3 +130,12 @@ fn a_torque_that_the_library_has_no_law_for_is_not_named() {
         o.diagnosis.causes
     );
 }
+
+#[test]
+fn a_third_inertia_on_a_spring_is_found_at_its_frequency() {
+    let hidden = [(Effect::MotorMode, 0, 0.8), (Effect::MotorMode, 1, 12.8), (Effect::MotorMode, 2, 0.16)];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 0.01, |_| 0.0, 5), INERTIA);
+    assert_eq!(named(&o), ["flexible_mode"], "{:#?}", told(&o));
+    let [inertia, stiffness, _] = *o.improved.effects.of(Effect::MotorMode) else { unreachable!() };
+    assert!(((stiffness / inertia).sqrt() / 4.0 - 1.0).abs() < 0.02, "{inertia} {stiffness}");
+}
