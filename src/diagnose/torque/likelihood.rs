@@ -15,9 +15,9 @@ use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::super::model::{BaseParameter, Model};
 use super::super::record::Record;
+use super::hidden::settle;
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
-use crate::effects::Place;
 
 /// Decades of variance below the residual's that a discrepancy is looked for in.
 const DECADES: i32 = 12;
@@ -274,6 +274,15 @@ impl Band {
         grows
     }
 
+    /// The sides that are measured; the first stands for both of a rigid axis.
+    pub const fn sides(&self) -> &'static [usize] {
+        match self.sight {
+            Sight::Rigid | Sight::Motor => &[0],
+            Sight::Table => &[1],
+            Sight::Both => &[0, 1],
+        }
+    }
+
     pub fn equations(&self) -> usize {
         if self.sight == Sight::Both { 2 } else { 1 }
     }
@@ -281,17 +290,6 @@ impl Band {
     /// Spectra of the equations.
     pub fn lacking(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> Lacking {
         let torque = &tracked.torque;
-        // A mode of its own answers the error, too.
-        let mode =
-            crate::effects::EFFECTS.iter().copied().find(|e| e.is_mode() && model.effects.is_on(*e)).map(|effect| {
-                let side = usize::from(self.sight != Sight::Rigid && effect.info().place == Place::Table);
-                let mut e: Vec<C> =
-                    tracked.error[side].iter().zip(&self.taper).map(|(e, w)| C::new(e * w, 0.0)).collect();
-                planner.plan_fft_forward(self.n).process(&mut e);
-                let p = model.effects.of(effect);
-                (side, e, [p[0], p[1], p[2]])
-            });
-
         let mut z: Vec<C> = (0..self.n).map(|k| C::new(torque[0][k], torque[1][k]) * self.taper[k]).collect();
         planner.plan_fft_forward(self.n).process(&mut z);
         let scale = 1.0 / (self.n as f64).sqrt();
@@ -299,12 +297,8 @@ impl Band {
         let mut rows = [Vec::with_capacity(count), Vec::with_capacity(count)];
         for m in 0..count {
             let (a, b) = (z[m], z[(self.n - m) % self.n].conj());
-            let mut one = (a + b) * (0.5 * scale);
-            let mut two = (a - b) * C::new(0.0, -0.5 * scale);
-            if let Some((side, e, mode)) = &mode {
-                let z = mode_inertia(*mode, self.omega[m], self.dt) * square(self.omega[m], self.dt) * e[m] * scale;
-                if *side == 0 { one += z } else { two += z }
-            }
+            let one = (a + b) * (0.5 * scale);
+            let two = (a - b) * C::new(0.0, -0.5 * scale);
             if self.sight == Sight::Both {
                 rows[0].push(one);
                 rows[1].push(two);
@@ -316,7 +310,25 @@ impl Band {
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };
+        settle(self, model, &mut rows, planner);
         Lacking { rows, weights: self.weights(model), alike }
+    }
+
+    /// Real product of rows, each frequency at its weight.
+    pub fn product(&self, a: &[Vec<C>; 2], b: &[Vec<C>; 2]) -> f64 {
+        let of = |a: &[C], b: &[C]| -> f64 {
+            a.iter().zip(b).zip(&self.weight).map(|((a, b), w)| w * (a.re * b.re + a.im * b.im)).sum()
+        };
+        of(&a[0], &b[0]) + of(&a[1], &b[1])
+    }
+
+    /// Rows of a torque on one side.
+    pub fn at_side(&self, side: usize, torque: &[C]) -> [Vec<C>; 2] {
+        if self.sight != Sight::Both {
+            return [torque.iter().zip(&self.combine).map(|(t, c)| c[side] * t).collect(), Vec::new()];
+        }
+        let none = vec![C::default(); torque.len()];
+        if side == 1 { [none, torque.to_vec()] } else { [torque.to_vec(), none] }
     }
 
     /// Spectra of the measured motion, which the torque of a base parameter follows; `None` where a position is missing.
@@ -373,10 +385,7 @@ impl Band {
     pub fn mode_column(&self, side: usize, acceleration: &[C], mode: [f64; 3]) -> [Vec<C>; 2] {
         let by = 1.0 / (self.n as f64).sqrt();
         let torque = |m: usize| mode_inertia(mode, self.omega[m], self.dt) * acceleration[m] * by;
-        let seen = |m: usize| if self.sight == Sight::Both { torque(m) } else { self.combine[m][side] * torque(m) };
-        let row: Vec<C> = (0..self.omega.len()).map(seen).collect();
-        let none = vec![C::default(); self.omega.len()];
-        if self.sight == Sight::Both && side == 1 { [none, row] } else { [row, none] }
+        self.at_side(side, &(0..self.omega.len()).map(torque).collect::<Vec<C>>())
     }
 
     /// Half the sum of squares of the whitened rows.

@@ -12,6 +12,7 @@ mod conclusion;
 mod descent;
 mod fit;
 mod gap;
+mod hidden;
 mod likelihood;
 mod pool;
 mod race;

@@ -186,18 +186,19 @@ impl Search<'_> {
     fn climb(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
         for _ in 0..2 * MOST {
-            if self.at_floor(&best) || self.leaves_little(&best) || self.is_negligible(&best) {
+            if self.at_floor(&best) {
                 break;
             }
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
-            if let Some(next) = self.joined(&best, pool) {
+            let enough = self.leaves_little(&best) || self.is_negligible(&best);
+            if !enough && let Some(next) = self.joined(&best, pool) {
                 best = self.pruned(next, pool);
                 continue;
             }
             if self.is_tired() {
                 break;
             }
-            // What was named first was named without the others.
+            // What was named first was named without the others, however little they leave together.
             let other = self.exchanged(best.clone(), pool);
             if other.terms == best.terms {
                 break;

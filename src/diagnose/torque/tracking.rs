@@ -8,12 +8,13 @@
 //! ```
 //!
 //! with central differences for `s` and `s^2`: exact for the linear axis whatever the feedback's bandwidth, because an impulse at a
-//! sample is one in the second difference there. The bandwidth only says along which motion the effects act: the model's own (low:
+//! sample is one in the second difference there. A side that is not measured goes along with the other ([`super::hidden`]). The bandwidth only says along which motion the effects act: the model's own (low:
 //! output error) or the measured one (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a
 //! Kalman filter does.
 
 use super::super::model::Model;
 use super::super::record::Record;
+use super::hidden::Hidden;
 use crate::axis::{Axis, Scheme, Structure, substeps};
 use crate::effects::TorqueHistory;
 
@@ -22,8 +23,6 @@ use crate::effects::TorqueHistory;
 pub struct Tracked {
     /// Torque lacking at motor and table, N.m; the second is zero on a rigid axis.
     pub torque: [Vec<f64>; 2],
-    /// Measured less read position of each side, rad.
-    pub error: [Vec<f64>; 2],
     /// Motion of the model: `[theta1, omega1, theta2, omega2]`.
     pub motion: Vec<[f64; 4]>,
 }
@@ -32,8 +31,7 @@ impl Tracked {
     /// Of a model that could not be run.
     #[must_use]
     pub fn nothing(n: usize) -> Self {
-        let zero = || [vec![0.0; n], vec![0.0; n]];
-        Self { torque: zero(), error: zero(), motion: vec![[0.0; 4]; n] }
+        Self { torque: [vec![0.0; n], vec![0.0; n]], motion: vec![[0.0; 4]; n] }
     }
 }
 
@@ -165,14 +163,21 @@ fn track_with(
             return None;
         }
     }
-    let torque = lacking(model, dt, inertia, &error, given);
+    let torque = lacking(model, dt, inertia, &sides, &error, given);
     // Squares of what is larger than this are no numbers.
     let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
-    bounded.then_some((Tracked { torque, error, motion }, memories))
+    bounded.then_some((Tracked { torque, motion }, memories))
 }
 
-/// Adds `D e` to what was given.
-fn lacking(model: &Model, dt: f64, inertia: [f64; 2], error: &[Vec<f64>; 2], given: [Vec<f64>; 2]) -> [Vec<f64>; 2] {
+/// Adds `D e` to what was given: along the sides that are measured, what follows them without an encoder goes along.
+fn lacking(
+    model: &Model,
+    dt: f64,
+    inertia: [f64; 2],
+    sides: &[usize],
+    error: &[Vec<f64>; 2],
+    given: [Vec<f64>; 2],
+) -> [Vec<f64>; 2] {
     let n = given[0].len();
     let p = &model.parameters;
     let coupled = model.structure == Structure::TwoInertia;
@@ -180,12 +185,18 @@ fn lacking(model: &Model, dt: f64, inertia: [f64; 2], error: &[Vec<f64>; 2], giv
     for k in 1..n.saturating_sub(1) {
         let second = |e: &[f64]| (e[k + 1] - 2.0 * e[k] + e[k - 1]) / (dt * dt);
         let first = |e: &[f64]| (e[k + 1] - e[k - 1]) / (2.0 * dt);
-        torque[0][k] += inertia[0] * second(&error[0]);
-        if coupled {
-            torque[1][k] += inertia[1] * second(&error[1]);
+        for &i in sides {
+            torque[i][k] += inertia[i] * second(&error[i]);
+        }
+        if coupled && sides.len() == 2 {
             let pull = p.b * (first(&error[0]) - first(&error[1])) + p.k * (error[0][k] - error[1][k]);
             torque[0][k] += pull;
             torque[1][k] -= pull;
+        }
+    }
+    for hidden in Hidden::of(model, sides) {
+        for (torque, pull) in torque[hidden.side].iter_mut().zip(hidden.pull(&error[hidden.side], dt)) {
+            *torque += pull;
         }
     }
     torque

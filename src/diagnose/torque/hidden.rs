@@ -1,0 +1,121 @@
+//! Inertias that no encoder shows: the other side of a coupling, a third inertia on a spring.
+//!
+//! Held at its place, such an inertia swings freely with `I y'' + B y' + K y = 0`, `y` its position relative to the place. How it swung
+//! when the record began is not known: its torque then has two decaying sines in it, whose sizes belong to the record and to no
+//! hypothesis. What the lacking torque has of those of the axis' own other side is taken out of it (variable projection: Golub, Pereyra, SIAM J. Numer. Anal. 10, 1973).
+
+use rustfft::FftPlanner;
+
+use super::super::model::Model;
+use super::likelihood::{Band, C};
+use crate::axis::Structure;
+use crate::effects::{EFFECTS, Place};
+
+/// Share of the second sine that must be left beside the first for it to be another one.
+const OWN: f64 = 1e-3;
+
+/// An inertia without an encoder.
+pub struct Hidden {
+    /// The measured side that it pulls at.
+    pub side: usize,
+    inertia: f64,
+    stiffness: f64,
+    damping: f64,
+}
+
+impl Hidden {
+    /// The other side of the coupling, where one side of a model is measured.
+    fn across(model: &Model, sides: &[usize]) -> Option<Self> {
+        let p = &model.parameters;
+        let &[side] = sides else { return None };
+        let inertia = if side == 0 { p.i2 } else { p.i1 };
+        (model.structure == Structure::TwoInertia).then_some(Self { side, inertia, stiffness: p.k, damping: p.b })
+    }
+
+    /// All of a model of which these sides are measured: on a rigid axis any is the first.
+    pub fn of(model: &Model, sides: &[usize]) -> Vec<Self> {
+        let rigid = model.structure == Structure::Rigid;
+        let modes = EFFECTS.iter().filter(|e| e.is_mode() && model.effects.is_on(**e)).filter_map(|e| {
+            let side = usize::from(!rigid && e.info().place == Place::Table);
+            let of = model.effects.of(*e);
+            (rigid || sides.contains(&side)).then_some(Self { side, inertia: of[0], stiffness: of[1], damping: of[2] })
+        });
+        Self::across(model, sides).into_iter().chain(modes).collect()
+    }
+
+    /// Decay and angular frequency of its free vibration; `None` where it does not swing.
+    fn vibration(&self) -> Option<C> {
+        let decay = 0.5 * self.damping / self.inertia;
+        let squared = self.stiffness / self.inertia - decay * decay;
+        (squared > 0.0).then(|| C::new(-decay, squared.sqrt()))
+    }
+
+    /// Its torque against its place where that moves by `e`, straight from sample to sample, from rest: at every sample a jump of the
+    /// relative speed, between them a free vibration.
+    pub fn pull(&self, e: &[f64], dt: f64) -> Vec<f64> {
+        let mut pull = vec![0.0; e.len()];
+        // What is damped to death goes along.
+        let Some(of) = self.vibration() else {
+            for k in 1..e.len().saturating_sub(1) {
+                pull[k] = self.inertia * (e[k + 1] - 2.0 * e[k] + e[k - 1]) / (dt * dt);
+            }
+            return pull;
+        };
+        let step = (of * dt).exp();
+        let (decay, frequency) = (-of.re, of.im);
+        let (mut y, mut rate) = (0.0, 0.0);
+        for k in 1..e.len().saturating_sub(1) {
+            let cosine = step.re;
+            let sine = step.im / frequency;
+            (y, rate) = (
+                y * (cosine + decay * sine) + rate * sine,
+                rate * (cosine - decay * sine) - y * sine * self.stiffness / self.inertia,
+            );
+            let jump = -(e[k + 1] - 2.0 * e[k] + e[k - 1]) / dt;
+            pull[k] = -self.stiffness * y - self.damping * (rate + 0.5 * jump);
+            rate += jump;
+        }
+        pull
+    }
+}
+
+/// Takes out of the rows of a model what the side without an encoder began with. A third inertia is no part of the axis, but an effect: to
+/// begin with a swing of its own choice would let the smallest explain anything that dies away.
+pub fn settle(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+    let Some(hidden) = Hidden::across(model, band.sides()) else { return };
+    // Faster than the record shows it is no part of the band.
+    let Some(of) = hidden.vibration().filter(|of| of.im * band.dt < std::f64::consts::PI) else { return };
+    let step = (of * band.dt).exp();
+    let mut at = C::new(1.0, 0.0);
+    let mut z: Vec<C> = Vec::with_capacity(band.n);
+    for w in &band.taper {
+        z.push(at * w);
+        at *= step;
+    }
+    planner.plan_fft_forward(band.n).process(&mut z);
+    let [mut cosine, mut sine] = [(1.0, C::new(0.5, 0.0)), (-1.0, C::new(0.0, -0.5))].map(|(sign, turn)| {
+        let spectrum = |m: usize| (z[m] + z[(band.n - m) % band.n].conj() * sign) * turn;
+        band.at_side(hidden.side, &(0..band.omega.len()).map(spectrum).collect::<Vec<C>>())
+    });
+    let whole = band.product(&sine, &sine);
+    normalise(band, &mut cosine);
+    take(band, &cosine, &mut sine);
+    take(band, &cosine, rows);
+    if band.product(&sine, &sine) > OWN * OWN * whole {
+        normalise(band, &mut sine);
+        take(band, &sine, rows);
+    }
+}
+
+fn normalise(band: &Band, column: &mut [Vec<C>; 2]) {
+    let size = band.product(column, column).sqrt().max(f64::MIN_POSITIVE);
+    column.iter_mut().flatten().for_each(|v| *v /= size);
+}
+
+/// Takes out of the rows what they have of a column of size one.
+fn take(band: &Band, column: &[Vec<C>; 2], rows: &mut [Vec<C>; 2]) {
+    let share = band.product(column, rows);
+    for (row, column) in rows.iter_mut().zip(column) {
+        row.iter_mut().zip(column).for_each(|(r, c)| *r -= c * share);
+    }
+}
