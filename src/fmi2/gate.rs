@@ -299,6 +299,59 @@ impl Body {
         Status::Error
     }
 
+    /// Takes the experiment's tolerance, start and stop time (s), where they are given.
+    ///
+    /// # Errors
+    /// When one is not finite, or the stop time is not after the start time.
+    pub fn set_up(&mut self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Result<(), Fault> {
+        // The tolerance has no meaning here: the internal step is fixed.
+        if let Some(tolerance) = tolerance {
+            finite("tolerance", tolerance)?;
+        }
+        finite("startTime", start)?;
+        let stop = stop.map_or(Ok(f64::INFINITY), |stop| finite("stopTime", stop))?;
+        if stop <= start {
+            return Err(Fault::Number { name: "stopTime", value: stop, must_be: "after startTime" });
+        }
+        self.kernel.set_experiment(start, stop);
+        self.set_up = true;
+        Ok(())
+    }
+
+    /// Enters the initialisation, once the experiment is set up.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn enter_initialisation(&mut self) -> Result<(), Fault> {
+        if !self.set_up {
+            return Err(Fault::NotSetUp);
+        }
+        self.mode = Mode::Initialization;
+        Ok(())
+    }
+
+    /// Ends the initialisation: steps come next.
+    ///
+    /// # Errors
+    /// When the parameters make no axis.
+    pub fn exit_initialisation(&mut self) -> Result<(), Fault> {
+        self.kernel.initialise()?;
+        self.mode = Mode::Step;
+        Ok(())
+    }
+
+    /// Ends the run.
+    pub fn terminate(&mut self) {
+        self.mode = Mode::Terminated;
+    }
+
+    /// Goes back to what [`create`] made; the log and the stored states stay.
+    pub fn reset(&mut self) {
+        self.kernel = Simulation::new(&self.starts);
+        self.mode = Mode::Instantiated;
+        self.set_up = false;
+    }
+
     /// A copy to go back to.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot { kernel: self.kernel, mode: self.mode, set_up: self.set_up }
@@ -310,6 +363,11 @@ impl Body {
         self.mode = to.mode;
         self.set_up = to.set_up;
     }
+}
+
+/// A number, unless it is infinite or NaN.
+fn finite(name: &'static str, value: f64) -> Result<f64, Fault> {
+    if value.is_finite() { Ok(value) } else { Err(Fault::Number { name, value, must_be: "a finite number" }) }
 }
 
 /// Makes an instance and hands its ownership to the importer.

@@ -20,10 +20,9 @@ pub use baked::bake;
 pub(crate) use baked::starts;
 pub use exports::*;
 pub(crate) use exports::{
-    array, array_mut, choose_categories, deserialise, directional, finite, finite_value, free_state, get_state,
-    none_of, output_derivatives, resolve, serialise, serialised_size, set, set_state, step, typed,
+    array, array_mut, choose_categories, deserialise, directional, finite_value, free_state, get_state, none_of,
+    output_derivatives, resolve, serialise, serialised_size, set, set_state, step, typed,
 };
 pub(crate) use fault::Fault;
 pub use gate::Mode;
 pub(crate) use gate::{Body, Function, Log, Sink, create, destroy, enter, text};
-pub(crate) use simulation::Simulation;

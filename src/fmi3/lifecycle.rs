@@ -4,9 +4,7 @@ use std::ffi::{CStr, c_int, c_void};
 use std::panic::catch_unwind;
 
 use super::{Instance, LogMessage, call};
-use crate::fmi2::{
-    Fault, Log, Mode, Simulation, Sink, Status, Text, array, choose_categories, create, destroy, finite, starts, text,
-};
+use crate::fmi2::{Log, Sink, Status, Text, array, choose_categories, create, destroy, starts, text};
 use crate::variables::guid;
 
 #[unsafe(no_mangle)]
@@ -85,18 +83,9 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
     stop: f64,
 ) -> c_int {
     call!(c, fmi3EnterInitializationMode, |body| {
-        // The tolerance has no meaning here: the internal step is fixed.
-        if tolerance_defined != 0 {
-            finite("tolerance", tolerance)?;
-        }
-        finite("startTime", start)?;
-        let stop = if stop_defined != 0 { finite("stopTime", stop)? } else { f64::INFINITY };
-        if stop <= start {
-            return Err(Fault::Number { name: "stopTime", value: stop, must_be: "after startTime" });
-        }
-        body.kernel.set_experiment(start, stop);
-        body.set_up = true;
-        body.mode = Mode::Initialization;
+        let tolerance = (tolerance_defined != 0).then_some(tolerance);
+        body.set_up(tolerance, start, (stop_defined != 0).then_some(stop))?;
+        body.enter_initialisation()?;
         Ok(Status::Ok)
     })
 }
@@ -104,8 +93,7 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3ExitInitializationMode(c: Instance) -> c_int {
     call!(c, fmi3ExitInitializationMode, |body| {
-        body.kernel.initialise()?;
-        body.mode = Mode::Step;
+        body.exit_initialisation()?;
         Ok(Status::Ok)
     })
 }
@@ -113,7 +101,7 @@ pub unsafe extern "C" fn fmi3ExitInitializationMode(c: Instance) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Terminate(c: Instance) -> c_int {
     call!(c, fmi3Terminate, |body| {
-        body.mode = Mode::Terminated;
+        body.terminate();
         Ok(Status::Ok)
     })
 }
@@ -121,9 +109,7 @@ pub unsafe extern "C" fn fmi3Terminate(c: Instance) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Reset(c: Instance) -> c_int {
     call!(c, fmi3Reset, |body| {
-        body.kernel = Simulation::new(&body.starts);
-        body.mode = Mode::Instantiated;
-        body.set_up = false;
+        body.reset();
         Ok(Status::Ok)
     })
 }

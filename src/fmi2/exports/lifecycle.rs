@@ -6,8 +6,7 @@ use std::panic::catch_unwind;
 use super::super::abi::{Callbacks, Component, LOG_CATEGORIES, Status, Text};
 use super::super::baked;
 use super::super::fault::Fault;
-use super::super::gate::{self, Body, Function, Log, Mode, Sink};
-use super::super::simulation::Simulation;
+use super::super::gate::{self, Body, Function, Log, Sink};
 use super::{array, call, typed};
 use crate::variables::guid;
 
@@ -115,17 +114,8 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
     stop: f64,
 ) -> c_int {
     call!(c, fmi2SetupExperiment, |body| {
-        // The tolerance has no meaning here: the internal step is fixed.
-        if tolerance_defined != 0 {
-            finite("tolerance", tolerance)?;
-        }
-        finite("startTime", start)?;
-        let stop = if stop_defined != 0 { finite("stopTime", stop)? } else { f64::INFINITY };
-        if stop <= start {
-            return Err(Fault::Number { name: "stopTime", value: stop, must_be: "after startTime" });
-        }
-        body.kernel.set_experiment(start, stop);
-        body.set_up = true;
+        let tolerance = (tolerance_defined != 0).then_some(tolerance);
+        body.set_up(tolerance, start, (stop_defined != 0).then_some(stop))?;
         Ok(Status::Ok)
     })
 }
@@ -133,10 +123,7 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2EnterInitializationMode(c: Component) -> c_int {
     call!(c, fmi2EnterInitializationMode, |body| {
-        if !body.set_up {
-            return Err(Fault::NotSetUp);
-        }
-        body.mode = Mode::Initialization;
+        body.enter_initialisation()?;
         Ok(Status::Ok)
     })
 }
@@ -144,8 +131,7 @@ pub unsafe extern "C" fn fmi2EnterInitializationMode(c: Component) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2ExitInitializationMode(c: Component) -> c_int {
     call!(c, fmi2ExitInitializationMode, |body| {
-        body.kernel.initialise()?;
-        body.mode = Mode::Step;
+        body.exit_initialisation()?;
         Ok(Status::Ok)
     })
 }
@@ -153,7 +139,7 @@ pub unsafe extern "C" fn fmi2ExitInitializationMode(c: Component) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Terminate(c: Component) -> c_int {
     call!(c, fmi2Terminate, |body| {
-        body.mode = Mode::Terminated;
+        body.terminate();
         Ok(Status::Ok)
     })
 }
@@ -161,13 +147,7 @@ pub unsafe extern "C" fn fmi2Terminate(c: Component) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Reset(c: Component) -> c_int {
     call!(c, fmi2Reset, |body| {
-        body.kernel = Simulation::new(&body.starts);
-        body.mode = Mode::Instantiated;
-        body.set_up = false;
+        body.reset();
         Ok(Status::Ok)
     })
-}
-
-pub(crate) fn finite(name: &'static str, value: f64) -> Result<f64, Fault> {
-    if value.is_finite() { Ok(value) } else { Err(Fault::Number { name, value, must_be: "a finite number" }) }
 }

@@ -34,7 +34,7 @@ macro_rules! call {
     }};
 }
 
-pub(crate) use lifecycle::{choose_categories, finite};
+pub(crate) use lifecycle::choose_categories;
 pub(crate) use states::{deserialise, free_state, get_state, serialise, serialised_size, set_state};
 pub(crate) use steps::step;
 pub(crate) use values::{directional, finite_value, none_of, output_derivatives, resolve, set};
