@@ -3,6 +3,7 @@
 //! The shared library comes embedded in the program (see `build.rs`), the description and the documentation from the
 //! variable table. The archive is deterministic: the same axis gives the same bytes.
 
+mod common;
 mod documentation;
 mod table;
 mod units;
@@ -160,7 +161,7 @@ impl Package {
         }
         for library in LIBRARIES {
             let folder = if self.fmi == Fmi::Three { tuple(library.platform) } else { library.platform };
-            let name = format!("binaries/{folder}/{}.{}", xml::identifier(model), library.extension);
+            let name = format!("binaries/{folder}/{}.{}", common::identifier(model), library.extension);
             add(&mut zip, &name, &self.baked(library)?, 0o755)?;
         }
         let page = documentation::page(&self.name, &self.starts, self.fmi);
