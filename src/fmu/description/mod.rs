@@ -378,32 +378,10 @@ impl Description {
             section.into_iter().flat_map(|s| s.children_named("Unknown")).map(unknown).collect()
         };
         Self {
-            fmi: Fmi::Two,
-            clocks: Vec::new(),
-            fmi_version: text(root, "fmiVersion").unwrap_or_default(),
-            model_name: text(root, "modelName").unwrap_or_default(),
-            guid: text(root, "guid").unwrap_or_default(),
-            description: text(root, "description"),
-            author: text(root, "author"),
-            version: text(root, "version"),
-            copyright: text(root, "copyright"),
-            license: text(root, "license"),
-            generation_tool: text(root, "generationTool"),
-            generation_date_and_time: text(root, "generationDateAndTime"),
-            structured_names: root.get("variableNamingConvention") == Some("structured"),
             number_of_event_indicators: number(root, "numberOfEventIndicators").unwrap_or(0),
             co_simulation: root.child("CoSimulation").map(interface),
             model_exchange: root.child("ModelExchange").map(interface),
-            units: within(root, "UnitDefinitions", "Unit").map(unit).collect(),
             types: within(root, "TypeDefinitions", "SimpleType").filter_map(simple_type).collect(),
-            log_categories: log_categories(root),
-            default_experiment: root.child("DefaultExperiment").map(|e| DefaultExperiment {
-                start_time: real(e, "startTime"),
-                stop_time: real(e, "stopTime"),
-                tolerance: real(e, "tolerance"),
-                step_size: real(e, "stepSize"),
-                position: e.position,
-            }),
             vendor_tools: within(root, "VendorAnnotations", "Tool").filter_map(|e| text(e, "name")).collect(),
             variables: within(root, "ModelVariables", "ScalarVariable").map(variable).collect(),
             structure: ModelStructure {
@@ -412,6 +390,7 @@ impl Description {
                 initial_unknowns: unknowns("InitialUnknowns"),
                 position: structure.map_or(root.position, |s| s.position),
             },
+            ..head(root, Fmi::Two, "guid")
         }
     }
 

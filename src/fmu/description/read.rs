@@ -4,8 +4,8 @@ use std::str::FromStr;
 
 use super::super::xml::{Element, Position};
 use super::{
-    BaseType, BaseUnit, Causality, DisplayUnit, Interface, SI_BASE, SimpleType, TypeAttributes, Unit, Unknown, Value,
-    Variability, Variable,
+    BaseType, BaseUnit, Causality, DefaultExperiment, Description, DisplayUnit, Fmi, Interface, ModelStructure,
+    SI_BASE, SimpleType, TypeAttributes, Unit, Unknown, Value, Variability, Variable,
 };
 
 /// Parses an `xs:boolean`.
@@ -80,13 +80,49 @@ pub(super) fn interface(e: &Element) -> Interface {
     }
 }
 
-pub(super) fn log_categories(root: &Element) -> Vec<(String, Option<String>, Position)> {
+/// What stands alike in both versions: the root's attributes, units, log categories and default experiment; `token` is
+/// the version's name of the attribute that binary and XML have in common. The rest is empty.
+pub(super) fn head(root: &Element, fmi: Fmi, token: &str) -> Description {
+    Description {
+        fmi,
+        fmi_version: text(root, "fmiVersion").unwrap_or_default(),
+        model_name: text(root, "modelName").unwrap_or_default(),
+        guid: text(root, token).unwrap_or_default(),
+        description: text(root, "description"),
+        author: text(root, "author"),
+        version: text(root, "version"),
+        copyright: text(root, "copyright"),
+        license: text(root, "license"),
+        generation_tool: text(root, "generationTool"),
+        generation_date_and_time: text(root, "generationDateAndTime"),
+        structured_names: root.get("variableNamingConvention") == Some("structured"),
+        number_of_event_indicators: 0,
+        co_simulation: None,
+        model_exchange: None,
+        units: within(root, "UnitDefinitions", "Unit").map(unit).collect(),
+        types: Vec::new(),
+        log_categories: log_categories(root),
+        default_experiment: root.child("DefaultExperiment").map(|e| DefaultExperiment {
+            start_time: real(e, "startTime"),
+            stop_time: real(e, "stopTime"),
+            tolerance: real(e, "tolerance"),
+            step_size: real(e, "stepSize"),
+            position: e.position,
+        }),
+        vendor_tools: Vec::new(),
+        variables: Vec::new(),
+        structure: ModelStructure::default(),
+        clocks: Vec::new(),
+    }
+}
+
+fn log_categories(root: &Element) -> Vec<(String, Option<String>, Position)> {
     within(root, "LogCategories", "Category")
         .map(|e| (text(e, "name").unwrap_or_default(), text(e, "description"), e.position))
         .collect()
 }
 
-pub(super) fn unit(e: &Element) -> Unit {
+fn unit(e: &Element) -> Unit {
     let base = e.child("BaseUnit").map(|b| BaseUnit {
         exponents: SI_BASE.map(|name| number(b, name).unwrap_or(0)),
         factor: real(b, "factor").unwrap_or(1.0),
@@ -105,7 +141,8 @@ pub(super) fn type_element(e: &Element) -> Option<(BaseType, &Element)> {
     e.children.iter().find_map(|child| Some((child.name.parse().ok()?, child)))
 }
 
-pub(super) fn type_attributes(base: BaseType, e: &Element) -> TypeAttributes {
+/// The attributes of a type; `integer` reads the values of an enumeration's items, which the versions write differently.
+pub(super) fn type_attributes(base: BaseType, e: &Element, integer: fn(&str) -> Option<i64>) -> TypeAttributes {
     TypeAttributes {
         base,
         quantity: text(e, "quantity"),
@@ -117,7 +154,7 @@ pub(super) fn type_attributes(base: BaseType, e: &Element) -> TypeAttributes {
         nominal: real(e, "nominal"),
         items: e
             .children_named("Item")
-            .map(|i| (text(i, "name").unwrap_or_default(), number(i, "value").unwrap_or(0), i.position))
+            .map(|i| (text(i, "name").unwrap_or_default(), i.get("value").and_then(integer).unwrap_or(0), i.position))
             .collect(),
         position: e.position,
     }
@@ -125,7 +162,7 @@ pub(super) fn type_attributes(base: BaseType, e: &Element) -> TypeAttributes {
 
 pub(super) fn simple_type(e: &Element) -> Option<SimpleType> {
     let (base, inner) = type_element(e)?;
-    let attributes = type_attributes(base, inner);
+    let attributes = type_attributes(base, inner, parse_integer);
     Some(SimpleType { name: text(e, "name").unwrap_or_default(), attributes, position: e.position })
 }
 
@@ -145,7 +182,7 @@ pub(super) fn variable(e: &Element) -> Variable {
         variability: word(e, "variability").unwrap_or(Variability::Continuous),
         declared_initial: word(e, "initial"),
         can_handle_multiple_set: e.get("canHandleMultipleSetPerTimeInstant").and_then(parse_boolean),
-        attributes: type_attributes(base, inner),
+        attributes: type_attributes(base, inner, parse_integer),
         declared_type: text(inner, "declaredType"),
         has_start: inner.get("start").is_some(),
         start,

@@ -8,10 +8,10 @@
 use std::collections::HashMap;
 
 use super::super::xml::{Element, Position};
-use super::read::{flag, log_categories, number, parse_boolean, parse_real, real, text, unit, within, word};
+use super::read::{flag, head, number, parse_boolean, parse_real, real, text, type_attributes, word};
 use super::{
-    BaseType, Causality, DefaultExperiment, DependencyKind, Description, Fmi, Interface, ModelStructure, SimpleType,
-    TypeAttributes, Unknown, Value, Variability, Variable,
+    BaseType, Causality, DependencyKind, Description, Fmi, Interface, ModelStructure, SimpleType, TypeAttributes,
+    Unknown, Value, Variability, Variable,
 };
 
 /// The types of FMI 3.0 (section 2.4.7).
@@ -222,22 +222,7 @@ fn indices(sizes: &[usize], at: usize) -> String {
 }
 
 fn attributes(e: &Element, kind: Kind) -> TypeAttributes {
-    let items = e.children_named("Item").map(|i| {
-        let value = i.get("value").and_then(integer).unwrap_or(0);
-        (text(i, "name").unwrap_or_default(), value, i.position)
-    });
-    TypeAttributes {
-        base: kind.base(),
-        quantity: text(e, "quantity"),
-        unit: text(e, "unit"),
-        display_unit: text(e, "displayUnit"),
-        relative_quantity: flag(e, "relativeQuantity"),
-        min: real(e, "min"),
-        max: real(e, "max"),
-        nominal: real(e, "nominal"),
-        items: items.collect(),
-        position: e.position,
-    }
+    type_attributes(kind.base(), e, integer)
 }
 
 fn interface(e: &Element) -> Interface {
@@ -342,32 +327,9 @@ impl Description {
             section.flat_map(|e| unknown(e, &elements, &silent)).collect()
         };
         Self {
-            fmi: Fmi::Three,
-            fmi_version: text(root, "fmiVersion").unwrap_or_default(),
-            model_name: text(root, "modelName").unwrap_or_default(),
-            guid: text(root, "instantiationToken").unwrap_or_default(),
-            description: text(root, "description"),
-            author: text(root, "author"),
-            version: text(root, "version"),
-            copyright: text(root, "copyright"),
-            license: text(root, "license"),
-            generation_tool: text(root, "generationTool"),
-            generation_date_and_time: text(root, "generationDateAndTime"),
-            structured_names: root.get("variableNamingConvention") == Some("structured"),
-            number_of_event_indicators: 0,
             co_simulation: root.child("CoSimulation").map(interface),
             model_exchange: root.child("ModelExchange").map(interface),
-            units: within(root, "UnitDefinitions", "Unit").map(unit).collect(),
             types: types(root),
-            log_categories: log_categories(root),
-            default_experiment: root.child("DefaultExperiment").map(|e| DefaultExperiment {
-                start_time: real(e, "startTime"),
-                stop_time: real(e, "stopTime"),
-                tolerance: real(e, "tolerance"),
-                step_size: real(e, "stepSize"),
-                position: e.position,
-            }),
-            vendor_tools: Vec::new(),
             structure: ModelStructure {
                 outputs: unknowns("Output"),
                 derivatives: unknowns("ContinuousStateDerivative"),
@@ -376,6 +338,7 @@ impl Description {
             },
             variables,
             clocks,
+            ..head(root, Fmi::Three, "instantiationToken")
         }
     }
 }
