@@ -115,24 +115,25 @@ const OWN: [(&str, &str, &str); 27] = [
     ("output-derivatives", "", "Implement fmi3GetOutputDerivatives or set maxOutputDerivativeOrder to 0."),
 ];
 
+/// A text of a rule in the words of a version: its `own` in FMI 3.0, where there is one, else that of 2.0 put into words
+/// of 3.0.
+fn in_words(fmi: Fmi, two: &str, own: Option<&str>) -> String {
+    match fmi {
+        Fmi::Two => two.to_owned(),
+        Fmi::Three => own.filter(|own| !own.is_empty()).map_or_else(|| in_three(two), str::to_owned),
+    }
+}
+
 fn own(rule: &Rule) -> Option<&'static (&'static str, &'static str, &'static str)> {
     OWN.iter().find(|(id, ..)| *id == rule.id)
 }
 
 pub(super) fn title(rule: &Rule, fmi: Fmi) -> String {
-    match (fmi, own(rule)) {
-        (Fmi::Two, _) => rule.title.to_owned(),
-        (Fmi::Three, Some((_, title, _))) if !title.is_empty() => (*title).to_owned(),
-        (Fmi::Three, _) => in_three(rule.title),
-    }
+    in_words(fmi, rule.title, own(rule).map(|(_, title, _)| *title))
 }
 
 pub(super) fn advice(rule: &Rule, fmi: Fmi) -> String {
-    match (fmi, own(rule)) {
-        (Fmi::Two, _) => rule.advice.to_owned(),
-        (Fmi::Three, Some((.., advice))) if !advice.is_empty() => (*advice).to_owned(),
-        (Fmi::Three, _) => in_three(rule.advice),
-    }
+    in_words(fmi, rule.advice, own(rule).map(|(.., advice)| *advice))
 }
 
 #[cfg(test)]
