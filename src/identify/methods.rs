@@ -1,5 +1,6 @@
 //! Each method on a record: what it starts from, what it is called, how it ended.
 
+use super::extended::{NOISE_ORDER, extended_batch, extended_recursive};
 use super::frequency::Measured;
 use super::instrumental::instrumental;
 use super::joined::Joined;
@@ -7,7 +8,7 @@ use super::output_error::{Fit, Free, OutputError};
 use super::paper;
 use super::parameters::{Estimated, wider};
 use super::record::Record;
-use super::regression::{NOISE_ORDER, RegressionError, extended_batch, extended_recursive, least_squares, recursive};
+use super::regression::{RegressionError, least_squares, recursive};
 use super::result::{History, MethodResult};
 use super::run::{Method, Request, hold_name, torque_unit};
 use super::statistics::whiteness;

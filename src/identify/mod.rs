@@ -2,6 +2,7 @@
 
 mod assessment;
 pub mod excitation;
+pub mod extended;
 pub mod frequency;
 pub mod identifiability;
 pub mod instrumental;

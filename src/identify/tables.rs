@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use super::excitation::{Kind, Multisine};
+use super::extended::extended_recursive;
 use super::paper::{self, Rule};
 use super::parameters::Estimated;
 use super::record::Record;
-use super::regression::{RegressionError, extended_recursive, least_squares, recursive};
+use super::regression::{RegressionError, least_squares, recursive};
 use crate::axis::{
     Hold, Parameters, PhysicalData, Scheme, SimulateOptions, Structure, dt_criterion, period_elongation, simulate,
 };

@@ -4,10 +4,11 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::excitation::{Kind, Multisine};
+use super::extended::{extended_batch, extended_recursive};
 use super::instrumental::instrumental;
 use super::output_error::{Free, OutputError};
 use super::record::Record;
-use super::regression::{extended_batch, extended_recursive, least_squares, recursive};
+use super::regression::{least_squares, recursive};
 use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use crate::effects::Settings;
 use crate::trace::{Signal, Trace};
