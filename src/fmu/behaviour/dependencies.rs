@@ -69,16 +69,16 @@ fn against_inputs(p: &Probe, soon: bool) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn outputs(p: &Probe) -> Tested {
+pub(in super::super) fn outputs(p: &Probe) -> Tested {
     against_inputs(p, false)
 }
 
-pub(super) fn outputs_soon(p: &Probe) -> Tested {
+pub(in super::super) fn outputs_soon(p: &Probe) -> Tested {
     against_inputs(p, true)
 }
 
 /// Unknowns and outputs in initialisation mode, where they answer at once if at all.
-pub(super) fn initial(p: &Probe) -> Tested {
+pub(in super::super) fn initial(p: &Probe) -> Tested {
     let outputs = declared(p, &p.d, &p.d.structure.outputs);
     let initial = declared(p, &p.d, &p.d.structure.initial_unknowns);
     if outputs.is_empty() && initial.is_empty() {
@@ -137,7 +137,7 @@ fn at_initialisation(
 }
 
 /// "constant": the partial derivative is the same always. Against inputs, at two values and two times.
-pub(super) fn kinds(p: &Probe) -> Tested {
+pub(in super::super) fn kinds(p: &Probe) -> Tested {
     let mut problems = Vec::new();
     let mut tested = false;
     for (unknown, v) in declared(p, &p.d, &p.d.structure.outputs) {
@@ -180,7 +180,7 @@ pub(super) fn kinds(p: &Probe) -> Tested {
 }
 
 /// An output that is another one at another start time depends on the time.
-pub(super) fn time(p: &Probe) -> Tested {
+pub(in super::super) fn time(p: &Probe) -> Tested {
     let independent = p.d.variables.iter().position(|v| v.causality == Causality::Independent).map(|i| i as u32 + 1);
     let Some(independent) = independent else {
         return not_applicable("no independent variable is declared, which dependencies could name");

@@ -21,7 +21,7 @@ fn life(setup: &Setup) -> Result<(), HostError> {
     Ok(())
 }
 
-pub(super) fn directory(setup: &Setup) -> Tested {
+pub(in super::super) fn directory(setup: &Setup) -> Tested {
     let before = std::env::current_dir().ok();
     life(setup)?;
     let after = std::env::current_dir().ok();
@@ -29,7 +29,7 @@ pub(super) fn directory(setup: &Setup) -> Tested {
     Ok(if before == after { vec![] } else { vec![format!("the working directory is now {}", show(after))] })
 }
 
-pub(super) fn rounding(setup: &Setup) -> Tested {
+pub(in super::super) fn rounding(setup: &Setup) -> Tested {
     let before = measure::floating_point();
     life(setup)?;
     let after = measure::floating_point();
@@ -43,12 +43,12 @@ pub(super) fn rounding(setup: &Setup) -> Tested {
 }
 
 /// The rule is tested by the parent process, which holds this one's standard output.
-pub(super) fn stdout(setup: &Setup) -> Tested {
+pub(in super::super) fn stdout(setup: &Setup) -> Tested {
     life(setup)?;
     Ok(vec![])
 }
 
-pub(super) fn signals(setup: &Setup) -> Tested {
+pub(in super::super) fn signals(setup: &Setup) -> Tested {
     let before = measure::signal_handlers();
     life(setup)?;
     let changed: Vec<String> = before
@@ -64,7 +64,7 @@ pub(super) fn signals(setup: &Setup) -> Tested {
     })
 }
 
-pub(super) fn environment(setup: &Setup) -> Tested {
+pub(in super::super) fn environment(setup: &Setup) -> Tested {
     let read = || -> BTreeSet<_> { std::env::vars_os().collect() };
     let before = read();
     life(setup)?;
@@ -75,7 +75,7 @@ pub(super) fn environment(setup: &Setup) -> Tested {
     Ok(if names.is_empty() { vec![] } else { vec![format!("changed environment variables: {}", names.join(", "))] })
 }
 
-pub(super) fn locale(setup: &Setup) -> Tested {
+pub(in super::super) fn locale(setup: &Setup) -> Tested {
     let before = measure::numeric_locale();
     life(setup)?;
     let after = measure::numeric_locale();
@@ -86,7 +86,7 @@ pub(super) fn locale(setup: &Setup) -> Tested {
     })
 }
 
-pub(super) fn files(setup: &Setup) -> Tested {
+pub(in super::super) fn files(setup: &Setup) -> Tested {
     let list = || -> BTreeSet<String> {
         let entries = std::fs::read_dir(&setup.workplace).into_iter().flatten().flatten();
         entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
@@ -102,7 +102,7 @@ fn logging(p: &Probe) -> Result<Instance, HostError> {
     Instance::new(Arc::clone(&p.binary), None, &options)
 }
 
-pub(super) fn callbacks(p: &Probe) -> Tested {
+pub(in super::super) fn callbacks(p: &Probe) -> Tested {
     let mut instance = logging(p)?;
     instance.poison();
     let before = abuse::poison_hits();
@@ -125,7 +125,7 @@ pub(super) fn callbacks(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn allocation(p: &Probe) -> Tested {
+pub(in super::super) fn allocation(p: &Probe) -> Tested {
     abuse::fail_allocations(true);
     let instance = p.instantiate();
     if let Ok(mut instance) = instance
@@ -137,7 +137,7 @@ pub(super) fn allocation(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn debug_logging(p: &Probe) -> Tested {
+pub(in super::super) fn debug_logging(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
     let categories: Vec<&str> = p.d.log_categories.iter().map(|c| c.0.as_str()).collect();
     let mut problems = Vec::new();
@@ -149,7 +149,7 @@ pub(super) fn debug_logging(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn log_categories(p: &Probe) -> Tested {
+pub(in super::super) fn log_categories(p: &Probe) -> Tested {
     let declared: BTreeSet<&str> = p.d.log_categories.iter().map(|c| c.0.as_str()).collect();
     if declared.is_empty() {
         return not_applicable("no log categories are declared");

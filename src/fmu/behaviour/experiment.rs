@@ -25,7 +25,7 @@ enum Run {
 
 /// Runs the default experiment, in one instance. Where no step size is declared and the FMU refuses the first one, other
 /// usual ones are tried: an FMU with a fixed step of its own has no way to say so in FMI 2.0.
-pub(super) fn simulate(p: &mut Probe) -> Tested {
+pub(in super::super) fn simulate(p: &mut Probe) -> Tested {
     let declared = p.d.default_experiment.and_then(|e| e.step_size).is_some();
     let mut finding = match default_run(p)? {
         Run::Done(cost) => {
@@ -84,7 +84,7 @@ fn default_run(p: &Probe) -> Result<Run, super::Stop> {
 }
 
 /// "startTime" is the initial value of the independent variable (section 2.1.6): a run from another one.
-pub(super) fn start_time(p: &Probe) -> Tested {
+pub(in super::super) fn start_time(p: &Probe) -> Tested {
     let start = p.start + 10.0 * p.step;
     let mut instance = p.instantiate()?;
     if let Err(error) = instance.initialize(start, None) {
@@ -117,7 +117,7 @@ pub(super) fn start_time(p: &Probe) -> Tested {
 }
 
 /// "If the environment tries to compute past stopTime the FMU has to return fmi2Error" (section 2.1.6).
-pub(super) fn stop_time(p: &Probe) -> Tested {
+pub(in super::super) fn stop_time(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
     instance.initialize(p.start, Some(p.time(3)))?;
     for k in 0..3 {
@@ -135,7 +135,7 @@ pub(super) fn stop_time(p: &Probe) -> Tested {
 }
 
 /// Inputs set before and during initialisation are there after it.
-pub(super) fn inputs_initial(p: &Probe) -> Tested {
+pub(in super::super) fn inputs_initial(p: &Probe) -> Tested {
     let mut problems = Vec::new();
     let mut any = false;
     for v in p.inputs().filter(|v| v.base() == BaseType::Real).take(50) {
@@ -185,7 +185,7 @@ pub(super) fn inputs_initial(p: &Probe) -> Tested {
 }
 
 /// "In this state, the solution at the final time can be retrieved" (terminated, section 4.2.4).
-pub(super) fn terminated(p: &Probe) -> Tested {
+pub(in super::super) fn terminated(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     let last = p.observe(&mut instance)?;

@@ -10,7 +10,7 @@ use super::probe::{Learned, Probe, STEPS, Tested, not_applicable, not_tested};
 const TRIAL: Duration = Duration::from_secs(2);
 
 /// A second instance after the first; then how much the FMU can be asked for.
-pub(super) fn repeated(p: &mut Probe) -> Tested {
+pub(in super::super) fn repeated(p: &mut Probe) -> Tested {
     if p.interface().only_once {
         p.learn(Learned { observe_all: true, ..p.learned.clone() });
         return not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
@@ -68,7 +68,7 @@ fn trial(p: &Probe) -> Result<usize, HostError> {
 }
 
 /// An instance after one that had other values, against one that was the first.
-pub(super) fn sequential(p: &Probe) -> Tested {
+pub(in super::super) fn sequential(p: &Probe) -> Tested {
     p.comparable()?;
     let n = p.steps();
     let record = |p: &Probe| -> Result<_, HostError> {
@@ -90,7 +90,7 @@ pub(super) fn sequential(p: &Probe) -> Tested {
         .collect())
 }
 
-pub(super) fn independent(p: &Probe) -> Tested {
+pub(in super::super) fn independent(p: &Probe) -> Tested {
     if p.interface().only_once {
         return not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
     }
@@ -131,7 +131,7 @@ pub(super) fn independent(p: &Probe) -> Tested {
 /// Instances that run at the same time.
 const THREADS: usize = 4;
 
-pub(super) fn threads(p: &Probe) -> Tested {
+pub(in super::super) fn threads(p: &Probe) -> Tested {
     if !independent(p)?.is_empty() {
         return not_tested("instances affect each other on one thread already");
     }
@@ -169,7 +169,7 @@ pub(super) fn threads(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn handover(p: &Probe) -> Tested {
+pub(in super::super) fn handover(p: &Probe) -> Tested {
     p.comparable()?;
     let n = p.steps();
     let mut alone = p.ready()?;

@@ -15,7 +15,7 @@ fn continuous_inputs(p: &Probe) -> Result<Vec<(usize, &Variable)>, Stop> {
 
 /// "Calling fmi2SetRealInputDerivatives has an effect" (canInterpolateInputs, section 4.3.1): a slope that brings the
 /// input where a step's result answers to it.
-pub(super) fn effect(p: &Probe) -> Tested {
+pub(in super::super) fn effect(p: &Probe) -> Tested {
     let inputs = continuous_inputs(p)?;
     let stepped = |change: Option<(&Variable, f64)>, slope: Option<(&Variable, f64)>| -> Result<Snapshot, HostError> {
         let mut instance = p.ready()?;
@@ -62,7 +62,7 @@ pub(super) fn effect(p: &Probe) -> Tested {
     }
 }
 
-pub(super) fn input_derivatives(p: &Probe) -> Tested {
+pub(in super::super) fn input_derivatives(p: &Probe) -> Tested {
     let inputs: Vec<u32> = continuous_inputs(p)?.into_iter().map(|(_, v)| v.value_reference).collect();
     let mut instance = p.ready()?;
     p.drive(&mut instance, p.start)?;
@@ -78,7 +78,7 @@ pub(super) fn input_derivatives(p: &Probe) -> Tested {
     Ok(what.map(|what| format!("input derivatives of 0 change the step: {what}")).into_iter().collect())
 }
 
-pub(super) fn output_derivatives(p: &Probe) -> Tested {
+pub(in super::super) fn output_derivatives(p: &Probe) -> Tested {
     let order = p.interface().max_output_derivative_order;
     if order == 0 {
         return not_applicable("maxOutputDerivativeOrder is 0");

@@ -74,7 +74,7 @@ fn left_behind(p: &Probe) -> Result<(Option<i64>, bool, bool), Stop> {
     Ok((growth, more(measure::open_files(), files), more(measure::threads(), threads)))
 }
 
-pub(super) fn instance_leak(p: &Probe) -> Tested {
+pub(in super::super) fn instance_leak(p: &Probe) -> Tested {
     let (growth, files, threads) = left_behind(p)?;
     let growth = growth.filter(|&bytes| bytes < LARGE && !files && !threads);
     Ok(growth
@@ -83,7 +83,7 @@ pub(super) fn instance_leak(p: &Probe) -> Tested {
         .collect())
 }
 
-pub(super) fn instance_leak_large(p: &Probe) -> Tested {
+pub(in super::super) fn instance_leak_large(p: &Probe) -> Tested {
     let (growth, files, threads) = left_behind(p)?;
     let mut problems = Vec::new();
     if let Some(growth) = growth.filter(|&bytes| bytes >= LARGE) {
@@ -98,7 +98,7 @@ pub(super) fn instance_leak_large(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn step_leak(p: &Probe) -> Tested {
+pub(in super::super) fn step_leak(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let mut k = 0;
     let growth = grows(Duration::from_millis(15), || {
@@ -121,7 +121,7 @@ pub(super) fn step_leak(p: &Probe) -> Tested {
 }
 
 /// Getting, serialising, setting and freeing a state again and again.
-pub(super) fn state_leak(p: &Probe) -> Tested {
+pub(in super::super) fn state_leak(p: &Probe) -> Tested {
     if !p.interface().can_get_and_set_state {
         return not_applicable("canGetAndSetFMUstate is false");
     }

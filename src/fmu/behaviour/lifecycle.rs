@@ -11,7 +11,7 @@ use super::probe::{Learned, Probe, Tested};
 use super::{Setup, settable_real};
 use crate::fmu::host::HostError;
 
-pub(super) fn load(setup: &Setup) -> Tested {
+pub(in super::super) fn load(setup: &Setup) -> Tested {
     match Binary::load(&setup.binary_path, true) {
         Ok(binary) => {
             // Unloading is a rule of its own.
@@ -127,11 +127,11 @@ const OTHERS3: [&str; 13] = [
     "fmi3ActivateModelPartition",
 ];
 
-pub(super) fn symbols(p: &Probe) -> Tested {
+pub(in super::super) fn symbols(p: &Probe) -> Tested {
     Ok(needed(p).into_iter().filter(|s| !p.binary.exports(s)).map(|s| format!("{s} is not exported")).collect())
 }
 
-pub(super) fn all_symbols(p: &Probe) -> Tested {
+pub(in super::super) fn all_symbols(p: &Probe) -> Tested {
     let needed = needed(p);
     let others: &[&str] = if p.d.fmi == Fmi::Three { &OTHERS3 } else { &[] };
     let missing: Vec<&str> = CALLS
@@ -143,12 +143,12 @@ pub(super) fn all_symbols(p: &Probe) -> Tested {
     Ok(if missing.is_empty() { vec![] } else { vec![format!("not exported: {}", missing.join(", "))] })
 }
 
-pub(super) fn types_platform(p: &Probe) -> Tested {
+pub(in super::super) fn types_platform(p: &Probe) -> Tested {
     let text = super::super::host::static_text(&p.binary, Call::get_types_platform)?;
     Ok(if text == "default" { vec![] } else { vec![format!("fmi2GetTypesPlatform gives {text:?}, not \"default\"")] })
 }
 
-pub(super) fn version(p: &Probe) -> Tested {
+pub(in super::super) fn version(p: &Probe) -> Tested {
     if p.d.fmi == Fmi::Three {
         let text = super::super::host::static_text(&p.binary, Call::get_version3)?;
         return Ok(if text == "3.0" { vec![] } else { vec![format!("fmi3GetVersion gives {text:?}, not \"3.0\"")] });
@@ -157,17 +157,17 @@ pub(super) fn version(p: &Probe) -> Tested {
     Ok(if text == "2.0" { vec![] } else { vec![format!("fmi2GetVersion gives {text:?}, not \"2.0\"")] })
 }
 
-pub(super) fn instantiate(p: &Probe) -> Tested {
+pub(in super::super) fn instantiate(p: &Probe) -> Tested {
     p.instantiate()?.free();
     Ok(vec![])
 }
 
-pub(super) fn free_null(p: &Probe) -> Tested {
+pub(in super::super) fn free_null(p: &Probe) -> Tested {
     abuse::free_null(&p.binary, p.d.fmi)?;
     Ok(vec![])
 }
 
-pub(super) fn initialise(p: &Probe) -> Tested {
+pub(in super::super) fn initialise(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
     instance.setup_experiment(None, p.start, p.stop)?;
     instance.enter_initialization()?;
@@ -175,7 +175,7 @@ pub(super) fn initialise(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn step_status(p: &Probe) -> Tested {
+pub(in super::super) fn step_status(p: &Probe) -> Tested {
     if p.d.fmi == Fmi::Three {
         return super::three::status(p);
     }
@@ -215,7 +215,7 @@ pub(super) fn last_words(instance: &Instance) -> String {
     instance.take_log().last().map_or(String::new(), |m| format!("; the FMU says: {}", m.message))
 }
 
-pub(super) fn terminate(p: &Probe) -> Tested {
+pub(in super::super) fn terminate(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     instance.terminate()?;
@@ -228,7 +228,7 @@ pub(super) fn terminate(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn guid(p: &Probe) -> Tested {
+pub(in super::super) fn guid(p: &Probe) -> Tested {
     let options = InstanceOptions { guid: "{00000000-dead-beef-0000-000000000000}".into(), ..p.options() };
     match Instance::new(Arc::clone(&p.binary), None, &options) {
         Ok(_) => Ok(vec!["fmi2Instantiate accepts a wrong GUID".into()]),
@@ -236,7 +236,7 @@ pub(super) fn guid(p: &Probe) -> Tested {
     }
 }
 
-pub(super) fn resources(p: &Probe) -> Tested {
+pub(in super::super) fn resources(p: &Probe) -> Tested {
     let options = InstanceOptions { resources: resource_location("/nowhere/at/all".as_ref(), p.d.fmi), ..p.options() };
     if let Ok(mut instance) = Instance::new(Arc::clone(&p.binary), None, &options)
         && instance.initialize(p.start, p.stop).is_ok()
@@ -246,7 +246,7 @@ pub(super) fn resources(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn determinism(p: &mut Probe) -> Tested {
+pub(in super::super) fn determinism(p: &mut Probe) -> Tested {
     let run = |p: &Probe| -> Result<_, HostError> {
         let mut instance = p.ready()?;
         let mut record = vec![p.observe(&mut instance)?];
@@ -272,7 +272,7 @@ pub(super) fn determinism(p: &mut Probe) -> Tested {
     Ok(vec![format!("two equal runs differ in {count} variables: {what}, in the second run")])
 }
 
-pub(super) fn reset(p: &Probe) -> Tested {
+pub(in super::super) fn reset(p: &Probe) -> Tested {
     p.comparable()?;
     let n = p.steps();
     let mut fresh = p.ready()?;
@@ -353,7 +353,7 @@ fn slopes(p: &Probe, instance: &mut Instance) {
     }
 }
 
-pub(super) fn unload(setup: &Setup) -> Tested {
+pub(in super::super) fn unload(setup: &Setup) -> Tested {
     let p = setup.probe()?;
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 2)?;
@@ -363,7 +363,7 @@ pub(super) fn unload(setup: &Setup) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn null_component(p: &Probe) -> Tested {
+pub(in super::super) fn null_component(p: &Probe) -> Tested {
     abuse::null_component(&p.binary, p.d.fmi);
     Ok(vec![])
 }

@@ -82,7 +82,7 @@ pub(super) fn quotients(
     Ok(wide.into_iter().zip(narrow).map(|(a, b)| agree(a, b).then_some(b)).collect())
 }
 
-pub(super) fn directional(p: &Probe) -> Tested {
+pub(in super::super) fn directional(p: &Probe) -> Tested {
     if !p.interface().provides_directional_derivative {
         return not_applicable("providesDirectionalDerivative is false");
     }

@@ -5,7 +5,7 @@ use super::probe::{Probe, Tested, not_applicable, not_tested};
 
 const TYPES: [BaseType; 4] = [BaseType::Real, BaseType::Integer, BaseType::Boolean, BaseType::String];
 
-pub(super) fn bad_reference_get(p: &Probe) -> Tested {
+pub(in super::super) fn bad_reference_get(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let mut problems = Vec::new();
     for base in TYPES {
@@ -24,7 +24,7 @@ pub(super) fn bad_reference_get(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn bad_reference_set(p: &Probe) -> Tested {
+pub(in super::super) fn bad_reference_set(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let mut problems = Vec::new();
     for base in TYPES {
@@ -44,7 +44,7 @@ pub(super) fn bad_reference_set(p: &Probe) -> Tested {
 }
 
 /// A reference of which the FMU looks at 16 bits is one of another variable.
-pub(super) fn bits(p: &Probe) -> Tested {
+pub(in super::super) fn bits(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     if instance.get_real(&[p.unused_reference(BaseType::Real)]).is_ok() {
         return not_tested("unknown value references are accepted");
@@ -67,13 +67,13 @@ pub(super) fn bits(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn empty(p: &Probe) -> Tested {
+pub(in super::super) fn empty(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let failed = instance.empty_calls().into_iter().filter(|(_, status)| !status.is_ok());
     Ok(failed.map(|(name, status)| format!("{name} of no variables at all returned {status}")).collect())
 }
 
-pub(super) fn string_values(p: &Probe) -> Tested {
+pub(in super::super) fn string_values(p: &Probe) -> Tested {
     let strings: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::String).collect();
     if strings.is_empty() {
         return not_applicable("there is no String variable");
@@ -87,7 +87,7 @@ pub(super) fn string_values(p: &Probe) -> Tested {
 }
 
 /// Texts read together are those read one by one.
-pub(super) fn string_buffers(p: &Probe) -> Tested {
+pub(in super::super) fn string_buffers(p: &Probe) -> Tested {
     let strings: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::String).take(50).collect();
     if strings.len() < 2 {
         return not_applicable("there are no two String variables");

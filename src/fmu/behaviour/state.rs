@@ -37,7 +37,7 @@ fn takes_disturbance(p: &Probe) -> bool {
     attempt().is_ok()
 }
 
-pub(super) fn restore(p: &Probe) -> Tested {
+pub(in super::super) fn restore(p: &Probe) -> Tested {
     needs_state(p)?;
     if !get_consistent(p)?.is_empty() {
         return not_tested("reading changes values");
@@ -88,7 +88,7 @@ pub(super) fn restore(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn handles(p: &Probe) -> Tested {
+pub(in super::super) fn handles(p: &Probe) -> Tested {
     needs_state(p)?;
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 1)?;
@@ -97,7 +97,7 @@ pub(super) fn handles(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn serialise(p: &Probe) -> Tested {
+pub(in super::super) fn serialise(p: &Probe) -> Tested {
     needs_state(p)?;
     if !p.interface().can_serialize_state {
         return not_applicable("canSerializeFMUstate is false");

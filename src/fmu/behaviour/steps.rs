@@ -87,7 +87,7 @@ pub(super) fn size_counts(p: &Probe) -> Result<(), super::Stop> {
     }
 }
 
-pub(super) fn ignored(p: &Probe) -> Tested {
+pub(in super::super) fn ignored(p: &Probe) -> Tested {
     let courses = two_sizes(p, 10)?;
     Ok(match ignores_size(&courses) {
         Some(name) => {
@@ -100,7 +100,7 @@ pub(super) fn ignored(p: &Probe) -> Tested {
     })
 }
 
-pub(super) fn convergence(p: &Probe) -> Tested {
+pub(in super::super) fn convergence(p: &Probe) -> Tested {
     let count = 8;
     let courses = two_sizes(p, count)?;
     if ignores_size(&courses).is_some() {
@@ -128,7 +128,7 @@ pub(super) fn convergence(p: &Probe) -> Tested {
 
 /// Outputs that are those of the step before: then a course in steps of h, looked at one step later, is that in steps of
 /// h/2, looked at one of its steps later.
-pub(super) fn delay(p: &Probe) -> Tested {
+pub(in super::super) fn delay(p: &Probe) -> Tested {
     let count = 10;
     let courses = two_sizes(p, count)?;
     if ignores_size(&courses).is_some() {
@@ -168,7 +168,7 @@ fn range(rows: &[Vec<f64>], at: usize) -> f64 {
     high - low
 }
 
-pub(super) fn variable(p: &Probe) -> Tested {
+pub(in super::super) fn variable(p: &Probe) -> Tested {
     if !p.interface().can_handle_variable_step_size {
         return not_applicable("canHandleVariableCommunicationStepSize is false");
     }
@@ -198,7 +198,7 @@ pub(super) fn variable(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn time(p: &Probe) -> Tested {
+pub(in super::super) fn time(p: &Probe) -> Tested {
     let Some(v) = p.d.variables.iter().find(|v| v.causality == Causality::Independent && v.base() == BaseType::Real)
     else {
         return not_applicable("there is no independent variable");
@@ -230,7 +230,7 @@ pub(super) fn time(p: &Probe) -> Tested {
     Ok(wrong.into_iter().collect())
 }
 
-pub(super) fn derivative(p: &Probe) -> Tested {
+pub(in super::super) fn derivative(p: &Probe) -> Tested {
     let pairs: Vec<(&Variable, &Variable)> =
         p.d.variables
             .iter()
@@ -274,14 +274,14 @@ fn accepted(instance: &mut Instance, time: f64, step: f64) -> Result<bool, HostE
     instance.do_step_status(time, step, true).map(super::super::host::Status::is_ok)
 }
 
-pub(super) fn negative(p: &Probe) -> Tested {
+pub(in super::super) fn negative(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     let taken = accepted(&mut instance, p.time(3), -p.step)?;
     Ok(if taken { vec![format!("fmi2DoStep by {} returned fmi2OK", -p.step)] } else { vec![] })
 }
 
-pub(super) fn zero(p: &Probe) -> Tested {
+pub(in super::super) fn zero(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     let before = p.observe(&mut instance)?;
@@ -295,7 +295,7 @@ pub(super) fn zero(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn wrong_point(p: &Probe) -> Tested {
+pub(in super::super) fn wrong_point(p: &Probe) -> Tested {
     let mut problems = Vec::new();
     for (what, at) in [("ahead of", 8), ("behind", 1)] {
         let mut instance = p.ready()?;
@@ -311,7 +311,7 @@ pub(super) fn wrong_point(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn nan_input(p: &Probe) -> Tested {
+pub(in super::super) fn nan_input(p: &Probe) -> Tested {
     let references: Vec<u32> = p.inputs().filter(|v| v.base() == BaseType::Real).map(|v| v.value_reference).collect();
     if references.is_empty() {
         return not_applicable("there is no Real input");
@@ -328,7 +328,7 @@ pub(super) fn nan_input(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-pub(super) fn early(p: &Probe) -> Tested {
+pub(in super::super) fn early(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
     let mut problems = Vec::new();
     if accepted(&mut instance, p.start, p.step)? {
@@ -341,7 +341,7 @@ pub(super) fn early(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn late(p: &Probe) -> Tested {
+pub(in super::super) fn late(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     instance.terminate()?;
@@ -349,7 +349,7 @@ pub(super) fn late(p: &Probe) -> Tested {
     Ok(if taken { vec!["fmi2DoStep after fmi2Terminate returned fmi2OK".into()] } else { vec![] })
 }
 
-pub(super) fn initialisation_order(p: &Probe) -> Tested {
+pub(in super::super) fn initialisation_order(p: &Probe) -> Tested {
     let mut problems = Vec::new();
     let mut instance = p.instantiate()?;
     if instance.exit_initialization().is_ok() {
@@ -369,7 +369,7 @@ pub(super) fn initialisation_order(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn status_functions(p: &Probe) -> Tested {
+pub(in super::super) fn status_functions(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 1)?;
     instance.status_calls();

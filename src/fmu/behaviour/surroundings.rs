@@ -23,7 +23,7 @@ fn run(p: &Probe, resources: String) -> Result<Vec<Snapshot>, HostError> {
 }
 
 /// The resources in a folder whose name has a blank and an umlaut, which a URI spells `%20` and `%C3%A4`.
-pub(super) fn resources(setup: &Setup) -> Tested {
+pub(in super::super) fn resources(setup: &Setup) -> Tested {
     let p = setup.probe()?;
     if p.interface().only_once {
         return super::probe::not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
@@ -101,7 +101,7 @@ fn set_comma(workplace: &Path) -> bool {
 }
 
 /// The FMU where the host has set a locale with a decimal comma, as applications with a user interface do.
-pub(super) fn locale(setup: &Setup) -> Tested {
+pub(in super::super) fn locale(setup: &Setup) -> Tested {
     let p = setup.probe()?;
     if p.interface().only_once {
         return super::probe::not_applicable("canBeInstantiatedOnlyOncePerProcess is true");

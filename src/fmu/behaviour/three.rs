@@ -23,7 +23,7 @@ fn steps(p: &Probe) -> usize {
 }
 
 /// The output arguments of each step, where no early return is allowed.
-pub(super) fn report(p: &Probe) -> Tested {
+pub(in super::super) fn report(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let (mut lagging, mut in_time) = (None, false);
     for k in 0..steps(p) {
@@ -54,7 +54,7 @@ pub(super) fn report(p: &Probe) -> Tested {
 }
 
 /// Runs with early return allowed: each early return is announced, gets on, and can be gone on from.
-pub(super) fn early_return(p: &Probe) -> Tested {
+pub(in super::super) fn early_return(p: &Probe) -> Tested {
     if !p.interface().might_return_early {
         return not_applicable("mightReturnEarlyFromDoStep is false");
     }
@@ -93,7 +93,7 @@ pub(super) fn early_return(p: &Probe) -> Tested {
 }
 
 /// Runs with event mode used, entering it where the FMU asks for it, and at one point where only the importer does.
-pub(super) fn event_mode(p: &Probe) -> Tested {
+pub(in super::super) fn event_mode(p: &Probe) -> Tested {
     if !p.interface().has_event_mode {
         return not_applicable("hasEventMode is false");
     }
@@ -123,7 +123,7 @@ pub(super) fn event_mode(p: &Probe) -> Tested {
 }
 
 /// Structural parameters set to their own values in configuration mode leave a run as it was.
-pub(super) fn configuration_mode(p: &Probe) -> Tested {
+pub(in super::super) fn configuration_mode(p: &Probe) -> Tested {
     let structural: Vec<_> = p.d.variables.iter().filter(|v| v.causality == Causality::StructuralParameter).collect();
     if structural.is_empty() {
         return not_applicable("there is no structural parameter");
@@ -159,7 +159,7 @@ pub(super) fn configuration_mode(p: &Probe) -> Tested {
 }
 
 /// Reading an array into less room than it needs.
-pub(super) fn array_count(p: &Probe) -> Tested {
+pub(in super::super) fn array_count(p: &Probe) -> Tested {
     let arrays =
         p.d.variables.iter().filter_map(|v| v.cell).filter(|c| c.kind == Kind::Float64 && c.of > 1 && c.at == 0);
     let mut any = false;

@@ -47,7 +47,7 @@ fn same(a: &Value, b: &Value) -> bool {
     }
 }
 
-pub(super) fn start_values(p: &Probe) -> Tested {
+pub(in super::super) fn start_values(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
     instance.initialize(p.start, p.stop)?;
     let mut problems = Vec::new();
@@ -72,7 +72,7 @@ pub(super) fn start_values(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn start_settable(p: &Probe) -> Tested {
+pub(in super::super) fn start_settable(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
     let mut problems = Vec::new();
     for v in p.d.variables.iter().filter(|v| settable(v)) {
@@ -145,7 +145,7 @@ fn is_rounded(value: f64, read: f64) -> bool {
     (read - value).abs() <= SINGLE * value.abs()
 }
 
-pub(super) fn set_get(p: &Probe) -> Tested {
+pub(in super::super) fn set_get(p: &Probe) -> Tested {
     let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
     let mut problems: Vec<String> =
         kept(p)?.into_iter().filter(|(_, _, value, read)| !is_rounded(*value, *read)).map(say).collect();
@@ -171,14 +171,14 @@ pub(super) fn set_get(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-pub(super) fn set_get_rounded(p: &Probe) -> Tested {
+pub(in super::super) fn set_get_rounded(p: &Probe) -> Tested {
     let rounded = kept(p)?.into_iter().filter(|(_, _, value, read)| value != read && is_rounded(*value, *read));
     let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
     Ok(rounded.map(say).collect())
 }
 
 /// A tunable parameter that acts when it is set before the run acts when it is set during it.
-pub(super) fn tunable_effect(p: &Probe) -> Tested {
+pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
     let tunable = |v: &&Variable| v.causality == Causality::Parameter && v.variability == Variability::Tunable;
     p.comparable()?;
     let (n, cut) = (p.steps(), p.steps() / 3);
@@ -239,7 +239,7 @@ pub(super) fn tunable_effect(p: &Probe) -> Tested {
     if any { Ok(problems) } else { not_applicable("there is no tunable parameter with another value to set") }
 }
 
-pub(super) fn get_consistent(p: &Probe) -> Tested {
+pub(in super::super) fn get_consistent(p: &Probe) -> Tested {
     p.comparable()?;
     let n = p.steps();
     let mut instance = p.ready()?;
@@ -271,7 +271,7 @@ pub(super) fn get_consistent(p: &Probe) -> Tested {
         .collect())
 }
 
-pub(super) fn boolean_values(p: &Probe) -> Tested {
+pub(in super::super) fn boolean_values(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let booleans: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::Boolean).collect();
     if booleans.is_empty() {
@@ -284,7 +284,7 @@ pub(super) fn boolean_values(p: &Probe) -> Tested {
     Ok(wrong.map(|(v, value)| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name)).collect())
 }
 
-pub(super) fn unchanging(p: &Probe) -> Tested {
+pub(in super::super) fn unchanging(p: &Probe) -> Tested {
     let kept: Vec<&Variable> = p
         .d
         .variables
@@ -350,7 +350,7 @@ fn watch(
     Ok(None)
 }
 
-pub(super) fn finite(p: &Probe) -> Tested {
+pub(in super::super) fn finite(p: &Probe) -> Tested {
     let outputs: Vec<&Variable> =
         p.d.variables.iter().filter(|v| v.causality == Causality::Output && v.base() == BaseType::Real).collect();
     if outputs.is_empty() {
@@ -373,7 +373,7 @@ pub(super) fn finite(p: &Probe) -> Tested {
     Ok(found.into_iter().collect())
 }
 
-pub(super) fn range(p: &Probe) -> Tested {
+pub(in super::super) fn range(p: &Probe) -> Tested {
     let watched: Vec<(&Variable, f64, f64, Vec<i64>)> =
         p.d.variables
             .iter()
@@ -423,7 +423,7 @@ fn other(p: &Probe, v: &Variable) -> Option<Value> {
     }
 }
 
-pub(super) fn fixed_set(p: &Probe) -> Tested {
+pub(in super::super) fn fixed_set(p: &Probe) -> Tested {
     let fixed = |v: &&Variable| {
         matches!(v.causality, Causality::Parameter | Causality::StructuralParameter)
             && v.variability == Variability::Fixed
@@ -452,7 +452,7 @@ pub(super) fn fixed_set(p: &Probe) -> Tested {
     })
 }
 
-pub(super) fn tunable_set(p: &Probe) -> Tested {
+pub(in super::super) fn tunable_set(p: &Probe) -> Tested {
     let tunable = |v: &&Variable| v.causality == Causality::Parameter && v.variability == Variability::Tunable;
     let mut any = false;
     let mut problems = Vec::new();
@@ -469,7 +469,7 @@ pub(super) fn tunable_set(p: &Probe) -> Tested {
 }
 
 /// Every variable of the description is one of the binary.
-pub(super) fn readable(p: &Probe) -> Tested {
+pub(in super::super) fn readable(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     let mut problems = Vec::new();
     for v in &p.d.variables {

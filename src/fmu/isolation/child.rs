@@ -20,9 +20,10 @@ mod unix {
     use std::process::ExitCode;
     use std::sync::atomic::Ordering;
 
-    use super::super::super::behaviour::{self, Setup, Stop};
+    use super::super::super::behaviour::{self, Behaviour, Setup, Stop};
     use super::super::super::description::Description;
     use super::super::super::host::{Fmu, HostError};
+    use super::super::super::rules::{self, Check, id};
     use super::super::super::simulate::{self, Record};
     use super::super::super::xml::Document;
     use super::super::job::{Answer, Head, Job, Nonce, Order, RunTask, Task, numbers, send_numbers};
@@ -53,7 +54,7 @@ mod unix {
             let strength = sandbox::raise(fence, &page.refused);
             page.strength.store(strength as u32, Ordering::Relaxed);
         }
-        let at_once = !matches!(&order.job, Job::Rule(task) if task.rule == "unload");
+        let at_once = !matches!(&order.job, Job::Rule(task) if task.rule == id::UNLOAD.text());
         let (answer, record) = match order.job {
             Job::Rule(task) => (rule(task)?, None),
             Job::Simulate(task) => match simulation(&task) {
@@ -118,8 +119,10 @@ mod unix {
         let xml = std::fs::read(task.folder.join("modelDescription.xml"))?;
         // Whether the version is spelt right is a rule of its own.
         let description = Description::from_document(&Document::parse(&xml).map_err(io::Error::other)?);
-        let test = behaviour::behaviour(&task.rule).ok_or_else(|| io::Error::other("no such rule"))?;
-        let Task { rule: task_rule, folder, binary_path, workplace, learned } = task;
+        let Some(Check::Behaviour(test)) = rules::rule(&task.rule).map(|rule| rule.check) else {
+            return Err(io::Error::other("no such rule"));
+        };
+        let Task { folder, binary_path, workplace, learned, .. } = task;
         let setup = Setup { description, folder, binary_path, workplace, learned };
         let (tested, learned) = behaviour::run(test, &setup);
         let mut answer = Answer { learned, ..Answer::default() };
@@ -127,7 +130,9 @@ mod unix {
             Ok(findings) => answer.findings = findings.into_iter().map(|message| (message, None)).collect(),
             Err(Stop::NotApplicable(why)) => answer.not_applicable = Some(why),
             Err(Stop::NotTested(why)) => answer.not_tested = Some(why),
-            Err(Stop::Host(error)) if behaviour::is_indirect(&task_rule) => answer.not_tested = Some(error.to_string()),
+            Err(Stop::Host(error)) if matches!(test, Behaviour::Indirect(_)) => {
+                answer.not_tested = Some(error.to_string())
+            }
             Err(Stop::Host(error)) => {
                 let call = match &error {
                     HostError::Status { function, .. } | HostError::Missing(function) => Some((*function).to_owned()),

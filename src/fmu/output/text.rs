@@ -234,7 +234,7 @@ pub fn rules_json() -> serde_json::Value {
             serde_json::json!({
                 "id": r.id, "title": r.title, "severity": r.severity, "kind": r.kind,
                 "section": r.section(Fmi::Two), "section3": r.section(Fmi::Three),
-                "advice": r.advice, "tests": if r.check.is_static() { "file" } else { "behaviour" },
+                "advice": r.advice, "tests": if r.is_static() { "file" } else { "behaviour" },
             })
         })
         .collect();

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use super::super::xml::Element;
 use super::finding::Findings;
+use super::id;
 
 /// Checks the clocks, and the variables that name them.
 pub(super) fn check(root: &Element, findings: &mut Findings) {
@@ -16,7 +17,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
         if v.name == "Clock"
             && let Some(why) = clock(v)
         {
-            findings.at("clock", v.position, format!("the clock \"{name}\": {why}"));
+            findings.at(id::CLOCK, v.position, format!("the clock \"{name}\": {why}"));
         }
         for reference in v.get("clocks").unwrap_or("").split_whitespace() {
             let why = match by_reference.get(reference) {
@@ -24,7 +25,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
                 Some(other) if other.name != "Clock" => format!("\"{}\" is no clock", other.get("name").unwrap_or("")),
                 Some(_) => continue,
             };
-            findings.at("clock", v.position, format!("\"{name}\" belongs to the clock {reference}: {why}"));
+            findings.at(id::CLOCK, v.position, format!("\"{name}\" belongs to the clock {reference}: {why}"));
         }
     }
     let has_clock = all.iter().any(|v| v.name == "Clock");
@@ -32,7 +33,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
         && !interface.get("hasEventMode").is_some_and(|flag| flag == "true" || flag == "1")
     {
         let message = "there are clocks, which tick in event mode, but hasEventMode is not true";
-        findings.at("clock", interface.position, message);
+        findings.at(id::CLOCK, interface.position, message);
     }
 }
 

@@ -6,6 +6,7 @@ use super::super::description::{Description, Fmi, Interface};
 use super::super::xml::{Element, Position};
 use super::finding::Findings;
 use super::names::is_c_identifier;
+use super::{Id, id};
 
 /// The version of FMI, where it is one with rules of its own.
 pub(super) fn foreign(root: &Element) -> Option<&str> {
@@ -17,7 +18,7 @@ pub(super) fn foreign(root: &Element) -> Option<&str> {
 pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
     if root.name != "fmiModelDescription" {
         let message = format!("the root element is {}, not fmiModelDescription", root.name);
-        findings.at("schema-element", root.position, message);
+        findings.at(id::SCHEMA_ELEMENT, root.position, message);
         return false;
     }
     match root.get("fmiVersion") {
@@ -25,7 +26,7 @@ pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
         Some(three) if Fmi::of(three) == Some(Fmi::Three) => {
             if !is_version_3(three) {
                 let message = format!("fmiVersion is \"{three}\"; it is \"3.0\" for every FMI 3.0.x");
-                findings.at("fmi-version", root.position_of("fmiVersion"), message);
+                findings.at(id::FMI_VERSION, root.position_of("fmiVersion"), message);
             }
             true
         }
@@ -34,7 +35,7 @@ pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
                 Some(other) => format!("fmiVersion is \"{other}\"; it is \"2.0\" for every FMI 2.0.x"),
                 None => "fmiVersion is missing; it is \"2.0\" for every FMI 2.0.x".into(),
             };
-            findings.at("fmi-version", root.position_of("fmiVersion"), message);
+            findings.at(id::FMI_VERSION, root.position_of("fmiVersion"), message);
             true
         }
     }
@@ -45,10 +46,10 @@ pub(super) fn check(d: &Description, root: &Element, findings: &mut Findings) {
     if d.guid.trim().is_empty() {
         let name = if d.fmi == Fmi::Three { "instantiationToken" } else { "guid" };
         let message = format!("the {name} is empty, so that it ties no binary to this file");
-        findings.at("guid", root.position_of(name), message);
+        findings.at(id::GUID, root.position_of(name), message);
     }
     if d.model_name.trim().is_empty() {
-        findings.at("model-name", root.position_of("modelName"), "the modelName is empty");
+        findings.at(id::MODEL_NAME, root.position_of("modelName"), "the modelName is empty");
     }
     for (name, interface) in [("ModelExchange", &d.model_exchange), ("CoSimulation", &d.co_simulation)] {
         if let Some(interface) = interface {
@@ -56,14 +57,14 @@ pub(super) fn check(d: &Description, root: &Element, findings: &mut Findings) {
         }
     }
     experiment(d, findings);
-    unique("log-category", "log category", d.log_categories.iter().map(|c| (c.0.as_str(), c.2)), findings);
+    unique(id::LOG_CATEGORY, "log category", d.log_categories.iter().map(|c| (c.0.as_str(), c.2)), findings);
     if d.fmi == Fmi::Three {
         return;
     }
     let tools = root.child("VendorAnnotations");
     let tools =
         tools.into_iter().flat_map(|v| v.children_named("Tool")).map(|t| (t.get("name").unwrap_or(""), t.position));
-    unique("vendor-tool", "vendor annotation of tool", tools, findings);
+    unique(id::VENDOR_TOOL, "vendor annotation of tool", tools, findings);
 }
 
 /// The pattern of the schema: `3[.](0|[1-9][0-9]*)([.](0|[1-9][0-9]*))?(-.+)?`.
@@ -79,12 +80,7 @@ fn is_version_3(text: &str) -> bool {
         && label.is_none_or(|l| !l.is_empty())
 }
 
-fn unique<'a>(
-    rule: &'static str,
-    what: &str,
-    names: impl Iterator<Item = (&'a str, Position)>,
-    findings: &mut Findings,
-) {
+fn unique<'a>(rule: Id, what: &str, names: impl Iterator<Item = (&'a str, Position)>, findings: &mut Findings) {
     let mut seen = HashSet::new();
     for (name, position) in names {
         if !seen.insert(name) {
@@ -96,17 +92,17 @@ fn unique<'a>(
 fn check_interface(name: &str, interface: &Interface, findings: &mut Findings) {
     if !is_c_identifier(&interface.model_identifier) {
         let message = format!("{name}: modelIdentifier \"{}\" is no identifier of C", interface.model_identifier);
-        findings.at("model-identifier", interface.position, message);
+        findings.at(id::MODEL_IDENTIFIER, interface.position, message);
     }
     if interface.can_serialize_state && !interface.can_get_and_set_state {
         let message = format!("{name}: canSerializeFMUstate without canGetAndSetFMUstate");
-        findings.at("capability-serialize", interface.position, message);
+        findings.at(id::CAPABILITY_SERIALIZE, interface.position, message);
     }
 }
 
 fn experiment(d: &Description, findings: &mut Findings) {
     let Some(e) = &d.default_experiment else { return };
-    let mut complain = |message: String| findings.at("default-experiment", e.position, message);
+    let mut complain = |message: String| findings.at(id::DEFAULT_EXPERIMENT, e.position, message);
     let start = e.start_time.unwrap_or(0.0);
     for (name, value) in
         [("startTime", e.start_time), ("stopTime", e.stop_time), ("tolerance", e.tolerance), ("stepSize", e.step_size)]

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::description::Fmi;
 use super::super::xml::Position;
-use super::{Rule, Severity};
+use super::{Id, Rule, Severity, id};
 
 /// Where a finding is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,10 +94,10 @@ impl Report {
         if self.count(Severity::Error) > 0 || strict && self.count(Severity::Warning) > 0 {
             return Outcome::Fails;
         }
-        let asked = || self.rules.iter().filter(|(r, v)| !r.check.is_static() && *v != Verdict::Skipped);
+        let asked = || self.rules.iter().filter(|(r, v)| !r.is_static() && *v != Verdict::Skipped);
         let untested = |(_, verdict): &(&Rule, Verdict)| matches!(verdict, Verdict::NotTested(_));
         // Without the default experiment nothing of the FMU has been seen at work.
-        let idle = asked().any(|rule| rule.0.id == "simulate" && untested(rule));
+        let idle = asked().any(|rule| rule.0.is(id::SIMULATE) && untested(rule));
         if !self.static_only && asked().next().is_some() && (idle || asked().all(untested)) {
             return Outcome::NotTested;
         }
@@ -119,27 +119,26 @@ pub(crate) struct Findings {
 
 impl Findings {
     /// A finding at a place of `modelDescription.xml`.
-    pub fn at(&mut self, rule: &'static str, position: Position, message: impl Into<String>) {
+    pub fn at(&mut self, rule: Id, position: Position, message: impl Into<String>) {
         self.push(rule, Some(Place { file: "modelDescription.xml".into(), position: Some(position) }), message.into());
     }
 
     /// A finding on an entry of the archive.
-    pub fn entry(&mut self, rule: &'static str, file: &str, message: impl Into<String>) {
+    pub fn entry(&mut self, rule: Id, file: &str, message: impl Into<String>) {
         self.push(rule, Some(Place { file: file.to_owned(), position: None }), message.into());
     }
 
     /// A finding on the whole.
-    pub fn whole(&mut self, rule: &'static str, message: impl Into<String>) {
+    pub fn whole(&mut self, rule: Id, message: impl Into<String>) {
         self.push(rule, None, message.into());
     }
 
-    fn push(&mut self, rule: &'static str, place: Option<Place>, message: String) {
-        debug_assert!(super::rule(rule).is_some(), "{rule} is not in the list of rules");
-        self.list.push(Finding { rule: rule.into(), message, place, call: None, advice: None });
+    fn push(&mut self, rule: Id, place: Option<Place>, message: String) {
+        self.list.push(Finding { rule: rule.text().into(), message, place, call: None, advice: None });
     }
 
     /// Whether a rule has a finding.
-    pub fn has(&self, rule: &str) -> bool {
-        self.list.iter().any(|f| f.rule == rule)
+    pub fn has(&self, rule: Id) -> bool {
+        self.list.iter().any(|f| f.rule == rule.text())
     }
 }

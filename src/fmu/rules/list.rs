@@ -1,343 +1,388 @@
 //! THE list of rules. `eixo validate --rules`, the documentation and the tests iterate it; nothing lists rules twice.
 //!
+//! A behavioural rule stands here with the function that tests it. The static rules come out of readers that go through the
+//! file once and find on their way what several of them ask, so that none has a function of its own: each has a constant in
+//! [`id`], with which its findings are reported. One that is never used is a warning of the compiler. Behavioural rules have
+//! a constant where something else speaks of them.
+//!
 //! The first section is that of FMI 2.0.4, the second that of FMI 3.0; `-` stands for none: the rule is not one of that
-//! version, or not tested for it. Titles and advice are in the words of 2.0; [`super::words`] has those of 3.0. What the standard leaves undefined is robustness, never conformance; and what only an
-//! importer that breaks the standard can bring out (a call out of order, an unknown reference) is a note.
+//! version, or not tested for it. Titles and advice are in the words of 2.0; [`super::words`] has those of 3.0. What the standard
+//! leaves undefined is robustness, never conformance; and what only an importer that breaks the standard can bring out (a call out of order, an unknown reference) is a note.
 
+use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
+use super::super::behaviour::{
+    dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, state, steps,
+    surroundings, three, values,
+};
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
 use super::{Check, Rule};
 
+/// The name of a rule; there are none but those of the list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Id(&'static str);
+
+impl Id {
+    /// As `--only`, `--skip` and reports have it.
+    pub const fn text(self) -> &'static str {
+        self.0
+    }
+}
+
 macro_rules! rules {
-    ($($id:literal $severity:ident $kind:ident $two:literal $three:literal $check:expr; $title:literal, $advice:literal;)*) => {
+    (
+        static {$(
+            $name:ident = $id:literal $severity:ident $kind:ident $two:literal $three:literal; $title:literal, $advice:literal;
+        )*}
+        behaviour {$(
+            $($b_name:ident =)? $b_id:literal $b_severity:ident $b_kind:ident $b_two:literal $b_three:literal $test:expr;
+            $b_title:literal, $b_advice:literal;
+        )*}
+    ) => {
+        /// Names of rules.
+        pub(crate) mod id {
+            use super::Id;
+            $(pub(crate) const $name: Id = Id($id);)*
+            $($(pub(crate) const $b_name: Id = Id($b_id);)?)*
+        }
+
         /// Every rule, in the order in which it is reported.
-        pub const RULES: &[Rule] = &[$(Rule {
-            id: $id, title: $title, severity: $severity, kind: $kind, sections: [$two, $three], advice: $advice, check: $check,
-        }),*];
+        pub const RULES: &[Rule] = &[
+            $(Rule {
+                id: $id, title: $title, severity: $severity, kind: $kind, sections: [$two, $three], advice: $advice,
+                check: Check::Static,
+            },)*
+            $(Rule {
+                id: $b_id, title: $b_title, severity: $b_severity, kind: $b_kind, sections: [$b_two, $b_three],
+                advice: $b_advice, check: Check::Behaviour($test),
+            }),*
+        ];
     };
 }
 
-rules! {
-    "archive-readable" Error Conformance "2.3" "2.5" Check::Static;
+rules! { static {
+    ARCHIVE_READABLE = "archive-readable" Error Conformance "2.3" "2.5";
         "The FMU is a ZIP archive", "Pack the FMU again with an ordinary ZIP tool; compare its size with the original after each transfer.";
-    "archive-path" Error Robustness "2.3" "2.5" Check::Static;
+    ARCHIVE_PATH = "archive-path" Error Robustness "2.3" "2.5";
         "No entry leads out of the archive", "Remove absolute paths, `..`, symbolic links and control characters from the entries' names; importers refuse or overwrite files.";
-    "archive-backslash" Error Conformance "2.3" "2.5" Check::Static;
+    ARCHIVE_BACKSLASH = "archive-backslash" Error Conformance "2.3" "2.5";
         "Paths use forward slashes", "Pack with forward slashes, which the ZIP specification prescribes; importers outside Windows see one odd file name.";
-    "archive-method" Error Conformance "2.3" "2.5" Check::Static;
+    ARCHIVE_METHOD = "archive-method" Error Conformance "2.3" "2.5";
         "Entries are deflated or stored, and not encrypted", "Pack with deflate and without a password.";
-    "archive-duplicate" Error Robustness "2.3" "2.5" Check::Static;
+    ARCHIVE_DUPLICATE = "archive-duplicate" Error Robustness "2.3" "2.5";
         "Entry names are unique, on any file system", "Rename or remove the second entry; which of the two an importer takes is chance.";
-    "archive-damaged" Error Conformance "2.3" "2.5" Check::Static;
+    ARCHIVE_DAMAGED = "archive-damaged" Error Conformance "2.3" "2.5";
         "Every entry can be inflated and has the right checksum", "Pack the FMU again; it was cut or changed after packing.";
-    "archive-bomb" Error Robustness "2.3" "2.5" Check::Static;
+    ARCHIVE_BOMB = "archive-bomb" Error Robustness "2.3" "2.5";
         "The archive inflates to a sane size", "Remove the entry that inflates beyond all measure, or ship it outside the FMU.";
-    "archive-description" Error Conformance "2.3" "2.5.1" Check::Static;
+    ARCHIVE_DESCRIPTION = "archive-description" Error Conformance "2.3" "2.5.1";
         "modelDescription.xml is at the top of the archive", "Pack the folder's contents, not the folder, and spell modelDescription.xml exactly so.";
-    "xml-well-formed" Error Conformance "2.2" "2.4" Check::Static;
+    XML_WELL_FORMED = "xml-well-formed" Error Conformance "2.2" "2.4";
         "modelDescription.xml is well-formed XML", "Correct the XML at the place named; escape & as &amp; and < as &lt;.";
-    "fmi-version" Error Conformance "2.2.1" "2.4.1" Check::Static;
+    FMI_VERSION = "fmi-version" Error Conformance "2.2.1" "2.4.1";
         "fmiVersion is 2.0", "Write fmiVersion=\"2.0\", for 2.0.1 to 2.0.5 too.";
-    "interface-missing" Error Conformance "2.2.1" "2.4.1" Check::Static;
+    INTERFACE_MISSING = "interface-missing" Error Conformance "2.2.1" "2.4.1";
         "There is a ModelExchange or CoSimulation element", "Put one of them first in the file.";
-    "schema-element" Error Conformance "2.2" "2.4" Check::Static;
+    SCHEMA_ELEMENT = "schema-element" Error Conformance "2.2" "2.4";
         "Elements are where the schema has them", "Put the elements in the schema's order, and no others.";
-    "schema-attribute" Error Conformance "2.2" "2.4" Check::Static;
+    SCHEMA_ATTRIBUTE = "schema-attribute" Error Conformance "2.2" "2.4";
         "Attributes are those of the schema", "Correct the spelling, or move tool data to VendorAnnotations or Annotations.";
-    "schema-required" Error Conformance "2.2" "2.4" Check::Static;
+    SCHEMA_REQUIRED = "schema-required" Error Conformance "2.2" "2.4";
         "Required attributes are there", "Add the attribute.";
-    "schema-value" Error Conformance "2.2" "2.4" Check::Static;
+    SCHEMA_VALUE = "schema-value" Error Conformance "2.2" "2.4";
         "Attribute values are of the schema's types", "Write the value in the form named.";
-    "date-time" Error Conformance "2.2.1" "2.4.1" Check::Static;
+    DATE_TIME = "date-time" Error Conformance "2.2.1" "2.4.1";
         "generationDateAndTime is a date and time", "Write it as 2009-12-08T14:33:22Z.";
-    "guid" Error Conformance "2.2.1" "2.4.1" Check::Static;
+    GUID = "guid" Error Conformance "2.2.1" "2.4.1";
         "The guid is not empty", "Generate a guid (or a hash of the file) at export and compile it into the binary.";
-    "model-name" Warning Quality "2.2.1" "2.4.1" Check::Static;
+    MODEL_NAME = "model-name" Warning Quality "2.2.1" "2.4.1";
         "The modelName is not empty", "Give the model's name.";
-    "model-identifier" Error Conformance "2.2.1" "2.4.2" Check::Static;
+    MODEL_IDENTIFIER = "model-identifier" Error Conformance "2.2.1" "2.4.2";
         "modelIdentifier is a C identifier", "Use letters, digits and underscores, no digit first; it names the binary and prefixes functions in source code.";
-    "capability-serialize" Error Conformance "4.3.1" "2.4.2" Check::Static;
+    CAPABILITY_SERIALIZE = "capability-serialize" Error Conformance "4.3.1" "2.4.2";
         "canSerializeFMUstate comes with canGetAndSetFMUstate", "Set both flags, or neither.";
-    "log-category" Error Conformance "2.2.4" "2.4.5" Check::Static;
+    LOG_CATEGORY = "log-category" Error Conformance "2.2.4" "2.4.5";
         "Log categories are unique", "Remove the second one.";
-    "vendor-tool" Error Conformance "2.2.6" "-" Check::Static;
+    VENDOR_TOOL = "vendor-tool" Error Conformance "2.2.6" "-";
         "Vendor annotations are unique by tool", "Merge the annotations of one tool.";
-    "default-experiment" Error Conformance "2.2.5" "2.4.6" Check::Static;
+    DEFAULT_EXPERIMENT = "default-experiment" Error Conformance "2.2.5" "2.4.6";
         "The default experiment is in order", "Let startTime < stopTime, 0 < stepSize <= stopTime - startTime and tolerance > 0.";
-    "unit-unique" Error Conformance "2.2.2" "2.4.3" Check::Static;
+    UNIT_UNIQUE = "unit-unique" Error Conformance "2.2.2" "2.4.3";
         "Units, and display units of a unit, are unique", "Remove the second one.";
-    "unit-conversion" Error Conformance "2.2.2" "2.4.3" Check::Static;
+    UNIT_CONVERSION = "unit-conversion" Error Conformance "2.2.2" "2.4.3";
         "Factors of units can be inverted", "Give a finite factor that is not 0.";
-    "unit-undeclared" Error Conformance "2.2.2" "2.4.3" Check::Static;
+    UNIT_UNDECLARED = "unit-undeclared" Error Conformance "2.2.2" "2.4.3";
         "Units in use are defined", "Add the Unit to UnitDefinitions.";
-    "display-unit" Error Conformance "2.2.2" "2.4.3" Check::Static;
+    DISPLAY_UNIT = "display-unit" Error Conformance "2.2.2" "2.4.3";
         "Display units in use are defined, and have a unit", "Add the DisplayUnit to the Unit, or the unit to the variable.";
-    "type-unique" Error Conformance "2.2.3" "2.4.4" Check::Static;
+    TYPE_UNIQUE = "type-unique" Error Conformance "2.2.3" "2.4.4";
         "Type names are unique, among variables too", "Rename the type.";
-    "type-undeclared" Error Conformance "2.2.3" "2.4.4" Check::Static;
+    TYPE_UNDECLARED = "type-undeclared" Error Conformance "2.2.3" "2.4.4";
         "Declared types are defined", "Add the SimpleType to TypeDefinitions.";
-    "type-mismatch" Error Conformance "2.2.3" "2.4.4" Check::Static;
+    TYPE_MISMATCH = "type-mismatch" Error Conformance "2.2.3" "2.4.4";
         "A variable is of the type that its declared type has", "Let both be Real, Integer, Boolean, String or Enumeration.";
-    "enumeration-items" Error Conformance "2.2.3" "2.4.4" Check::Static;
+    ENUMERATION_ITEMS = "enumeration-items" Error Conformance "2.2.3" "2.4.4";
         "Items of an enumeration are unique in name and value", "Give each item its own name and value.";
-    "variable-name-unique" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    VARIABLE_NAME_UNIQUE = "variable-name-unique" Error Conformance "2.2.7" "2.4.7";
         "Variable names are unique", "Rename one of the variables.";
-    "variable-name" Warning Conformance "2.2.9" "2.4.7" Check::Static;
+    VARIABLE_NAME = "variable-name" Warning Conformance "2.2.9" "2.4.7";
         "Variable names follow the naming convention", "Quote unusual names as 'name', or declare variableNamingConvention=\"flat\".";
-    "variability-type" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    VARIABILITY_TYPE = "variability-type" Error Conformance "2.2.7" "2.4.7";
         "Only a Real is continuous", "Declare variability=\"discrete\" (or fixed, tunable, constant); continuous is the default.";
-    "causality-variability" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    CAUSALITY_VARIABILITY = "causality-variability" Error Conformance "2.2.7" "2.4.7";
         "Causality and variability go together", "See the table of combinations in section 2.2.7.";
-    "initial" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    INITIAL = "initial" Error Conformance "2.2.7" "2.4.7";
         "initial goes with causality and variability", "Leave initial out to get the default, or see the table in section 2.2.7.";
-    "start-missing" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    START_MISSING = "start-missing" Error Conformance "2.2.7" "2.4.7";
         "Start values are there where they are needed", "Add the start value.";
-    "start-forbidden" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    START_FORBIDDEN = "start-forbidden" Error Conformance "2.2.7" "2.4.7";
         "No start value where the value is calculated", "Remove start, or declare initial=\"approx\" or \"exact\".";
-    "start-range" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    START_RANGE = "start-range" Error Conformance "2.2.7" "2.4.7";
         "Start values are between min and max, or an item of the enumeration", "Correct start, min or max.";
-    "min-max" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    MIN_MAX = "min-max" Error Conformance "2.2.7" "2.4.7";
         "min is not above max", "Exchange or correct them.";
-    "nominal" Warning Conformance "2.2.7" "2.4.7" Check::Static;
+    NOMINAL = "nominal" Warning Conformance "2.2.7" "2.4.7";
         "Nominal values are positive", "Give a typical magnitude, or leave nominal out.";
-    "independent-variable" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    INDEPENDENT_VARIABLE = "independent-variable" Error Conformance "2.2.7" "2.4.7";
         "At most one variable is independent, and it is a Real", "Keep the one that stands for time.";
-    "derivative-index" Error Conformance "2.2.7" "2.4.7" Check::Static;
+    DERIVATIVE_INDEX = "derivative-index" Error Conformance "2.2.7" "2.4.7";
         "derivative names another continuous Real", "Give the one-based index of the state.";
-    "reinit" Warning Conformance "2.2.7" "-" Check::Static;
+    REINIT = "reinit" Warning Conformance "2.2.7" "-";
         "reinit is used for model exchange alone", "Remove the attribute.";
-    "alias" Error Conformance "2.2.7" "-" Check::Static;
+    ALIAS = "alias" Error Conformance "2.2.7" "-";
         "Variables of one value reference agree in start value and variability", "Give the start value to one of them, or separate value references.";
-    "alias-unit" Error Conformance "2.2.7" "-" Check::Static;
+    ALIAS_UNIT = "alias-unit" Error Conformance "2.2.7" "-";
         "Variables of one value reference have one unit", "Give all of them the same unit, or none.";
-    "alias-unit-missing" Note Conformance "2.2.7" "-" Check::Static;
+    ALIAS_UNIT_MISSING = "alias-unit-missing" Note Conformance "2.2.7" "-";
         "Variables of one value reference all have a unit, or none, spelt alike", "Give all of them the same unit by the same name, or none.";
-    "reference-unique" Error Conformance "-" "2.4.7" Check::Static;
+    REFERENCE_UNIQUE = "reference-unique" Error Conformance "-" "2.4.7";
         "Value references are unique", "Give each variable its own valueReference; a second name of one value is an Alias element.";
-    "dimension" Error Conformance "-" "2.4.7" Check::Static;
+    DIMENSION = "dimension" Error Conformance "-" "2.4.7";
         "Dimensions have a size", "Give each Dimension either a start of 1 or more, or the valueReference of a UInt64 that is a structural parameter or constant.";
-    "start-count" Error Conformance "-" "2.4.7" Check::Static;
+    START_COUNT = "start-count" Error Conformance "-" "2.4.7";
         "Arrays have as many start values as elements, or one for all", "List the start values row by row.";
-    "clock" Error Conformance "-" "2.2.8" Check::Static;
+    CLOCK = "clock" Error Conformance "-" "2.2.8";
         "Clocks are declared as their kind asks", "See the table of clock types: outputs are triggered, constant clocks have an interval, and variables name their clocks by value reference.";
-    "structure-index" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    STRUCTURE_INDEX = "structure-index" Error Conformance "2.2.8" "2.4.8";
         "Indices of the model structure are those of variables", "Indices count the ScalarVariables from 1; they are no value references.";
-    "structure-duplicate" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    STRUCTURE_DUPLICATE = "structure-duplicate" Error Conformance "2.2.8" "2.4.8";
         "No unknown is listed twice", "Remove the second one.";
-    "structure-outputs" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    STRUCTURE_OUTPUTS = "structure-outputs" Error Conformance "2.2.8" "2.4.8";
         "Outputs lists exactly the variables of causality output", "Add or remove the Unknown.";
-    "structure-derivatives" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    STRUCTURE_DERIVATIVES = "structure-derivatives" Error Conformance "2.2.8" "2.4.8";
         "Derivatives lists derivatives", "Add the derivative attribute to the variable, or remove the Unknown.";
-    "structure-initial-unknowns" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    STRUCTURE_INITIAL_UNKNOWNS = "structure-initial-unknowns" Error Conformance "2.2.8" "2.4.8";
         "InitialUnknowns is complete", "List outputs with initial approx or calculated, calculated parameters, and states and derivatives with initial approx or calculated; nothing else.";
-    "structure-initial-unknowns-absent" Warning Conformance "2.2.8" "2.4.8" Check::Static;
+    STRUCTURE_INITIAL_UNKNOWNS_ABSENT = "structure-initial-unknowns-absent" Warning Conformance "2.2.8" "2.4.8";
         "InitialUnknowns are there when something is calculated at initialisation", "List outputs with initial approx or calculated, calculated parameters, and states and derivatives with initial approx or calculated. The schema lets the element be left out, and some exporters always do; some importers refuse that.";
-    "structure-order" Error Conformance "2.2.8" "-" Check::Static;
+    STRUCTURE_ORDER = "structure-order" Error Conformance "2.2.8" "-";
         "InitialUnknowns goes by index", "Sort the list.";
-    "dependencies-index" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    DEPENDENCIES_INDEX = "dependencies-index" Error Conformance "2.2.8" "2.4.8";
         "Dependencies are indices of variables, each once", "Indices count the ScalarVariables from 1; they are no value references.";
-    "dependencies-order" Warning Conformance "2.2.8" "-" Check::Static;
+    DEPENDENCIES_ORDER = "dependencies-order" Warning Conformance "2.2.8" "-";
         "Dependencies go by index", "Sort the list, with its dependenciesKind.";
-    "dependencies-known" Note Conformance "2.2.8" "-" Check::Static;
+    DEPENDENCIES_KNOWN = "dependencies-known" Note Conformance "2.2.8" "-";
         "Dependencies are knowns of their section", "List inputs, states and the independent variable; in InitialUnknowns inputs, variables with initial exact and the independent variable.";
-    "dependencies-kind" Error Conformance "2.2.8" "2.4.8" Check::Static;
+    DEPENDENCIES_KIND = "dependencies-kind" Error Conformance "2.2.8" "2.4.8";
         "dependenciesKind has one fitting kind a dependency", "Give as many kinds as dependencies, other than dependent for Reals alone.";
-    "dependencies-kind-real" Note Conformance "2.2.8" "-" Check::Static;
+    DEPENDENCIES_KIND_REAL = "dependencies-kind-real" Note Conformance "2.2.8" "-";
         "Kinds other than dependent are for Reals, and in InitialUnknowns only constant", "Write dependent; importers that use the kinds for linearisation look at Reals alone.";
-    "binary-missing" Error Conformance "2.3" "2.5.1" Check::Static;
+    BINARY_MISSING = "binary-missing" Error Conformance "2.3" "2.5.1";
         "There is a binary or source code", "Add binaries/<platform>/<modelIdentifier>.<so|dll|dylib>, or sources/.";
-    "binary-folder" Warning Conformance "2.3" "2.5.1" Check::Static;
+    BINARY_FOLDER = "binary-folder" Warning Conformance "2.3" "2.5.1";
         "Binaries are in platform folders of the standard's spelling", "Use win32, win64, linux32, linux64, darwin32 or darwin64.";
-    "binary-name" Error Conformance "2.3" "2.5.1" Check::Static;
+    BINARY_NAME = "binary-name" Error Conformance "2.3" "2.5.1";
         "Each platform folder holds <modelIdentifier> with the platform's extension", "Name the binary as the modelIdentifier of its interface, with .so, .dll or .dylib and no prefix such as lib.";
-    "binary-format" Error Conformance "2.3" "2.5.1" Check::Static;
+    BINARY_FORMAT = "binary-format" Error Conformance "2.3" "2.5.1";
         "Each binary is of its folder's platform", "Put the library built for that platform there; an empty, 32-bit or foreign file cannot be loaded.";
-    "source-files" Warning Conformance "2.3" "-" Check::Static;
+    SOURCE_FILES = "source-files" Warning Conformance "2.3" "-";
         "Listed source files are in the archive", "Add the file under sources/, or remove it from SourceFiles.";
-    "binary-load" Error Robustness "2.3" "2.5.1" Check::Behaviour;
+} behaviour {
+    BINARY_LOAD = "binary-load" Error Robustness "2.3" "2.5.1" Raw(lifecycle::load);
         "The binary loads, with every symbol it needs", "Link what is missing statically or ship it beside the binary; build against an old C library; `ldd -r` shows the gaps.";
-    "binary-symbols" Error Conformance "2.1" "2.2.1" Check::Behaviour;
+    BINARY_SYMBOLS = "binary-symbols" Error Conformance "2.1" "2.2.1" Loaded(lifecycle::symbols);
         "The functions that hosts and the capability flags need are exported", "Export the function with C linkage and default visibility, or clear the capability flag.";
-    "binary-all-symbols" Warning Conformance "2.1" "2.2.1" Check::Behaviour;
+    "binary-all-symbols" Warning Conformance "2.1" "2.2.1" Loaded(lifecycle::all_symbols);
         "All functions of co-simulation are exported", "Export the rest too, returning fmi2Error; many hosts look all of them up when they load an FMU.";
-    "types-platform" Error Conformance "2.1.4" "-" Check::Behaviour;
+    "types-platform" Error Conformance "2.1.4" "-" Loaded(lifecycle::types_platform);
         "fmi2GetTypesPlatform gives \"default\"", "Return fmi2TypesPlatform of the standard header.";
-    "version" Error Conformance "2.1.4" "2.2.4" Check::Behaviour;
+    VERSION = "version" Error Conformance "2.1.4" "2.2.4" Loaded(lifecycle::version);
         "fmi2GetVersion gives \"2.0\"", "Return fmi2Version of the standard header, for 2.0.x too.";
-    "instantiate" Error Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    INSTANTIATE = "instantiate" Error Conformance "2.1.5" "2.3.1" Loaded(lifecycle::instantiate);
         "An instance can be made and freed", "See the FMU's message; the guid compiled in must be that of modelDescription.xml.";
-    "initialise" Error Conformance "2.1.6" "2.3.2" Check::Behaviour;
+    INITIALISE = "initialise" Error Conformance "2.1.6" "2.3.2" Loaded(lifecycle::initialise);
         "An instance initialises with its start values", "The start values of modelDescription.xml must make a valid model.";
-    "variable-readable" Error Conformance "2.1.7" "2.2.6.2" Check::Behaviour;
+    VARIABLE_READABLE = "variable-readable" Error Conformance "2.1.7" "2.2.6.2" Loaded(values::readable);
         "Every variable can be read", "Let each valueReference of modelDescription.xml be one of the binary, for the variable's type.";
-    "simulate" Error Conformance "4.2.2" "4.2.1" Check::Behaviour;
+    SIMULATE = "simulate" Error Conformance "4.2.2" "4.2.1" Learning(experiment::simulate);
         "The default experiment runs to its end", "Let the model run from its start values with the default step size, or declare another default experiment.";
-    "step-status" Error Conformance "4.2.2" "4.2.1" Check::Behaviour;
+    STEP_STATUS = "step-status" Error Conformance "4.2.2" "4.2.1" Loaded(lifecycle::step_status);
         "fmi2DoStep returns a status of the standard, fmi2Pending only when announced", "Set canRunAsynchronuously or step synchronously; return fmi2OK, Warning, Discard, Error or Fatal.";
-    "step-report" Error Conformance "-" "4.2.1" Check::Behaviour;
+    "step-report" Error Conformance "-" "4.2.1" Loaded(three::report);
         "fmi3DoStep tells how far it came", "Write all four output arguments in each call; lastSuccessfulTime is the end of the step unless it returned early.";
-    "early-return" Error Conformance "-" "4.2.1" Check::Behaviour;
+    "early-return" Error Conformance "-" "4.2.1" Indirect(three::early_return);
         "Steps return early only where that is allowed and announced, and can be gone on from", "Look at earlyReturnAllowed, set mightReturnEarlyFromDoStep, and make progress in each step.";
-    "event-mode" Error Conformance "-" "2.3.5" Check::Behaviour;
+    "event-mode" Error Conformance "-" "2.3.5" Loaded(three::event_mode);
         "Events are handled in event mode", "Accept fmi3EnterEventMode at communication points, and let fmi3UpdateDiscreteStates come to an end; or clear hasEventMode.";
-    "configuration-mode" Error Conformance "-" "2.3.6" Check::Behaviour;
+    "configuration-mode" Error Conformance "-" "2.3.6" Loaded(three::configuration_mode);
         "Structural parameters can be set in configuration mode", "Accept fmi3EnterConfigurationMode after fmi3InstantiateCoSimulation, and allocate arrays anew in fmi3ExitConfigurationMode.";
-    "instances-repeated" Error Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    INSTANCES_REPEATED = "instances-repeated" Error Conformance "2.1.5" "2.3.1" Learning(instances::repeated);
         "A second instance can be made after the first was freed", "Undo in fmi2FreeInstance what fmi2Instantiate did for the whole process, or set canBeInstantiatedOnlyOncePerProcess.";
-    "determinism" Warning Robustness "2.1" "2.2" Check::Behaviour;
+    DETERMINISM = "determinism" Warning Robustness "2.1" "2.2" Learning(lifecycle::determinism);
         "Equal runs give equal results", "Initialise all memory; keep clocks and unseeded random numbers out of the model.";
-    "terminate" Error Conformance "2.1.6" "2.3.4" Check::Behaviour;
+    TERMINATE = "terminate" Error Conformance "2.1.6" "2.3.4" Loaded(lifecycle::terminate);
         "Instances can be terminated, and freed at any time", "Let fmi2Terminate succeed after initialisation, and fmi2FreeInstance in every state.";
-    "terminated" Error Conformance "4.2.4" "2.3.8" Check::Behaviour;
+    "terminated" Error Conformance "4.2.4" "2.3.8" Loaded(experiment::terminated);
         "After fmi2Terminate the final values can be read", "Keep the values until fmi2FreeInstance or fmi2Reset.";
-    "free-null" Error Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    "free-null" Error Conformance "2.1.5" "2.3.1" Loaded(lifecycle::free_null);
         "fmi2FreeInstance of a null pointer does nothing", "Return at once when the component is null.";
-    "unload" Warning Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    UNLOAD = "unload" Warning Robustness "2.1.5" "2.3.1" Raw(lifecycle::unload);
         "The binary can be unloaded and the process ends well", "Join threads and remove exit handlers in fmi2FreeInstance.";
-    "guid-check" Note Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    GUID_CHECK = "guid-check" Note Robustness "2.1.5" "2.3.1" Loaded(lifecycle::guid);
         "A wrong GUID is refused", "Compare the GUID in fmi2Instantiate and return null; it guards against a binary and an XML of different versions.";
-    "resources-missing" Warning Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "resources-missing" Warning Robustness "2.1.5" "2.3.1" Loaded(lifecycle::resources);
         "A resources folder that is not there is survived", "Return null from fmi2Instantiate, with a message, when a resource cannot be read.";
-    "resources-path" Warning Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    RESOURCES_PATH = "resources-path" Warning Conformance "2.1.5" "2.3.1" Raw(surroundings::resources);
         "Resources are found in a folder with blanks and umlauts", "fmuResourceLocation is a URI (RFC 3986): decode %20 and the like before opening files.";
-    "start-time" Error Conformance "2.1.6" "2.3.2" Check::Behaviour;
+    START_TIME = "start-time" Error Conformance "2.1.6" "2.3.2" Loaded(experiment::start_time);
         "The start time is where the run begins", "Take startTime of fmi2SetupExperiment for the initial time.";
-    "stop-time" Note Conformance "2.1.6" "2.3.2" Check::Behaviour;
+    "stop-time" Note Conformance "2.1.6" "2.3.2" Loaded(experiment::stop_time);
         "A step past the stop time is refused", "Return fmi2Error when stopTimeDefined is true and a step would end after stopTime.";
-    "start-values" Error Conformance "2.2.7" "2.4.7" Check::Behaviour;
+    "start-values" Error Conformance "2.2.7" "2.4.7" Loaded(values::start_values);
         "Start values of the binary are those of modelDescription.xml", "Generate both from one source; a host that sets nothing simulates another model than the XML says.";
-    "start-settable" Error Conformance "4.2.4" "2.3.2" Check::Behaviour;
+    "start-settable" Error Conformance "4.2.4" "2.3.2" Loaded(values::start_settable);
         "Start values can be set before initialisation", "Accept fmi2SetXXX of inputs, and of variables with initial exact or approx, after fmi2Instantiate.";
-    "inputs-initial" Error Conformance "4.2.4" "2.3.3" Check::Behaviour;
+    "inputs-initial" Error Conformance "4.2.4" "2.3.3" Loaded(experiment::inputs_initial);
         "Inputs set before and during initialisation are there after it", "Do not set inputs back to their start values in fmi2EnterInitializationMode or fmi2ExitInitializationMode.";
-    "set-get" Error Conformance "2.1.7" "2.2.6.2" Check::Behaviour;
+    "set-get" Error Conformance "2.1.7" "2.2.6.2" Loaded(values::set_get);
         "Parameters and inputs read as they were set", "Store each value under its own reference.";
-    "set-get-rounded" Note Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "set-get-rounded" Note Robustness "2.1.7" "2.2.6.2" Indirect(values::set_get_rounded);
         "Parameters and inputs are kept to the last digit", "Keep Reals as 64-bit numbers; what is cut to 32 bits comes back as another number.";
-    "get-consistent" Error Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "get-consistent" Error Robustness "2.1.7" "2.2.6.2" Loaded(values::get_consistent);
         "Reading changes nothing, and values do not depend on how they are read", "Compute outputs without side effects on the state.";
-    "boolean-values" Error Conformance "2.1.2" "2.2.6.2" Check::Behaviour;
+    BOOLEAN_VALUES = "boolean-values" Error Conformance "2.1.2" "2.2.6.2" Loaded(values::boolean_values);
         "Booleans are fmi2False (0) or fmi2True (1)", "Normalise with !!value.";
-    "string-values" Error Conformance "2.1.7" "2.2.6.2" Check::Behaviour;
+    "string-values" Error Conformance "2.1.7" "2.2.6.2" Loaded(references::string_values);
         "Strings are not null, and UTF-8", "Return an empty string for no text, and convert from other encodings.";
-    "string-buffers" Error Conformance "2.1.7" "2.2.6.2" Check::Behaviour;
+    "string-buffers" Error Conformance "2.1.7" "2.2.6.2" Loaded(references::string_buffers);
         "Strings read together are those read one by one", "Give each String variable a buffer of its own.";
-    "unchanging" Error Conformance "2.2.7" "2.4.7" Check::Behaviour;
+    "unchanging" Error Conformance "2.2.7" "2.4.7" Loaded(values::unchanging);
         "Constant, fixed and parameter variables do not change by themselves", "Declare the variable discrete or continuous, or leave its value alone.";
-    "output-finite" Error Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "output-finite" Error Robustness "2.1.7" "2.2.6.2" Loaded(values::finite);
         "Outputs are finite", "Return fmi2Discard or fmi2Error instead of passing NaN or infinity on.";
-    "output-range" Warning Conformance "2.2.7" "2.2.6.3" Check::Behaviour;
+    "output-range" Warning Conformance "2.2.7" "2.2.6.3" Loaded(values::range);
         "Calculated values keep within min and max, and to the items of their enumeration", "Correct the limits, or the model.";
-    "tunable-set" Error Conformance "4.2.4" "4.2.1" Check::Behaviour;
+    "tunable-set" Error Conformance "4.2.4" "4.2.1" Loaded(values::tunable_set);
         "Tunable parameters can be set during a run", "Accept fmi2SetXXX between steps, or declare the parameter fixed.";
-    "tunable-effect" Warning Conformance "2.2.7" "4.2.1" Check::Behaviour;
+    "tunable-effect" Warning Conformance "2.2.7" "4.2.1" Indirect(values::tunable_effect);
         "Tunable parameters act when they are set during a run", "Use the present value in each step, or declare the parameter fixed.";
-    "fixed-set" Note Robustness "4.2.4" "4.2.1" Check::Behaviour;
+    "fixed-set" Note Robustness "4.2.4" "4.2.1" Loaded(values::fixed_set);
         "Fixed and constant variables cannot be set during a run", "Return fmi2Error, or declare the parameter tunable when it takes effect.";
-    "bad-reference-get" Note Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "bad-reference-get" Note Robustness "2.1.7" "2.2.6.2" Loaded(references::bad_reference_get);
         "Reading an unknown value reference is refused", "Return fmi2Error in the default branch; a wrong connection goes unnoticed otherwise.";
-    "bad-reference-set" Note Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "bad-reference-set" Note Robustness "2.1.7" "2.2.6.2" Loaded(references::bad_reference_set);
         "Setting an unknown value reference is refused", "Return fmi2Error in the default branch; a wrong connection goes unnoticed otherwise.";
-    "reference-bits" Note Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    REFERENCE_BITS = "reference-bits" Note Robustness "2.1.7" "2.2.6.2" Loaded(references::bits);
         "Value references are looked at whole", "Keep value references as 32-bit numbers; cut ones meet another variable's.";
-    "empty-call" Warning Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "empty-call" Warning Robustness "2.1.7" "2.2.6.2" Loaded(references::empty);
         "Reading and setting no variables at all succeeds", "Return fmi2OK when nvr is 0, before looking at the arrays.";
-    "array-count" Note Robustness "-" "2.2.6.2" Check::Behaviour;
+    "array-count" Note Robustness "-" "2.2.6.2" Loaded(three::array_count);
         "Too few values for an array are refused", "Compare nValues with the elements of the variables and return fmi3Error; memory beyond the importer's is read or written otherwise.";
-    "reset" Error Conformance "2.1.6" "2.3.1" Check::Behaviour;
+    "reset" Error Conformance "2.1.6" "2.3.1" Loaded(lifecycle::reset);
         "fmi2Reset restores a new instance", "Restore states, parameters, inputs and all internal memory to what fmi2Instantiate made them.";
-    "state-restore" Error Conformance "2.1.8" "2.2.6.4" Check::Behaviour;
+    "state-restore" Error Conformance "2.1.8" "2.2.6.4" Loaded(state::restore);
         "fmi2SetFMUstate restores everything", "Copy all that influences the future: states, inputs, parameters, event times, solver memory.";
-    "state-handles" Error Conformance "2.1.8" "2.2.6.4" Check::Behaviour;
+    "state-handles" Error Conformance "2.1.8" "2.2.6.4" Loaded(state::handles);
         "FMU states can be overwritten and freed as the standard says", "Reuse a state that is passed in, set it to null when freed, ignore null.";
-    "state-serialise" Error Conformance "2.1.8" "2.2.6.4" Check::Behaviour;
+    "state-serialise" Error Conformance "2.1.8" "2.2.6.4" Loaded(state::serialise);
         "A state serialised and read back is the same, in another instance too", "Serialise the whole state, and no pointers.";
-    "state-leak" Warning Robustness "2.1.8" "2.2.6.4" Check::Behaviour;
+    "state-leak" Warning Robustness "2.1.8" "2.2.6.4" Indirect(leaks::state_leak);
         "States that are freed leave no memory behind", "Free in fmi2FreeFMUstate all that fmi2GetFMUstate and fmi2DeSerializeFMUstate took.";
-    "step-size" Error Conformance "4.2.2" "4.2.1" Check::Behaviour;
+    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(steps::ignored);
         "communicationStepSize is honoured", "Integrate to currentCommunicationPoint + communicationStepSize.";
-    "step-convergence" Warning Robustness "4.2.2" "4.2.1" Check::Behaviour;
+    "step-convergence" Warning Robustness "4.2.2" "4.2.1" Loaded(steps::convergence);
         "Results converge as the step shrinks", "Scale whatever happens once a call with the step size, or sub-step internally.";
-    "output-delay" Warning Robustness "4.2.2" "4.2.1" Check::Behaviour;
+    "output-delay" Warning Robustness "4.2.2" "4.2.1" Indirect(steps::delay);
         "Outputs are those at the end of the step", "Compute outputs after the integration, from the new states.";
-    "step-variable" Error Conformance "4.3.1" "4.4" Check::Behaviour;
+    "step-variable" Error Conformance "4.3.1" "4.4" Loaded(steps::variable);
         "Steps of varying size give the results of equal ones", "Use the size of the present step, or clear canHandleVariableCommunicationStepSize.";
-    "step-negative" Note Robustness "4.2.2" "4.2.1" Check::Behaviour;
+    "step-negative" Note Robustness "4.2.2" "4.2.1" Loaded(steps::negative);
         "A step backwards is refused", "Return fmi2Error or fmi2Discard for communicationStepSize < 0.";
-    "step-zero" Warning Robustness "4.2.2" "4.2.1" Check::Behaviour;
+    "step-zero" Warning Robustness "4.2.2" "4.2.1" Loaded(steps::zero);
         "A step of size 0 does no harm", "Do not divide by communicationStepSize.";
-    "step-wrong-point" Note Robustness "4.2.2" "4.2.1" Check::Behaviour;
+    "step-wrong-point" Note Robustness "4.2.2" "4.2.1" Loaded(steps::wrong_point);
         "A step from another point than the communication point is refused", "Compare currentCommunicationPoint with the time reached and return fmi2Error.";
-    "step-early" Note Robustness "4.2.4" "4.2.1" Check::Behaviour;
+    "step-early" Note Robustness "4.2.4" "4.2.1" Loaded(steps::early);
         "A step before initialisation is refused", "Keep track of the state of the calling sequence and return fmi2Error.";
-    "step-late" Note Robustness "4.2.4" "4.2.1" Check::Behaviour;
+    "step-late" Note Robustness "4.2.4" "4.2.1" Loaded(steps::late);
         "A step after termination is refused", "Keep track of the state of the calling sequence and return fmi2Error.";
-    "initialisation-order" Note Robustness "4.2.4" "2.3.3" Check::Behaviour;
+    "initialisation-order" Note Robustness "4.2.4" "2.3.3" Loaded(steps::initialisation_order);
         "Initialisation out of order is refused", "Keep track of the state of the calling sequence and return fmi2Error.";
-    "nan-input" Warning Robustness "2.1.7" "2.2.6.2" Check::Behaviour;
+    "nan-input" Warning Robustness "2.1.7" "2.2.6.2" Loaded(steps::nan_input);
         "Inputs that are NaN, infinite or huge are survived", "Bound iterations, and return fmi2Error or fmi2Discard when they do not converge.";
-    "status-functions" Warning Robustness "4.2.3" "-" Check::Behaviour;
+    "status-functions" Warning Robustness "4.2.3" "-" Loaded(steps::status_functions);
         "Status functions and fmi2CancelStep come back when nothing is pending", "Return fmi2Discard or fmi2Error.";
-    "time-variable" Error Conformance "2.2.7" "2.4.7" Check::Behaviour;
+    "time-variable" Error Conformance "2.2.7" "2.4.7" Loaded(steps::time);
         "The independent variable is the communication point", "Return startTime after initialisation, and the end of the step after each step.";
-    "derivative-value" Warning Conformance "2.2.7" "2.4.7" Check::Behaviour;
+    "derivative-value" Warning Conformance "2.2.7" "2.4.7" Loaded(steps::derivative);
         "Variables declared as derivatives are the slope of their state", "Correct the derivative attribute's index or the value.";
-    "input-derivatives" Error Conformance "4.2.1" "-" Check::Behaviour;
+    "input-derivatives" Error Conformance "4.2.1" "-" Loaded(interpolation::input_derivatives);
         "Input derivatives are taken, and zero ones change nothing", "Implement fmi2SetRealInputDerivatives or clear canInterpolateInputs.";
-    "input-derivatives-effect" Error Conformance "4.3.1" "-" Check::Behaviour;
+    "input-derivatives-effect" Error Conformance "4.3.1" "-" Indirect(interpolation::effect);
         "Input derivatives have an effect", "Let the input run along its slope during the step, or clear canInterpolateInputs.";
-    "output-derivatives" Error Conformance "4.2.1" "2.2.12" Check::Behaviour;
+    OUTPUT_DERIVATIVES = "output-derivatives" Error Conformance "4.2.1" "2.2.12" Loaded(interpolation::output_derivatives);
         "Output derivatives are given", "Implement fmi2GetRealOutputDerivatives or set maxOutputDerivativeOrder to 0.";
-    "directional-derivative" Error Conformance "2.1.9" "2.2.11" Check::Behaviour;
+    "directional-derivative" Error Conformance "2.1.9" "2.2.11" Loaded(partial::directional);
         "Directional derivatives are those that perturbation shows", "Check signs, factors and the order of the arguments; solvers diverge on wrong ones.";
-    "dependencies-hold" Error Conformance "2.2.8" "2.2.10" Check::Behaviour;
+    "dependencies-hold" Error Conformance "2.2.8" "2.2.10" Loaded(dependencies::outputs);
         "Outputs depend directly on declared inputs alone", "Add the input to the output's dependencies; masters order the FMUs and find algebraic loops by them.";
-    "dependencies-soon" Note Robustness "2.2.8" "2.2.10" Check::Behaviour;
+    "dependencies-soon" Note Robustness "2.2.8" "2.2.10" Indirect(dependencies::outputs_soon);
         "Outputs answer within a step to declared inputs alone", "Add the input to the output's dependencies, if it is there that the output is computed from it.";
-    "dependencies-initial" Note Robustness "2.2.8" "2.2.10" Check::Behaviour;
+    "dependencies-initial" Note Robustness "2.2.8" "2.2.10" Indirect(dependencies::initial);
         "Initial unknowns and outputs depend on declared knowns alone at initialisation", "Add the known to the dependencies, or leave the attribute out, which stands for all.";
-    "dependencies-constant" Error Conformance "2.2.8" "2.2.10" Check::Behaviour;
+    "dependencies-constant" Error Conformance "2.2.8" "2.2.10" Indirect(dependencies::kinds);
         "Dependencies declared constant are", "Declare the kind dependent (or fixed, tunable, discrete).";
-    "dependencies-time" Note Conformance "2.2.8" "2.2.10" Check::Behaviour;
+    "dependencies-time" Note Conformance "2.2.8" "2.2.10" Indirect(dependencies::time);
         "Outputs that depend on the time say so", "Add the independent variable to the output's dependencies.";
-    "instances-independent" Error Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    "instances-independent" Error Conformance "2.1.5" "2.3.1" Loaded(instances::independent);
         "Instances in one process do not affect each other", "Keep all state in the component, or set canBeInstantiatedOnlyOncePerProcess.";
-    "instances-sequential" Error Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    "instances-sequential" Error Conformance "2.1.5" "2.3.1" Loaded(instances::sequential);
         "An instance keeps nothing of one before it", "Keep parameters and start values in the component, not in static memory.";
-    "instances-threads" Note Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "instances-threads" Note Robustness "2.1.5" "2.3.1" Loaded(instances::threads);
         "Instances on several threads do not affect each other", "Keep scratch memory in the component, and lock what is shared.";
-    "thread-handover" Note Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "thread-handover" Note Robustness "2.1.5" "2.3.1" Loaded(instances::handover);
         "An instance goes on when another thread calls it", "Keep state in the component, not in thread-local storage.";
-    "instance-leak" Warning Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "instance-leak" Warning Robustness "2.1.5" "2.3.1" Loaded(leaks::instance_leak);
         "Freed instances leave no memory behind", "Free in fmi2FreeInstance all that fmi2Instantiate and the steps took.";
-    "instance-leak-large" Error Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "instance-leak-large" Error Robustness "2.1.5" "2.3.1" Loaded(leaks::instance_leak_large);
         "Freed instances leave no large memory, files or threads behind", "Free, close and join in fmi2FreeInstance all that fmi2Instantiate and the steps took: hosts that vary parameters make thousands of instances.";
-    "null-component" Note Robustness "2.1" "2.2" Check::Behaviour;
+    "null-component" Note Robustness "2.1" "2.2" Loaded(lifecycle::null_component);
         "Calls without an instance are survived", "Return fmi2Error when the component is null.";
-    "step-leak" Warning Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "step-leak" Warning Robustness "2.1.5" "2.3.1" Loaded(leaks::step_leak);
         "Steps do not use up memory", "Free or reuse what each fmi2DoStep allocates.";
-    "callbacks-copied" Note Robustness "2.1.5" "-" Check::Behaviour;
+    "callbacks-copied" Note Robustness "2.1.5" "-" Loaded(effects::callbacks);
         "The callbacks and the instance name are copied", "Copy the structure and the name in fmi2Instantiate; some hosts free theirs afterwards.";
-    "allocation-failure" Warning Robustness "2.1.5" "-" Check::Behaviour;
+    "allocation-failure" Warning Robustness "2.1.5" "-" Loaded(effects::allocation);
         "Failing memory callbacks are survived", "Check what allocateMemory returns, and return null from fmi2Instantiate.";
-    "debug-logging" Error Conformance "2.1.5" "2.3.1" Check::Behaviour;
+    "debug-logging" Error Conformance "2.1.5" "2.3.1" Loaded(effects::debug_logging);
         "Declared log categories can be switched on and off", "Accept every category of LogCategories in fmi2SetDebugLogging.";
-    "log-categories" Warning Quality "2.2.4" "2.4.5" Check::Behaviour;
+    "log-categories" Warning Quality "2.2.4" "2.4.5" Loaded(effects::log_categories);
         "Log messages are of declared categories", "Declare the category in LogCategories, so that users can choose it.";
-    "side-directory" Error Robustness "2.3" "2.5.1" Check::Behaviour;
+    SIDE_DIRECTORY = "side-directory" Error Robustness "2.3" "2.5.1" Raw(effects::directory);
         "The working directory stays", "Open files by the path of fmuResourceLocation instead.";
-    "side-rounding" Error Robustness "2.1" "2.2" Check::Behaviour;
+    "side-rounding" Error Robustness "2.1" "2.2" Raw(effects::rounding);
         "The floating-point environment stays", "Restore rounding, exception masks and flush-to-zero before returning; -ffast-math changes them when the library is loaded.";
-    "side-stdout" Warning Robustness "2.1.5" "2.2.3" Check::Behaviour;
+    SIDE_STDOUT = "side-stdout" Warning Robustness "2.1.5" "2.2.3" Raw(effects::stdout);
         "Nothing is printed to standard output", "Use the logger callback.";
-    "side-signals" Warning Robustness "2.1" "2.2" Check::Behaviour;
+    "side-signals" Warning Robustness "2.1" "2.2" Raw(effects::signals);
         "Signal handlers stay", "Leave signals to the host.";
-    "side-environment" Warning Robustness "2.1" "2.2" Check::Behaviour;
+    "side-environment" Warning Robustness "2.1" "2.2" Raw(effects::environment);
         "Environment variables stay", "Pass settings inside the FMU.";
-    "side-locale" Error Robustness "2.1" "2.2" Check::Behaviour;
+    "side-locale" Error Robustness "2.1" "2.2" Raw(effects::locale);
         "The locale of numbers stays", "Use uselocale or explicit formats instead of setlocale.";
-    "locale-numbers" Warning Robustness "2.1.5" "2.3.1" Check::Behaviour;
+    "locale-numbers" Warning Robustness "2.1.5" "2.3.1" Raw(surroundings::locale);
         "Numbers are read alike whatever the host's locale", "Use strtod_l with the C locale, std::from_chars or the like: a host with a user interface may have a decimal comma.";
-    "side-files" Warning Robustness "2.3" "2.5.1" Check::Behaviour;
+    "side-files" Warning Robustness "2.3" "2.5.1" Raw(effects::files);
         "No files are written to the working directory", "Write to a temporary folder, and remove it in fmi2FreeInstance.";
+    }
 }

@@ -19,11 +19,13 @@ pub mod words;
 use std::path::Path;
 
 use super::archive::Archive;
+use super::behaviour::Behaviour;
 use super::description::{Description, Fmi};
 use super::xml::Document;
 use finding::Findings;
 pub use finding::{Finding, Outcome, Place, Report, Verdict};
 pub use list::RULES;
+pub(crate) use list::{Id, id};
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -51,11 +53,11 @@ pub enum Kind {
 
 /// How a rule is tested.
 #[derive(Debug, Clone, Copy)]
-pub enum Check {
+pub(crate) enum Check {
     /// On the archive and the XML.
     Static,
     /// On the loaded binary, in a process of its own.
-    Behaviour,
+    Behaviour(Behaviour),
 }
 
 /// A rule.
@@ -74,10 +76,21 @@ pub struct Rule {
     /// What to do about a finding.
     pub advice: &'static str,
     /// How it is tested.
-    pub check: Check,
+    pub(crate) check: Check,
 }
 
 impl Rule {
+    /// Whether it is the rule of a name.
+    pub(crate) fn is(&self, id: Id) -> bool {
+        self.id == id.text()
+    }
+
+    /// Whether it is tested without running the FMU.
+    #[must_use]
+    pub fn is_static(&self) -> bool {
+        matches!(self.check, Check::Static)
+    }
+
     /// The section of a version of the standard; none where the rule is not one of that version.
     #[must_use]
     pub fn section(&self, fmi: Fmi) -> Option<&'static str> {
@@ -145,8 +158,8 @@ pub(crate) fn check_file(path: &Path) -> Result<Static, super::archive::ArchiveE
         Err(error @ super::archive::ArchiveError::Io { .. }) => Err(error),
         Err(error) => {
             let mut result = Static::empty();
-            result.findings.whole("archive-readable", error.to_string());
-            result.stop("archive-path", "the archive cannot be read");
+            result.findings.whole(id::ARCHIVE_READABLE, error.to_string());
+            result.stop(id::ARCHIVE_PATH, "the archive cannot be read");
             Ok(result)
         }
     }
@@ -167,8 +180,8 @@ impl Static {
     }
 
     /// Notes that the static rules from this one on were not tested.
-    fn stop(&mut self, from: &'static str, why: &str) {
-        let rest = RULES.iter().skip_while(|r| r.id != from).filter(|r| matches!(r.check, Check::Static));
+    fn stop(&mut self, from: Id, why: &str) {
+        let rest = RULES.iter().skip_while(|r| !r.is(from)).filter(|r| r.is_static());
         self.untested.extend(rest.map(|r| (r.id, why.to_owned())));
     }
 }
@@ -179,15 +192,15 @@ pub(crate) fn check_archive(mut archive: Archive) -> Static {
     let safe = package::entries(&mut archive, &mut result.findings);
     if !safe {
         let why = "the entries were not inflated because of the findings above";
-        result.untested.extend(["archive-damaged", "archive-bomb"].map(|id| (id, why.to_owned())));
+        result.untested.extend([id::ARCHIVE_DAMAGED, id::ARCHIVE_BOMB].map(|id| (id.text(), why.to_owned())));
     }
     if !package::description(&archive, &mut result.findings) {
-        result.stop("xml-well-formed", "there is no modelDescription.xml");
+        result.stop(id::XML_WELL_FORMED, "there is no modelDescription.xml");
         return result;
     }
     let Ok(bytes) = archive.read("modelDescription.xml") else {
         // The entry's damage is reported already.
-        result.stop("xml-well-formed", "modelDescription.xml cannot be read");
+        result.stop(id::XML_WELL_FORMED, "modelDescription.xml cannot be read");
         return result;
     };
     let Some(description) = check_description(&bytes, &mut result) else { return result };
@@ -203,8 +216,8 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
         Ok(document) => document,
         Err(error) => {
             result.source = String::from_utf8_lossy(bytes).lines().map(str::to_owned).collect();
-            result.findings.at("xml-well-formed", error.position, error.message);
-            result.stop("fmi-version", "modelDescription.xml is not well-formed");
+            result.findings.at(id::XML_WELL_FORMED, error.position, error.message);
+            result.stop(id::FMI_VERSION, "modelDescription.xml is not well-formed");
             return None;
         }
     };
@@ -212,12 +225,12 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
     let findings = &mut result.findings;
     if let Some(version) = document::foreign(&document.root) {
         result.foreign = Some(version.to_owned());
-        result.stop("fmi-version", "this is neither FMI 2.0 nor 3.0");
+        result.stop(id::FMI_VERSION, "this is neither FMI 2.0 nor 3.0");
         return None;
     }
     result.fmi = document.root.get("fmiVersion").and_then(Fmi::of).unwrap_or_default();
     if !document::root(&document.root, findings) {
-        result.stop("interface-missing", "this is no model description of FMI");
+        result.stop(id::INTERFACE_MISSING, "this is no model description of FMI");
         return None;
     }
     match result.fmi {
@@ -225,8 +238,11 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
         Fmi::Three => schema3::check(&document.root, findings),
     }
     // What the schema refuses reads as its default below; findings that follow from that would mislead.
-    if ["schema-element", "schema-required", "schema-value", "interface-missing"].iter().any(|r| findings.has(r)) {
-        result.stop("guid", "the schema's findings come first");
+    if [id::SCHEMA_ELEMENT, id::SCHEMA_REQUIRED, id::SCHEMA_VALUE, id::INTERFACE_MISSING]
+        .iter()
+        .any(|r| findings.has(*r))
+    {
+        result.stop(id::GUID, "the schema's findings come first");
         return None;
     }
     let description = Description::from_document(&document);

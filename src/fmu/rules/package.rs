@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use super::super::archive::{Archive, ArchiveError, Hazard};
 use super::super::description::{Description, Fmi};
 use super::finding::Findings;
+use super::id;
 
 /// A platform folder of the standard: name, file name extension, and what the binary must be.
 struct Platform {
@@ -67,14 +68,16 @@ pub(super) fn entries(archive: &mut Archive, findings: &mut Findings) -> bool {
     let mut folded: BTreeMap<String, String> = BTreeMap::new();
     for entry in archive.entries() {
         match entry.hazard {
-            Some(Hazard::Backslash) => findings.entry("archive-backslash", &entry.name, Hazard::Backslash.to_string()),
-            Some(hazard) => findings.entry("archive-path", &entry.name, hazard.to_string()),
+            Some(Hazard::Backslash) => {
+                findings.entry(id::ARCHIVE_BACKSLASH, &entry.name, Hazard::Backslash.to_string())
+            }
+            Some(hazard) => findings.entry(id::ARCHIVE_PATH, &entry.name, hazard.to_string()),
             None => {}
         }
         safe &= entry.hazard.is_none();
         if entry.encrypted || !entry.common_method {
             let what = if entry.encrypted { "is encrypted" } else { "is neither stored nor deflated" };
-            findings.entry("archive-method", &entry.name, format!("the entry {what}; importers cannot read it"));
+            findings.entry(id::ARCHIVE_METHOD, &entry.name, format!("the entry {what}; importers cannot read it"));
             safe = false;
         }
         if let Some(other) = folded.insert(entry.name.to_lowercase(), entry.name.clone())
@@ -82,11 +85,11 @@ pub(super) fn entries(archive: &mut Archive, findings: &mut Findings) -> bool {
         {
             let message =
                 format!("differs from \"{other}\" in case alone: one overwrites the other on Windows and macOS");
-            findings.entry("archive-duplicate", &entry.name, message);
+            findings.entry(id::ARCHIVE_DUPLICATE, &entry.name, message);
         }
     }
     if archive.has_duplicate_names() {
-        findings.whole("archive-duplicate", "two entries of the archive have the same name");
+        findings.whole(id::ARCHIVE_DUPLICATE, "two entries of the archive have the same name");
     }
     if !safe {
         return false;
@@ -94,15 +97,15 @@ pub(super) fn entries(archive: &mut Archive, findings: &mut Findings) -> bool {
     match archive.test() {
         Ok(()) => true,
         Err(error @ ArchiveError::TooLarge { .. }) => {
-            findings.whole("archive-bomb", error.to_string());
+            findings.whole(id::ARCHIVE_BOMB, error.to_string());
             false
         }
         Err(ArchiveError::Entry { name, message }) => {
-            findings.entry("archive-damaged", &name, message);
+            findings.entry(id::ARCHIVE_DAMAGED, &name, message);
             false
         }
         Err(error) => {
-            findings.whole("archive-damaged", error.to_string());
+            findings.whole(id::ARCHIVE_DAMAGED, error.to_string());
             false
         }
     }
@@ -121,7 +124,7 @@ pub(super) fn description(archive: &Archive, findings: &mut Findings) -> bool {
         ),
         None => "the archive has no modelDescription.xml".into(),
     };
-    findings.whole("archive-description", message);
+    findings.whole(id::ARCHIVE_DESCRIPTION, message);
     false
 }
 
@@ -138,7 +141,7 @@ pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Find
             && !rest.contains('/')
         {
             let message = format!("a binary must be in a platform folder such as binaries/{}/", known[0].folder);
-            findings.entry("binary-folder", name, message);
+            findings.entry(id::BINARY_FOLDER, name, message);
         }
     }
     for folder in &folders {
@@ -146,11 +149,11 @@ pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Find
         let old = d.fmi == Fmi::Three && PLATFORMS.iter().any(|p| p.folder == *folder);
         if old {
             let message = "the folder has a name of FMI 2.0; FMI 3.0 has platform tuples such as x86_64-linux";
-            findings.entry("binary-folder", &format!("binaries/{folder}/"), message);
+            findings.entry(id::BINARY_FOLDER, &format!("binaries/{folder}/"), message);
         }
         if !known.iter().any(|p| p.folder == *folder) && known.iter().any(|p| p.folder == folded) {
             let message = format!("the platform folder is spelt {folded}");
-            findings.entry("binary-folder", &format!("binaries/{folder}/"), message);
+            findings.entry(id::BINARY_FOLDER, &format!("binaries/{folder}/"), message);
         }
     }
     let identifiers: BTreeSet<&str> = [&d.co_simulation, &d.model_exchange]
@@ -164,7 +167,7 @@ pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Find
             let file = format!("binaries/{}/{identifier}.{}", platform.folder, platform.extension);
             if !present.contains(file.as_str()) {
                 findings.entry(
-                    "binary-name",
+                    id::BINARY_NAME,
                     &file,
                     format!("missing, although binaries/{}/ is there", platform.folder),
                 );
@@ -175,13 +178,13 @@ pub(super) fn layout(archive: &mut Archive, d: &Description, findings: &mut Find
             }
         }
     }
-    if folders.is_empty() && !has_sources && !findings.has("binary-folder") {
-        findings.whole("binary-missing", "the archive has neither binaries/<platform>/ nor sources/");
+    if folders.is_empty() && !has_sources && !findings.has(id::BINARY_FOLDER) {
+        findings.whole(id::BINARY_MISSING, "the archive has neither binaries/<platform>/ nor sources/");
     }
     for interface in [&d.co_simulation, &d.model_exchange].into_iter().flatten() {
         for (file, position) in &interface.source_files {
             if !present.contains(format!("sources/{file}").as_str()) {
-                findings.at("source-files", *position, format!("sources/{file} is not in the archive"));
+                findings.at(id::SOURCE_FILES, *position, format!("sources/{file} is not in the archive"));
             }
         }
     }
@@ -193,7 +196,7 @@ fn check_format(file: &str, bytes: &[u8], platform: &Platform, findings: &mut Fi
     if !good {
         let found = found.map_or("something else".to_owned(), |f| f.to_string());
         let message = format!("must be {}, but is {found} ({} bytes)", platform.format, bytes.len());
-        findings.entry("binary-format", file, message);
+        findings.entry(id::BINARY_FORMAT, file, message);
     }
 }
 

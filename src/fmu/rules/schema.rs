@@ -5,6 +5,7 @@
 use super::super::description::{parse_boolean, parse_integer, parse_real};
 use super::super::xml::Element;
 use super::finding::Findings;
+use super::id;
 
 /// Type of an attribute.
 #[derive(Debug, Clone, Copy)]
@@ -273,11 +274,11 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
     }
     if interfaces == 0 {
         let message = "neither a ModelExchange nor a CoSimulation element comes first";
-        findings.at("interface-missing", root.position, message);
+        findings.at(id::INTERFACE_MISSING, root.position, message);
     }
     for name in ["ModelExchange", "CoSimulation"] {
         if let Some(second) = root.children_named(name).nth(1) {
-            findings.at("schema-element", second.position, format!("a second {name} element"));
+            findings.at(id::SCHEMA_ELEMENT, second.position, format!("a second {name} element"));
         }
     }
     sequence(root, &root.children[interfaces..], &ROOT, findings);
@@ -292,7 +293,7 @@ fn element(e: &Element, node: &Node, findings: &mut Findings) {
     attributes(e, node, findings);
     if e.has_text {
         findings.at(
-            "schema-element",
+            id::SCHEMA_ELEMENT,
             e.position,
             format!("the element {} holds text, which has no place there", e.name),
         );
@@ -303,7 +304,7 @@ fn element(e: &Element, node: &Node, findings: &mut Findings) {
         let first = children.first().and_then(|c| Some((c, node.choice.iter().find(|n| n.name == c.name)?)));
         let Some((child, node)) = first else {
             let message = format!("the element {} must begin with one of {}", e.name, names.join(", "));
-            findings.at("schema-element", e.position, message);
+            findings.at(id::SCHEMA_ELEMENT, e.position, message);
             return;
         };
         element(child, node, findings);
@@ -317,7 +318,7 @@ pub(super) fn needs_interface(root: &Element, interfaces: &[&Node], findings: &m
     if !root.children.iter().any(|c| interfaces.iter().any(|node| node.name == c.name)) {
         let names: Vec<&str> = interfaces.iter().map(|node| node.name).collect();
         let message = format!("there is none of the elements {}", names.join(", "));
-        findings.at("interface-missing", root.position, message);
+        findings.at(id::INTERFACE_MISSING, root.position, message);
     }
 }
 
@@ -326,12 +327,12 @@ fn mixed(e: &Element, nodes: &[&Node], findings: &mut Findings) {
         match nodes.iter().find(|n| n.name == child.name) {
             Some(node) => element(child, node, findings),
             None => {
-                findings.at("schema-element", child.position, format!("{} has no place in {}", child.name, e.name));
+                findings.at(id::SCHEMA_ELEMENT, child.position, format!("{} has no place in {}", child.name, e.name));
             }
         }
     }
     if e.children.is_empty() {
-        findings.at("schema-element", e.position, format!("{} has no elements", e.name));
+        findings.at(id::SCHEMA_ELEMENT, e.position, format!("{} has no elements", e.name));
     }
 }
 
@@ -345,23 +346,23 @@ pub(super) fn sequence(e: &Element, children: &[Element], node: &Node, findings:
     for child in children {
         let Some(index) = expected.iter().position(|(n, ..)| n.name == child.name) else {
             // The two interfaces are counted by the caller when they are out of place.
-            findings.at("schema-element", child.position, format!("{} has no place in {}", child.name, e.name));
+            findings.at(id::SCHEMA_ELEMENT, child.position, format!("{} has no place in {}", child.name, e.name));
             continue;
         };
         if index < current {
             let before = expected[current].0.name;
-            findings.at("schema-element", child.position, format!("{} must come before {before}", child.name));
+            findings.at(id::SCHEMA_ELEMENT, child.position, format!("{} must come before {before}", child.name));
         }
         current = current.max(index);
         counts[index] += 1;
         if counts[index] > expected[index].2 {
-            findings.at("schema-element", child.position, format!("a second {} element in {}", child.name, e.name));
+            findings.at(id::SCHEMA_ELEMENT, child.position, format!("a second {} element in {}", child.name, e.name));
         }
         element(child, expected[index].0, findings);
     }
     for ((node, least, _), count) in expected.iter().zip(counts) {
         if count < *least {
-            findings.at("schema-element", e.position, format!("{} has no {} element", e.name, node.name));
+            findings.at(id::SCHEMA_ELEMENT, e.position, format!("{} has no {} element", e.name, node.name));
         }
     }
 }
@@ -369,7 +370,7 @@ pub(super) fn sequence(e: &Element, children: &[Element], node: &Node, findings:
 fn required(e: &Element, node: &Node, findings: &mut Findings) {
     for (name, _, required) in node.attributes {
         if *required && e.get(name).is_none() {
-            findings.at("schema-required", e.position, format!("{} has no {name} attribute", describe(e)));
+            findings.at(id::SCHEMA_REQUIRED, e.position, format!("{} has no {name} attribute", describe(e)));
         }
     }
 }
@@ -395,14 +396,14 @@ pub(super) fn attributes(e: &Element, node: &Node, findings: &mut Findings) {
                 continue;
             }
             findings.at(
-                "schema-attribute",
+                id::SCHEMA_ATTRIBUTE,
                 attribute.position,
                 format!("{} has an attribute {name}, which the schema does not define there", describe(e)),
             );
             continue;
         };
         if let Err(expected) = fits(&attribute.value, *kind) {
-            let rule = if matches!(kind, DateTime) { "date-time" } else { "schema-value" };
+            let rule = if matches!(kind, DateTime) { id::DATE_TIME } else { id::SCHEMA_VALUE };
             let message = format!("{}: {name}=\"{}\" is not {expected}", describe(e), attribute.value);
             findings.at(rule, attribute.position, message);
         }

@@ -6,6 +6,7 @@ use super::super::description::{
     BaseType, Causality, DependencyKind, Description, Fmi, Initial, Unknown, Variability, Variable,
 };
 use super::finding::Findings;
+use super::{Id, id};
 
 /// Checks the model structure.
 pub(super) fn check(d: &Description, findings: &mut Findings) {
@@ -22,11 +23,11 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
                     Fmi::Two => format!("{section}: index {} is not from 1 to {last}", unknown.index),
                     Fmi::Three => format!("{section}: no variable has the value reference {}", unknown.reference),
                 };
-                findings.at("structure-index", unknown.position, message);
+                findings.at(id::STRUCTURE_INDEX, unknown.position, message);
                 sound = false;
             } else if !seen.insert(unknown.index) {
                 let message = format!("{section}: \"{}\" is listed twice", name(d, unknown.index));
-                findings.at("structure-duplicate", unknown.position, message);
+                findings.at(id::STRUCTURE_DUPLICATE, unknown.position, message);
             }
             // By value reference, and in any order, in FMI 3.0: see `three`.
             if d.fmi == Fmi::Two {
@@ -50,14 +51,7 @@ fn indices(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<u32>
 }
 
 /// Reports the difference between what a section lists and what it must.
-fn compare(
-    d: &Description,
-    section: &str,
-    rule: &'static str,
-    list: &[Unknown],
-    must: &BTreeSet<u32>,
-    f: &mut Findings,
-) {
+fn compare(d: &Description, section: &str, rule: Id, list: &[Unknown], must: &BTreeSet<u32>, f: &mut Findings) {
     let listed: BTreeSet<u32> = list.iter().map(|u| u.index).collect();
     let missing: Vec<&str> = must.difference(&listed).map(|&i| name(d, i)).collect();
     if !missing.is_empty() {
@@ -83,14 +77,14 @@ fn shorten(names: &[&str]) -> String {
 
 fn outputs(d: &Description, findings: &mut Findings) {
     let must = indices(d, |v| v.causality == Causality::Output);
-    compare(d, "Outputs", "structure-outputs", &d.structure.outputs, &must, findings);
+    compare(d, "Outputs", id::STRUCTURE_OUTPUTS, &d.structure.outputs, &must, findings);
 }
 
 fn derivatives(d: &Description, findings: &mut Findings) {
     let have = indices(d, |v| v.derivative.is_some());
     for unknown in d.structure.derivatives.iter().filter(|u| !have.contains(&u.index)) {
         let message = format!("Derivatives lists \"{}\", which has no derivative attribute", name(d, unknown.index));
-        findings.at("structure-derivatives", unknown.position, message);
+        findings.at(id::STRUCTURE_DERIVATIVES, unknown.position, message);
     }
 }
 
@@ -116,10 +110,10 @@ fn initial_unknowns(d: &Description, findings: &mut Findings) {
     if list.is_empty() && !must.is_empty() {
         let names: Vec<&str> = must.iter().map(|&i| name(d, i)).collect();
         let message = format!("there are no InitialUnknowns; {} belong there", shorten(&names));
-        findings.at("structure-initial-unknowns-absent", d.structure.position, message);
+        findings.at(id::STRUCTURE_INITIAL_UNKNOWNS_ABSENT, d.structure.position, message);
         return;
     }
-    compare(d, "InitialUnknowns", "structure-initial-unknowns", list, &must, findings);
+    compare(d, "InitialUnknowns", id::STRUCTURE_INITIAL_UNKNOWNS, list, &must, findings);
     if let Some(pair) = list.windows(2).find(|pair| d.fmi == Fmi::Two && pair[0].index > pair[1].index) {
         let message = format!(
             "InitialUnknowns: \"{}\" (index {}) comes after \"{}\" (index {}); they go by index",
@@ -128,7 +122,7 @@ fn initial_unknowns(d: &Description, findings: &mut Findings) {
             name(d, pair[0].index),
             pair[0].index
         );
-        findings.at("structure-order", pair[1].position, message);
+        findings.at(id::STRUCTURE_ORDER, pair[1].position, message);
     }
 }
 
@@ -139,7 +133,7 @@ fn dependencies(d: &Description, section: &str, unknown: &Unknown, findings: &mu
         if count != Some(kinds.len()) {
             let count = count.map_or("no dependencies attribute".into(), |n| format!("{n} dependencies"));
             let message = format!("{who}: {} dependenciesKind for {count}", kinds.len());
-            findings.at("dependencies-kind", unknown.position, message);
+            findings.at(id::DEPENDENCIES_KIND, unknown.position, message);
         } else {
             kind_of_type(d, section, unknown, kinds, &who, findings);
         }
@@ -149,21 +143,21 @@ fn dependencies(d: &Description, section: &str, unknown: &Unknown, findings: &mu
     for &index in list {
         let Some(known) = d.by_index(index) else {
             let message = format!("{who}: dependency {index} is not from 1 to {}", d.variables.len());
-            findings.at("dependencies-index", unknown.position, message);
+            findings.at(id::DEPENDENCIES_INDEX, unknown.position, message);
             return;
         };
         if !seen.insert(index) {
-            findings.at("dependencies-index", unknown.position, format!("{who}: dependency {index} is listed twice"));
+            findings.at(id::DEPENDENCIES_INDEX, unknown.position, format!("{who}: dependency {index} is listed twice"));
             return;
         }
         if !is_known(d, section, known) {
             let message = format!("{who}: \"{}\" is {} and no known of this section", known.name, known.causality);
-            findings.at("dependencies-known", unknown.position, message);
+            findings.at(id::DEPENDENCIES_KNOWN, unknown.position, message);
         }
     }
     if let Some(pair) = list.windows(2).find(|pair| pair[0] > pair[1]) {
         let message = format!("{who}: dependency {} comes after {}; they go by index", pair[1], pair[0]);
-        findings.at("dependencies-order", unknown.position, message);
+        findings.at(id::DEPENDENCIES_ORDER, unknown.position, message);
     }
 }
 
@@ -187,7 +181,7 @@ fn kind_of_type(
         } else {
             continue;
         };
-        f.at("dependencies-kind-real", unknown.position, message);
+        f.at(id::DEPENDENCIES_KIND_REAL, unknown.position, message);
     }
 }
 

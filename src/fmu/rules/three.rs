@@ -7,6 +7,7 @@ use super::super::description::Kind;
 use super::super::description::three::starts;
 use super::super::xml::Element;
 use super::finding::Findings;
+use super::id;
 
 /// A variable, by its element.
 struct Named<'a> {
@@ -24,7 +25,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
     for v in &all {
         if let Some(first) = seen.insert(v.reference, v.name) {
             let message = format!("\"{first}\" and \"{}\" have the value reference {}", v.name, v.reference);
-            findings.at("reference-unique", v.element.position, message);
+            findings.at(id::REFERENCE_UNIQUE, v.element.position, message);
         }
         dimensions(v, &by_reference, findings);
         declared_type(v, root, findings);
@@ -34,7 +35,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
     if !all.iter().any(|v| v.element.get("causality") == Some("independent")) {
         let message = "no variable is independent, as the time is; FMI 3.0 asks for exactly one";
         findings.at(
-            "independent-variable",
+            id::INDEPENDENT_VARIABLE,
             root.child("ModelVariables").map_or(root.position, |v| v.position),
             message,
         );
@@ -64,7 +65,7 @@ fn dimensions(v: &Named<'_>, all: &HashMap<&str, &Named<'_>>, findings: &mut Fin
         match size {
             Ok(size) => count = count.and_then(|n| n.checked_mul(size)),
             Err(why) => {
-                findings.at("dimension", d.position, format!("a Dimension of \"{}\": {why}", v.name));
+                findings.at(id::DIMENSION, d.position, format!("a Dimension of \"{}\": {why}", v.name));
                 count = None;
             }
         }
@@ -75,7 +76,7 @@ fn dimensions(v: &Named<'_>, all: &HashMap<&str, &Named<'_>>, findings: &mut Fin
         && starts.len() != 1
     {
         let message = format!("\"{}\" has {} elements and {} start values", v.name, count, starts.len());
-        findings.at("start-count", v.element.position, message);
+        findings.at(id::START_COUNT, v.element.position, message);
     }
 }
 
@@ -99,7 +100,7 @@ fn declared_type(v: &Named<'_>, root: &Element, findings: &mut Findings) {
     let Some(found) = types.find(|t| t.get("name") == Some(wanted)) else { return };
     if found.name.strip_suffix("Type") != Some(v.kind.word()) {
         let message = format!("\"{}\" is a {}, but its type \"{wanted}\" a {}", v.name, v.kind.word(), found.name);
-        findings.at("type-mismatch", v.element.position, message);
+        findings.at(id::TYPE_MISMATCH, v.element.position, message);
     }
 }
 
@@ -116,7 +117,7 @@ fn derivative(v: &Named<'_>, all: &HashMap<&str, &Named<'_>>, findings: &mut Fin
         Some(_) => return,
     };
     let message = format!("variable \"{}\" is the derivative of variable {reference}: {why}", v.name);
-    findings.at("derivative-index", v.element.position, message);
+    findings.at(id::DERIVATIVE_INDEX, v.element.position, message);
 }
 
 fn structure(root: &Element, all: &HashMap<&str, &Named<'_>>, findings: &mut Findings) {
@@ -133,7 +134,7 @@ fn structure(root: &Element, all: &HashMap<&str, &Named<'_>>, findings: &mut Fin
                 .as_ref()
                 .map_or("no dependencies attribute".into(), |l| format!("{} dependencies", l.len()));
             let message = format!("{who}: {} dependenciesKind for {count}", kinds.len());
-            findings.at("dependencies-kind", unknown.position, message);
+            findings.at(id::DEPENDENCIES_KIND, unknown.position, message);
         }
         let mut seen = HashSet::new();
         for dependency in dependencies.into_iter().flatten() {
@@ -142,7 +143,7 @@ fn structure(root: &Element, all: &HashMap<&str, &Named<'_>>, findings: &mut Fin
                 (true, false) => "it is listed twice",
                 (true, true) => continue,
             };
-            findings.at("dependencies-index", unknown.position, format!("{who}: dependency {dependency}: {why}"));
+            findings.at(id::DEPENDENCIES_INDEX, unknown.position, format!("{who}: dependency {dependency}: {why}"));
             break;
         }
     }

@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::super::description::{BaseType, Description, Fmi, TypeAttributes};
 use super::super::xml::Position;
 use super::finding::Findings;
+use super::id;
 
 /// Checks units, display units, and type definitions with their uses.
 pub(super) fn check(d: &Description, findings: &mut Findings) {
@@ -22,13 +23,13 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
         match d.type_of(v) {
             None => {
                 let kind = if d.fmi == Fmi::Three { "type" } else { "SimpleType" };
-                findings.at("type-undeclared", v.attributes.position, format!("{who}: no {kind} \"{name}\""));
+                findings.at(id::TYPE_UNDECLARED, v.attributes.position, format!("{who}: no {kind} \"{name}\""));
             }
             // By its name in FMI 3.0: see `three`.
             Some(t) if d.fmi == Fmi::Two && t.attributes.base != v.base() => {
                 let message =
                     format!("{who} is of type {}, its declared type \"{name}\" of {}", v.base(), t.attributes.base);
-                findings.at("type-mismatch", v.attributes.position, message);
+                findings.at(id::TYPE_MISMATCH, v.attributes.position, message);
             }
             Some(_) => {}
         }
@@ -42,31 +43,31 @@ fn duplicates<'a>(names: impl Iterator<Item = (&'a str, Position)>) -> Vec<(&'a 
 
 fn definitions(d: &Description, findings: &mut Findings) {
     for (name, position) in duplicates(d.units.iter().map(|u| (u.name.as_str(), u.position))) {
-        findings.at("unit-unique", position, format!("a second unit \"{name}\""));
+        findings.at(id::UNIT_UNIQUE, position, format!("a second unit \"{name}\""));
     }
     for u in &d.units {
         for (name, position) in duplicates(u.display.iter().map(|x| (x.name.as_str(), x.position))) {
-            findings.at("unit-unique", position, format!("unit \"{}\": a second display unit \"{name}\"", u.name));
+            findings.at(id::UNIT_UNIQUE, position, format!("unit \"{}\": a second display unit \"{name}\"", u.name));
         }
         if u.base.is_some_and(|b| b.factor == 0.0 || !b.factor.is_finite() || !b.offset.is_finite()) {
             let message = format!("unit \"{}\": the factor or offset cannot be inverted", u.name);
-            findings.at("unit-conversion", u.position, message);
+            findings.at(id::UNIT_CONVERSION, u.position, message);
         }
         for x in u.display.iter().filter(|x| x.factor == 0.0 || !x.factor.is_finite() || !x.offset.is_finite()) {
             let message = format!("display unit \"{}\": the factor or offset cannot be inverted", x.name);
-            findings.at("unit-conversion", x.position, message);
+            findings.at(id::UNIT_CONVERSION, x.position, message);
         }
     }
 }
 
 fn types(d: &Description, findings: &mut Findings) {
     for (name, position) in duplicates(d.types.iter().map(|t| (t.name.as_str(), t.position))) {
-        findings.at("type-unique", position, format!("a second type \"{name}\""));
+        findings.at(id::TYPE_UNIQUE, position, format!("a second type \"{name}\""));
     }
     let variables: HashSet<&str> = d.variables.iter().map(|v| v.name.as_str()).collect();
     for t in d.types.iter().filter(|t| variables.contains(t.name.as_str())) {
         let message = format!("the type \"{}\" has the name of a variable", t.name);
-        findings.at("type-unique", t.position, message);
+        findings.at(id::TYPE_UNIQUE, t.position, message);
     }
     for t in d.types.iter().filter(|t| t.attributes.base == BaseType::Enumeration) {
         let mut values = HashSet::new();
@@ -74,7 +75,7 @@ fn types(d: &Description, findings: &mut Findings) {
         for (name, value, position) in &t.attributes.items {
             if !values.insert(*value) || !names.insert(name.as_str()) {
                 let message = format!("type \"{}\": a second item named \"{name}\" or of value {value}", t.name);
-                findings.at("enumeration-items", *position, message);
+                findings.at(id::ENUMERATION_ITEMS, *position, message);
             }
         }
     }
@@ -91,7 +92,7 @@ fn use_of_unit(
     if let Some(unit) = &own.unit
         && !units.contains_key(unit.as_str())
     {
-        findings.at("unit-undeclared", own.position, format!("{who}: no Unit \"{unit}\" in UnitDefinitions"));
+        findings.at(id::UNIT_UNDECLARED, own.position, format!("{who}: no Unit \"{unit}\" in UnitDefinitions"));
         return;
     }
     let Some(display) = &own.display_unit else { return };
@@ -105,5 +106,5 @@ fn use_of_unit(
             _ => return,
         },
     };
-    findings.at("display-unit", own.position, message);
+    findings.at(id::DISPLAY_UNIT, own.position, message);
 }

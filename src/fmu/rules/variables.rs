@@ -6,6 +6,7 @@ use super::super::description::{
     BaseType, Causality, Description, Fmi, Initial, Value, Variability, Variable, default_initial,
 };
 use super::finding::Findings;
+use super::id;
 use super::names;
 
 /// Checks the variables.
@@ -23,7 +24,7 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
             independent += 1;
             if independent > 1 || v.base() != BaseType::Real {
                 let message = format!("variable \"{}\": at most one variable is independent, and it is a Real", v.name);
-                findings.at("independent-variable", v.position, message);
+                findings.at(id::INDEPENDENT_VARIABLE, v.position, message);
             }
         }
     }
@@ -38,15 +39,15 @@ fn unique_names(d: &Description, findings: &mut Findings) {
     for v in &d.variables {
         if let Some(first) = seen.get(v.name.as_str()) {
             let message = format!("the variable name \"{}\" is already taken at {}", v.name, first.position);
-            findings.at("variable-name-unique", v.position, message);
+            findings.at(id::VARIABLE_NAME_UNIQUE, v.position, message);
         } else {
             seen.insert(&v.name, v);
         }
         if v.name.trim().is_empty() {
-            findings.at("variable-name", v.position, "a variable has no name");
+            findings.at(id::VARIABLE_NAME, v.position, "a variable has no name");
         } else if d.structured_names && !names::is_structured(&v.name) {
             let message = format!("\"{}\" is not a name of the structured naming convention", v.name);
-            findings.at("variable-name", v.position, message);
+            findings.at(id::VARIABLE_NAME, v.position, message);
         }
     }
 }
@@ -63,7 +64,7 @@ fn table(fmi: Fmi, v: &Variable, findings: &mut Findings) -> bool {
             ),
             Fmi::Three => format!("variable \"{name}\" is no floating-point number and cannot be continuous"),
         };
-        findings.at("variability-type", v.position, message);
+        findings.at(id::VARIABILITY_TYPE, v.position, message);
         return false;
     }
     let good = match causality {
@@ -77,7 +78,7 @@ fn table(fmi: Fmi, v: &Variable, findings: &mut Findings) -> bool {
     };
     if !good {
         let message = format!("variable \"{}\": {causality} and {variability} do not go together", v.name);
-        findings.at("causality-variability", v.position, message);
+        findings.at(id::CAUSALITY_VARIABILITY, v.position, message);
         return false;
     }
     let Some(initial) = v.declared_initial else { return true };
@@ -96,7 +97,7 @@ fn table(fmi: Fmi, v: &Variable, findings: &mut Findings) -> bool {
         _ => format!("initial may be {}", allowed.iter().map(|i| i.word()).collect::<Vec<_>>().join(" or ")),
     };
     let message = format!("variable \"{}\": initial=\"{initial}\" with {causality} and {variability}: {may}", v.name);
-    findings.at("initial", v.position, message);
+    findings.at(id::INITIAL, v.position, message);
     false
 }
 
@@ -109,12 +110,12 @@ fn starts(v: &Variable, findings: &mut Findings) {
             _ => "it is an input".to_owned(),
         };
         let message = format!("variable \"{}\" has no start value, which it needs because {why}", v.name);
-        findings.at("start-missing", v.position, message);
+        findings.at(id::START_MISSING, v.position, message);
     }
     if v.has_start && (initial == Some(Initial::Calculated) || v.causality == Causality::Independent) {
         let why = if v.causality == Causality::Independent { "it is independent" } else { "its initial is calculated" };
         let message = format!("variable \"{}\" has a start value, which it must not because {why}", v.name);
-        findings.at("start-forbidden", v.attributes.position, message);
+        findings.at(id::START_FORBIDDEN, v.attributes.position, message);
     }
 }
 
@@ -124,12 +125,12 @@ fn ranges(d: &Description, v: &Variable, findings: &mut Findings) {
         && min > max
     {
         let message = format!("variable \"{}\": min={min} is above max={max}", v.name);
-        findings.at("min-max", v.attributes.position, message);
+        findings.at(id::MIN_MAX, v.attributes.position, message);
         return;
     }
     if r.nominal.is_some_and(|n| n.is_nan() || n <= 0.0) {
         let message = format!("variable \"{}\": nominal={} is not a magnitude", v.name, r.nominal.unwrap_or(0.0));
-        findings.at("nominal", v.attributes.position, message);
+        findings.at(id::NOMINAL, v.attributes.position, message);
     }
     let start = match v.start {
         Some(Value::Real(x)) => x,
@@ -141,17 +142,17 @@ fn ranges(d: &Description, v: &Variable, findings: &mut Findings) {
     if low || high {
         let end = |x: Option<f64>| x.map_or("open".to_owned(), |x| x.to_string());
         let message = format!("variable \"{}\": start={start} outside min={}, max={}", v.name, end(r.min), end(r.max));
-        findings.at("start-range", v.attributes.position, message);
+        findings.at(id::START_RANGE, v.attributes.position, message);
     } else if v.base() == BaseType::Enumeration && !r.items.is_empty() && !r.items.iter().any(|i| i.1 as f64 == start) {
         let message = format!("variable \"{}\": start={start} is no item of its enumeration", v.name);
-        findings.at("start-range", v.attributes.position, message);
+        findings.at(id::START_RANGE, v.attributes.position, message);
     }
 }
 
 fn derivative(d: &Description, v: &Variable, findings: &mut Findings) {
     if v.reinit && d.model_exchange.is_none() {
         let message = format!("variable \"{}\": reinit is for model exchange alone", v.name);
-        findings.at("reinit", v.attributes.position, message);
+        findings.at(id::REINIT, v.attributes.position, message);
     }
     let Some(index) = v.derivative else { return };
     let message = match d.by_index(index) {
@@ -162,7 +163,7 @@ fn derivative(d: &Description, v: &Variable, findings: &mut Findings) {
         Some(_) => return,
     };
     let message = format!("variable \"{}\" is the derivative of variable {index}: {message}", v.name);
-    findings.at("derivative-index", v.attributes.position, message);
+    findings.at(id::DERIVATIVE_INDEX, v.attributes.position, message);
 }
 
 /// The unit of a variable as a comparable text.
@@ -197,14 +198,14 @@ fn aliases(d: &Description, findings: &mut Findings) {
                 first.name,
                 set.iter().find(|v| constant(v) != constant(first)).map_or("", |v| &v.name)
             );
-            findings.at("alias", set[1].position, message);
+            findings.at(id::ALIAS, set[1].position, message);
         } else if constant(first) {
             if let Some(other) = set.iter().find(|v| v.start != first.start) {
                 let message = format!(
                     "the constants \"{}\" and \"{}\" have one value reference, but different start values",
                     first.name, other.name
                 );
-                findings.at("alias", other.position, message);
+                findings.at(id::ALIAS, other.position, message);
             }
         } else if let Some(second) = set.iter().filter(settable).nth(1) {
             let other = set.iter().find(settable).map_or("", |v| &v.name);
@@ -212,7 +213,7 @@ fn aliases(d: &Description, findings: &mut Findings) {
                 "\"{other}\" and \"{}\" have one value reference, and both have a start value or can be set",
                 second.name
             );
-            findings.at("alias", second.position, message);
+            findings.at(id::ALIAS, second.position, message);
         }
         let units: HashSet<Option<String>> = set.iter().map(|v| unit_key(d, v)).collect();
         if units.len() > 1 {
@@ -221,13 +222,13 @@ fn aliases(d: &Description, findings: &mut Findings) {
             // No unit beside one is untidy; two that cannot be converted make one number two quantities.
             if units.iter().flatten().count() > 1 {
                 findings.at(
-                    "alias-unit",
+                    id::ALIAS_UNIT,
                     set[1].position,
                     format!("{names} have one value reference, but not one unit"),
                 );
             } else {
                 let message = format!("{names} have one value reference, but only some of them have a unit");
-                findings.at("alias-unit-missing", set[1].position, message);
+                findings.at(id::ALIAS_UNIT_MISSING, set[1].position, message);
             }
         }
     }

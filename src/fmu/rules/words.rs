@@ -1,6 +1,6 @@
 //! The words of FMI 3.0 for what the list of rules and the rules' messages say in those of FMI 2.0.
 
-use super::Rule;
+use super::{Id, Rule, id};
 use crate::fmu::description::Fmi;
 
 /// Functions and attributes by another name, longest first where one begins with another.
@@ -41,78 +41,82 @@ pub fn in_three(text: &str) -> String {
 }
 
 /// Rules that hold something else in FMI 3.0: title and advice; empty where the words of 2.0 do.
-const OWN: [(&str, &str, &str); 27] = [
-    ("fmi-version", "fmiVersion is 3.0", "Write fmiVersion=\"3.0\", for 3.0.1 and later too."),
+const OWN: [(Id, &str, &str); 27] = [
+    (id::FMI_VERSION, "fmiVersion is 3.0", "Write fmiVersion=\"3.0\", for 3.0.1 and later too."),
     (
-        "interface-missing",
+        id::INTERFACE_MISSING,
         "There is a ModelExchange, CoSimulation or ScheduledExecution element",
         "Put one of them first in the file.",
     ),
-    ("schema-attribute", "", "Correct the spelling, or move tool data to Annotations."),
+    (id::SCHEMA_ATTRIBUTE, "", "Correct the spelling, or move tool data to Annotations."),
     (
-        "guid",
+        id::GUID,
         "The instantiationToken is not empty",
         "Generate a token (or a hash of the file) at export and compile it into the binary.",
     ),
-    ("type-undeclared", "", "Add the type to TypeDefinitions."),
-    ("type-mismatch", "", "Let a Float64 have a Float64Type, and so on."),
+    (id::TYPE_UNDECLARED, "", "Add the type to TypeDefinitions."),
+    (id::TYPE_MISMATCH, "", "Let a Float64 have a Float64Type, and so on."),
     (
-        "variability-type",
+        id::VARIABILITY_TYPE,
         "Only a floating-point number is continuous",
         "Declare variability=\"discrete\", the default (or fixed, tunable, constant).",
     ),
-    ("causality-variability", "", "See the table of combinations in section 2.4.7.4."),
-    ("initial", "", "Leave initial out to get the default, or see the table in section 2.4.7.4."),
+    (id::CAUSALITY_VARIABILITY, "", "See the table of combinations in section 2.4.7.4."),
+    (id::INITIAL, "", "Leave initial out to get the default, or see the table in section 2.4.7.4."),
     (
-        "independent-variable",
+        id::INDEPENDENT_VARIABLE,
         "Exactly one variable is independent, and it is a floating-point number",
         "Keep the one that stands for time, or add it.",
     ),
     (
-        "derivative-index",
+        id::DERIVATIVE_INDEX,
         "derivative names another continuous floating-point variable",
         "Give the valueReference of the state.",
     ),
     (
-        "structure-index",
+        id::STRUCTURE_INDEX,
         "Value references of the model structure are those of variables",
         "Entries of the model structure name variables by valueReference.",
     ),
     (
-        "structure-outputs",
+        id::STRUCTURE_OUTPUTS,
         "There is an Output for each variable of causality output, and for no other",
         "Add or remove the Output.",
     ),
     (
-        "structure-derivatives",
+        id::STRUCTURE_DERIVATIVES,
         "ContinuousStateDerivative lists derivatives",
         "Add the derivative attribute to the variable, or remove the entry.",
     ),
     (
-        "dependencies-index",
+        id::DEPENDENCIES_INDEX,
         "Dependencies are value references of variables, each once",
         "Name variables by valueReference.",
     ),
-    ("dependencies-kind", "", "Give as many kinds as dependencies."),
-    ("binary-missing", "", "Add binaries/<platform tuple>/<modelIdentifier>.<so|dll|dylib>, or sources/."),
-    ("binary-folder", "", "Use platform tuples: x86_64-windows, x86_64-linux, aarch64-darwin and so on."),
-    ("version", "fmi3GetVersion gives \"3.0\"", "Return fmi3Version of the standard header, for 3.0.x too."),
-    ("step-status", "fmi3DoStep returns a status of the standard", "Return fmi3OK, Warning, Discard, Error or Fatal."),
+    (id::DEPENDENCIES_KIND, "", "Give as many kinds as dependencies."),
+    (id::BINARY_MISSING, "", "Add binaries/<platform tuple>/<modelIdentifier>.<so|dll|dylib>, or sources/."),
+    (id::BINARY_FOLDER, "", "Use platform tuples: x86_64-windows, x86_64-linux, aarch64-darwin and so on."),
+    (id::VERSION, "fmi3GetVersion gives \"3.0\"", "Return fmi3Version of the standard header, for 3.0.x too."),
     (
-        "guid-check",
+        id::STEP_STATUS,
+        "fmi3DoStep returns a status of the standard",
+        "Return fmi3OK, Warning, Discard, Error or Fatal.",
+    ),
+    (
+        id::GUID_CHECK,
         "A wrong instantiationToken is refused",
         "Compare the token in fmi3InstantiateCoSimulation and return null; it guards against a binary and an XML of different versions.",
     ),
     (
-        "instantiate",
+        id::INSTANTIATE,
         "",
         "See the FMU's message; the token compiled in must be the instantiationToken of modelDescription.xml.",
     ),
-    ("resources-path", "", "resourcePath is a path, not a URI: open files below it as it stands, in UTF-8."),
-    ("start-time", "", "Take startTime of fmi3EnterInitializationMode for the initial time."),
-    ("boolean-values", "Booleans are fmi3False (0) or fmi3True (1)", ""),
-    ("side-directory", "", "Open files by the path of resourcePath instead."),
-    ("output-derivatives", "", "Implement fmi3GetOutputDerivatives or set maxOutputDerivativeOrder to 0."),
+    (id::RESOURCES_PATH, "", "resourcePath is a path, not a URI: open files below it as it stands, in UTF-8."),
+    (id::START_TIME, "", "Take startTime of fmi3EnterInitializationMode for the initial time."),
+    (id::BOOLEAN_VALUES, "Booleans are fmi3False (0) or fmi3True (1)", ""),
+    (id::SIDE_DIRECTORY, "", "Open files by the path of resourcePath instead."),
+    (id::OUTPUT_DERIVATIVES, "", "Implement fmi3GetOutputDerivatives or set maxOutputDerivativeOrder to 0."),
 ];
 
 /// A text of a rule in the words of a version: its `own` in FMI 3.0, where there is one, else that of 2.0 put into words
@@ -124,8 +128,8 @@ fn in_words(fmi: Fmi, two: &str, own: Option<&str>) -> String {
     }
 }
 
-fn own(rule: &Rule) -> Option<&'static (&'static str, &'static str, &'static str)> {
-    OWN.iter().find(|(id, ..)| *id == rule.id)
+fn own(rule: &Rule) -> Option<&'static (Id, &'static str, &'static str)> {
+    OWN.iter().find(|(id, ..)| rule.is(*id))
 }
 
 pub(super) fn title(rule: &Rule, fmi: Fmi) -> String {
@@ -143,8 +147,8 @@ mod tests {
     #[test]
     fn each_entry_is_of_a_rule_of_fmi_3_and_no_rule_of_it_speaks_of_fmi_2() {
         for (id, ..) in OWN {
-            let rule = super::super::rule(id).unwrap();
-            assert!(rule.section(Fmi::Three).is_some(), "{id}");
+            let rule = super::super::rule(id.text()).unwrap();
+            assert!(rule.section(Fmi::Three).is_some(), "{}", id.text());
         }
         for rule in super::super::of(Fmi::Three) {
             let text = format!("{} {}", rule.title(Fmi::Three), rule.advice(Fmi::Three));

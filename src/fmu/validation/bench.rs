@@ -12,25 +12,26 @@ use super::super::host;
 use super::super::isolation::{
     self, Answer, Bounds, Ended, Fence, Job, Outcome, Place, Strength, Task, sandbox, temporary,
 };
-use super::super::rules::{self, Finding, Rule, Verdict};
+use super::super::rules::{self, Finding, Id, Rule, Verdict, id};
 use super::{Options, ValidationError};
 
 /// Rules that must pass before the others make sense, in order.
-const GATES: [&str; 10] = [
-    "binary-load",
-    "binary-symbols",
-    "instantiate",
-    "initialise",
-    "variable-readable",
-    "simulate",
-    "step-status",
-    "instances-repeated",
-    "terminate",
-    "determinism",
+const GATES: [Id; 10] = [
+    id::BINARY_LOAD,
+    id::BINARY_SYMBOLS,
+    id::INSTANTIATE,
+    id::INITIALISE,
+    id::VARIABLE_READABLE,
+    id::SIMULATE,
+    id::STEP_STATUS,
+    id::INSTANCES_REPEATED,
+    id::TERMINATE,
+    id::DETERMINISM,
 ];
 
 /// Rules whose failure may be the sandbox's doing.
-pub(super) const NEEDY: [&str; 5] = ["binary-load", "instantiate", "initialise", "variable-readable", "simulate"];
+pub(super) const NEEDY: [Id; 5] =
+    [id::BINARY_LOAD, id::INSTANTIATE, id::INITIALISE, id::VARIABLE_READABLE, id::SIMULATE];
 
 /// A call may take this many times what the longest call of the default experiment took.
 const PATIENCE: u32 = 20;
@@ -38,6 +39,10 @@ const PATIENCE: u32 = 20;
 const FIRST: u32 = 2;
 /// What is left of the budget must be this much for a rule to be tried.
 const LEAST: Duration = Duration::from_millis(50);
+
+fn is_one_of(rule: &Rule, ids: &[Id]) -> bool {
+    ids.iter().any(|id| rule.is(*id))
+}
 
 pub(super) type Tested = (&'static Rule, Verdict, Vec<Finding>);
 
@@ -74,7 +79,7 @@ impl<'a> Bench<'a> {
             options,
             progress,
             fmi: description.fmi,
-            total: rules::of(description.fmi).filter(|r| !r.check.is_static()).count(),
+            total: rules::of(description.fmi).filter(|r| !r.is_static()).count(),
             needs_tool: interface.needs_execution_tool,
             begin: Instant::now(),
             longest: Mutex::new((Duration::ZERO, false)),
@@ -91,7 +96,7 @@ impl<'a> Bench<'a> {
         let mut tested = Vec::new();
         let mut learned = Learned::default();
         let mut blocked: Option<String> = None;
-        let gates = GATES.iter().filter_map(|id| rules::rule(id));
+        let gates = GATES.iter().filter_map(|id| rules::rule(id.text()));
         for rule in gates {
             if let Some(why) = &blocked {
                 tested.push((rule, Verdict::NotTested(why.clone()), vec![]));
@@ -101,7 +106,7 @@ impl<'a> Bench<'a> {
             if let Some(more) = more {
                 learned = more;
             }
-            if self.needs_tool && result.1 == Verdict::Failed && ["binary-load", "instantiate"].contains(&rule.id) {
+            if self.needs_tool && result.1 == Verdict::Failed && is_one_of(rule, &[id::BINARY_LOAD, id::INSTANTIATE]) {
                 // The tool may not be here, which is no fault of the FMU.
                 let first = result.2.first().map_or(String::new(), |f| format!(": {}", f.message));
                 let why = format!("the FMU needs its tool to run (needsExecutionTool){first}");
@@ -109,14 +114,14 @@ impl<'a> Bench<'a> {
             }
             match &result.1 {
                 // A run that differs from its like is compared no more, but what else it does is tested.
-                Verdict::Failed if rule.id != "determinism" => blocked = Some(format!("{} must pass first", rule.id)),
-                Verdict::NotTested(why) if rule.id != "determinism" => blocked = Some(why.clone()),
+                Verdict::Failed if !rule.is(id::DETERMINISM) => blocked = Some(format!("{} must pass first", rule.id)),
+                Verdict::NotTested(why) if !rule.is(id::DETERMINISM) => blocked = Some(why.clone()),
                 _ => {}
             }
             tested.push(result);
         }
         let rest: Vec<&'static Rule> = rules::of(self.fmi)
-            .filter(|r| !r.check.is_static() && !GATES.contains(&r.id))
+            .filter(|r| !r.is_static() && !is_one_of(r, &GATES))
             .filter(|r| self.options.wants(r))
             .collect();
         if let Some(why) = blocked {
@@ -185,16 +190,16 @@ impl<'a> Bench<'a> {
             // Someone ended the process, or the FMU does so itself: again, to tell.
             outcome = isolation::run(&place, job(learned))?;
         }
-        if rule.id == "instances-repeated" && outcome.ventured && outcome.ended != Ended::Well {
+        if rule.is(id::INSTANCES_REPEATED) && outcome.ventured && outcome.ended != Ended::Well {
             // It does not bear inputs that vary; without them it can be tested all the same.
             let tame = Learned { tame: true, ..learned.clone() };
             outcome = isolation::run(&place, job(&tame))?;
         }
-        if GATES.contains(&rule.id) {
+        if is_one_of(rule, &GATES) {
             // What is slow is given time in proportion.
             let mut longest = self.longest.lock().unwrap_or_else(PoisonError::into_inner);
             longest.0 = longest.0.max(outcome.longest);
-            longest.1 |= rule.id == "simulate";
+            longest.1 |= rule.is(id::SIMULATE);
         }
         {
             let mut strength = self.strength.lock().unwrap_or_else(PoisonError::into_inner);
@@ -253,7 +258,7 @@ impl<'a> Bench<'a> {
             let why = format!("with other parameters and start values than its own, {message}");
             return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
         }
-        if died.is_some() && rule.id == "reference-bits" {
+        if died.is_some() && rule.is(id::REFERENCE_BITS) {
             let why = "reading an unknown value reference ends the process".to_owned();
             return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
         }
@@ -268,13 +273,13 @@ impl<'a> Bench<'a> {
                 _ => "Never call exit in an FMU: return fmi2Error or fmi2Fatal, and leave the process to its host.",
             });
             // A rule on what an FMU survives has its own.
-            let advice = advice.filter(|_| GATES.contains(&rule.id)).map(str::to_owned);
+            let advice = advice.filter(|_| is_one_of(rule, &GATES)).map(str::to_owned);
             let finding = Finding { advice, ..finding(message, within) };
             return self.allowing_for_the_sandbox(rule, vec![finding], outcome.refused, None);
         }
         let Some(answer) = answer else { return (Verdict::NotTested("no answer".into()), vec![], None) };
         let mut findings: Vec<Finding> = answer.findings.into_iter().map(|(m, call)| finding(m, call)).collect();
-        if rule.id == "side-stdout" && !outcome.stdout.is_empty() {
+        if rule.is(id::SIDE_STDOUT) && !outcome.stdout.is_empty() {
             let line = outcome.stdout.lines().next().unwrap_or("").chars().take(80).collect::<String>();
             findings.push(finding(format!("the FMU prints to standard output: {line:?}"), None));
         }
@@ -301,7 +306,7 @@ impl<'a> Bench<'a> {
         let denied = || findings.iter().any(|f| f.message.contains("Permission denied"));
         let first = findings.first().map_or("", |f| f.message.as_str());
         let why = match refused {
-            _ if !self.options.sandbox || !NEEDY.contains(&rule.id) => None,
+            _ if !self.options.sandbox || !is_one_of(rule, &NEEDY) => None,
             Some(what) => Some(format!("the FMU asked for {what}, which the sandbox refuses ({first})")),
             None if denied() => Some(format!("the sandbox keeps files from the FMU ({first})")),
             None => None,

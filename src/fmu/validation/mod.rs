@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::description::{Description, Fmi};
 use super::host;
-use super::rules::{self, Check, Report, Rule, Verdict, words};
+use super::rules::{self, Report, Rule, Verdict, words};
 use bench::Bench;
 
 /// What to validate and how.
@@ -102,10 +102,10 @@ pub fn validate(
     let mut verdicts: HashMap<&str, Verdict> = HashMap::new();
     let mut remarks = Vec::new();
     let fmi = result.fmi;
-    for rule in rules::of(fmi).filter(|r| r.check.is_static()) {
+    for rule in rules::of(fmi).filter(|r| r.is_static()) {
         let untested = result.untested.iter().find(|(id, _)| *id == rule.id);
         let verdict = match untested {
-            _ if result.findings.has(rule.id) => Verdict::Failed,
+            _ if result.findings.list.iter().any(|f| f.rule == rule.id) => Verdict::Failed,
             Some((_, why)) => Verdict::NotTested(why.clone()),
             None => Verdict::Passed,
         };
@@ -122,7 +122,7 @@ pub fn validate(
             }
             remarks.extend(bench.gap().map(str::to_owned));
             remarks.extend(untested(&description));
-            if options.sandbox && bench::NEEDY.iter().any(|id| verdicts.get(id) == Some(&Verdict::Failed)) {
+            if options.sandbox && bench::NEEDY.iter().any(|id| verdicts.get(id.text()) == Some(&Verdict::Failed)) {
                 remarks.push("It failed in the sandbox; --no-sandbox, for an FMU that you trust, tells whether it does outside too.".into());
             }
         }
@@ -137,7 +137,7 @@ pub fn validate(
                     "This is a model exchange FMU: its behaviour was not tested, only its archive and XML.".into(),
                 );
             }
-            for rule in rules::of(fmi).filter(|r| !r.check.is_static()) {
+            for rule in rules::of(fmi).filter(|r| !r.is_static()) {
                 verdicts.insert(rule.id, Verdict::NotTested(why.clone()));
             }
         }
@@ -190,12 +190,4 @@ fn prepare(result: &mut rules::Static, options: &Options) -> Result<(Description
     let folder = archive.extract().map_err(|error| error.to_string())?;
     host::binary_file(folder.path(), description.fmi, interface).map_err(|error| error.to_string())?;
     Ok((description, folder))
-}
-
-impl Check {
-    /// Whether the rule is tested without running the FMU.
-    #[must_use]
-    pub fn is_static(self) -> bool {
-        matches!(self, Self::Static)
-    }
 }
