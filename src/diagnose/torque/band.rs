@@ -212,3 +212,45 @@ pub fn decimate(record: &Record, limit: f64) -> Record {
 fn smooth_up(n: usize) -> usize {
     (n..).find(|&m| smooth(m) == m).unwrap_or(n)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::Hold;
+
+    #[test]
+    fn a_smooth_number_has_factors_two_three_and_five_alone() {
+        assert_eq!([1, 7, 2187, 2245, 8192].map(smooth), [1, 6, 2187, 2187, 8192]);
+        assert!((1..400).all(|n| smooth_up(n) >= n && smooth(smooth_up(n)) == smooth_up(n)));
+    }
+
+    #[test]
+    fn as_many_samples_are_left_out_as_the_torque_has_instants_for() {
+        assert_eq!([1, 3, 5, 6, 10, 15, 16].map(thinning), [(1, 1), (3, 3), (5, 5), (5, 5), (10, 5), (15, 5), (16, 4)]);
+    }
+
+    #[test]
+    fn a_motion_within_the_band_is_the_same_at_the_lower_rate() {
+        let n = 6000;
+        let position = |k: usize| (0.01 * k as f64).sin() + 1e-3 * k as f64;
+        let record = Record {
+            start: 0.0,
+            dt: 1e-3,
+            hold: Hold::Linear,
+            torque: (0..n).map(|k| (0.01 * k as f64).cos()).collect(),
+            between: None,
+            channels: [Some((0..n).map(position).collect()), None, None, None],
+            noise: [1e-6; 4],
+            idle: Vec::new(),
+        };
+        // 10 rad/s are 1.6 Hz.
+        let slow = decimate(&record, 4.0);
+        let every = (slow.dt / record.dt).round() as usize;
+        assert!(every > 10, "{every}");
+        let y = slow.channels[0].as_ref().expect("a position");
+        let far = y.len() / 10..y.len() * 9 / 10;
+        for k in far {
+            assert!((y[k] - position(k * every)).abs() < 1e-5, "{k} {} {}", y[k], position(k * every));
+        }
+    }
+}

@@ -19,8 +19,8 @@ const LEFT: f64 = 0.25;
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
-/// Probability from which an effect may be named: as likely as one of two that the record cannot tell, and a remainder beside them.
-pub const LIKELY: f64 = 0.35;
+/// Probability from which an effect may be named: more likely than not.
+pub const LIKELY: f64 = 0.5;
 /// The same where no cause is named, white or not: more than the error of a measured current (one to five per cent).
 const UNCAUSED: f64 = 0.08;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
@@ -140,6 +140,15 @@ impl Search<'_> {
             })
             .collect();
         let likely = |p: &f64| *p >= LIKELY;
+        // One that is not likely explains nothing that needs a cause.
+        if let [only] = probabilities[..]
+            && !likely(&only)
+            && self.band().torque_share(plain.discrepancy, self.problem.record) <= UNCAUSED
+        {
+            let pool = ranking.into_iter().map(|w| w.fit).collect();
+            let none = Fit { terms: Vec::new(), ..plain.clone() };
+            return self.conclude(given, parameters, none, pool);
+        }
         if chosen.terms.len() > 1
             && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
             && !likely(&probabilities[least])
@@ -277,4 +286,83 @@ fn confusable(chosen: &Fit, ranking: &[Weighed], evidence: f64) -> Vec<Confusabl
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Parameters, Structure};
+    use crate::diagnose::model::Model;
+    use crate::effects::Settings;
+
+    fn fit(effects: &[Effect], log_likelihood: f64) -> Fit {
+        let terms: Vec<(Effect, usize)> = effects.iter().map(|e| (*e, 0)).collect();
+        Fit::told(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), &terms, log_likelihood)
+    }
+
+    fn decision(parameters: Fit) -> Decision {
+        Decision {
+            verdict: Verdict::Parameters,
+            cut_short: false,
+            given: parameters.clone(),
+            chosen: parameters.clone(),
+            parameters,
+            ranking: Vec::new(),
+            shares: Vec::new(),
+            probabilities: Vec::new(),
+            independent: 1.0,
+            confusable: Vec::new(),
+        }
+    }
+
+    fn scaled(by: [f64; 4]) -> Fit {
+        let mut fit = fit(&[], 0.0);
+        let p = &mut fit.model.parameters;
+        for (value, by) in [&mut p.i1, &mut p.i2, &mut p.b, &mut p.k].into_iter().zip(by) {
+            *value *= by;
+        }
+        fit
+    }
+
+    #[test]
+    fn parameters_that_all_changed_by_one_factor_are_a_gain_of_its_inverse() {
+        let (gain, _) = decision(scaled([1.25; 4])).torque_gain().expect("one factor");
+        assert!((gain - 0.8).abs() < 1e-12, "{gain}");
+        assert!(decision(scaled([1.25, 1.2, 1.3, 1.25])).torque_gain().is_some());
+        assert!(decision(scaled([1.25, 1.0, 1.25, 1.25])).torque_gain().is_none());
+        assert!(decision(scaled([1.01; 4])).torque_gain().is_none());
+    }
+
+    #[test]
+    fn the_plainer_fit_lacks_one_effect_and_is_the_likeliest_of_its_kind() {
+        use Effect::{CoulombMotor, Delay, ViscousMotor};
+        let all = fit(&[CoulombMotor, ViscousMotor, Delay], 9.0);
+        let pool = [
+            fit(&[CoulombMotor, Delay], 3.0),
+            fit(&[Delay, CoulombMotor], 5.0),
+            fit(&[CoulombMotor, ViscousMotor], 7.0),
+            fit(&[Delay], 8.0),
+        ];
+        let told = |i: usize| plainer(&all, i, &pool).map(|f| f.log_likelihood);
+        assert_eq!((told(0), told(1), told(2)), (None, Some(5.0), Some(7.0)));
+    }
+
+    #[test]
+    fn what_is_as_likely_with_another_effect_in_its_place_is_confusable_with_it() {
+        use Effect::{CoulombMotor, CoulombTable, Delay, Latch, ViscousMotor};
+        let chosen = fit(&[CoulombMotor, Delay], 0.0);
+        let weighed =
+            |effects: &[Effect], evidence: f64| Weighed { fit: fit(effects, 0.0), evidence, probability: 0.0 };
+        let ranking = [
+            weighed(&[CoulombMotor, Delay], 100.0),
+            weighed(&[CoulombTable, Delay], 99.0),
+            weighed(&[CoulombMotor, Latch], 98.0),
+            weighed(&[ViscousMotor, Latch], 98.0),
+            weighed(&[CoulombMotor, ViscousMotor], 100.0 - ALIKE),
+            weighed(&[Delay], 99.0),
+        ];
+        let found = confusable(&chosen, &ranking, 100.0);
+        let pairs: Vec<_> = found.iter().map(|c| (c.named, c.other, c.difference, c.is_of_place())).collect();
+        assert_eq!(pairs, [(CoulombMotor, CoulombTable, 1.0, true), (Delay, Latch, 2.0, false)]);
+    }
 }

@@ -339,3 +339,27 @@ impl Problem<'_> {
             - f.terms.iter().map(|t| self.price(*t)).sum::<f64>()
     }
 }
+
+#[cfg(test)]
+impl Fit {
+    /// A fit of effects that is as likely as told, of a model with its base parameters free.
+    pub fn told(model: Model, terms: &[Term], log_likelihood: f64) -> Self {
+        let base = BaseParameter::of(model.structure);
+        let coordinates: Vec<Coordinate> = base.iter().map(|p| Coordinate::new(Free::Base(*p), &model)).collect();
+        Self {
+            terms: terms.to_vec(),
+            model,
+            std: vec![0.0; coordinates.len()],
+            coordinates,
+            rows: Lacking::nothing(),
+            columns: Vec::new(),
+            discrepancy: [1.0; 2],
+            bandwidth: [1.0; 2],
+            log_likelihood,
+            log_prior: 0.0,
+            iterations: 1,
+            settled: true,
+            at_bound: false,
+        }
+    }
+}

@@ -119,3 +119,34 @@ fn take(band: &Band, column: &[Vec<C>; 2], rows: &mut [Vec<C>; 2]) {
         row.iter_mut().zip(column).for_each(|(r, c)| *r -= c * share);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HIDDEN: Hidden = Hidden { side: 0, inertia: 2e-3, stiffness: 50.0, damping: 0.02 };
+
+    #[test]
+    fn it_pulls_as_its_transfer_says_once_it_has_swung_in() {
+        // Den Hartog: the torque of a damped vibration absorber on its base, (k + jwb) I w^2/(k + jwb - I w^2) of the base's motion.
+        let (dt, n) = (1e-4, 40_000);
+        for w in [60.0, 140.0, 250.0] {
+            let e: Vec<f64> = (0..n).map(|k| (w * dt * k as f64).sin()).collect();
+            let spring = C::new(HIDDEN.stiffness, w * HIDDEN.damping);
+            let transfer = -spring * HIDDEN.inertia * w * w / (spring - HIDDEN.inertia * w * w);
+            let pull = HIDDEN.pull(&e, dt);
+            for k in n - 2000..n - 1 {
+                let (sine, cosine) = (w * dt * k as f64).sin_cos();
+                let exact = transfer.re * sine + transfer.im * cosine;
+                assert!((pull[k] - exact).abs() < 1e-3 * transfer.norm(), "{w} {k} {} {exact}", pull[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_damped_to_death_goes_along() {
+        let stiff = Hidden { damping: 10.0, ..HIDDEN };
+        let pull = stiff.pull(&[0.0, 0.0, 0.5, 2.0, 4.5], 1.0);
+        assert_eq!(pull, [0.0, 1e-3, 2e-3, 2e-3, 0.0]);
+    }
+}

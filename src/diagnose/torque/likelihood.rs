@@ -581,3 +581,11 @@ impl Band {
         z.iter().map(|v| v.re / self.n as f64).collect()
     }
 }
+
+#[cfg(test)]
+impl Lacking {
+    /// Nothing lacking in no band.
+    pub fn nothing() -> Self {
+        Self { rows: [Vec::new(), Vec::new()], weights: Vec::new(), alike: [1.0; 2] }
+    }
+}

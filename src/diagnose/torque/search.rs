@@ -385,3 +385,47 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
     let contains = |v: usize| all[..v].iter().any(|p| p.free.iter().all(|i| all[v].free.contains(i)));
     (0..all.len()).filter(|v| contains(*v) == richer).map(|v| (effect, v)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::Parameters;
+    use crate::diagnose::model::Model;
+    use crate::effects::{EFFECTS, Settings};
+
+    fn fit(terms: &[Term]) -> Fit {
+        Fit::told(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
+    }
+
+    #[test]
+    fn a_fit_is_more_than_another_when_it_has_all_its_effects_in_any_form_and_further_ones() {
+        let (coulomb, viscous) = (Effect::CoulombMotor, Effect::ViscousMotor);
+        assert!(is_more(&fit(&[(coulomb, 1), (viscous, 0)]), &fit(&[(coulomb, 0)])));
+        assert!(!is_more(&fit(&[(coulomb, 1)]), &fit(&[(coulomb, 0)])));
+        assert!(!is_more(&fit(&[(coulomb, 0), (viscous, 0)]), &fit(&[(Effect::Delay, 0)])));
+    }
+
+    #[test]
+    fn every_form_of_an_effect_is_looked_at_once_the_plain_ones_first() {
+        for e in EFFECTS {
+            let mut all = forms(e, false);
+            assert!(all.contains(&(e, 0)), "{e:?}");
+            all.extend(forms(e, true));
+            all.sort_unstable();
+            assert_eq!(all, (0..e.info().variants.len()).map(|v| (e, v)).collect::<Vec<Term>>());
+        }
+    }
+
+    #[test]
+    fn an_effect_below_two_standard_errors_of_its_independent_values_is_lost() {
+        let term = (Effect::LoadMotor, 0);
+        let plain = fit(&[]);
+        let mut rich = fit(&[term]);
+        rich.model.effects.of_mut(term.0)[0] = 0.3;
+        rich.coordinates.push(Coordinate::new(Free::Effect(term.0, 0), &rich.model));
+        rich.std.push(0.1);
+        assert!(!is_lost(&plain, &rich, 1.0));
+        // A quarter of the values: twice the standard error.
+        assert!(is_lost(&plain, &rich, 0.25));
+    }
+}
