@@ -13,7 +13,7 @@ trap 'rm -f "$EIXO_SKIPPED"' EXIT
 allowed() { [ -z "${EIXO_SKIPS+set}" ] || [[ " $EIXO_SKIPS " = *" $1 "* ]]; }
 if scripts/venv.sh; then
     # --color=no: a log is read by programs too.
-    .venv/bin/python -m pytest --quiet --color=no -p no:cacheprovider scripts || failed=1
+    .venv/bin/python -m pytest --quiet --color=no -p no:cacheprovider scripts python || failed=1
 else
     echo "SKIPPED: no Python environment (scripts/venv.sh), so neither the Python tests nor the other importers run" >&2
     allowed python || failed=1
