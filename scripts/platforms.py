@@ -47,31 +47,41 @@ def skip(what):
     print(f"SKIPPED: {what}", flush=True)
 
 
-def zig():
-    """The command of zig, or none."""
-    for python in (ROOT / ".venv" / "bin" / "python", Path(sys.executable)):
+def zig(*pythons):
+    """The command of zig, of one of these interpreters or the usual ones; or none."""
+    for python in (*pythons, ROOT / ".venv" / "bin" / "python", Path(sys.executable)):
         if python.is_file() and subprocess.run([python, "-c", "import ziglang"], capture_output=True, check=False).returncode == 0:
             return f'"{python}" -m ziglang'
     return shutil.which("zig")
+
+
+def old_linker(command, folder):
+    """Writes a linker against the old glibc, by zig, into a folder; its path."""
+    linker = folder / "zig-cc"
+    linker.write_text(f'#!/bin/sh\nexec {command} cc -target x86_64-linux-gnu.{OLD_GLIBC} "$@"\n')
+    linker.chmod(linker.stat().st_mode | stat.S_IXUSR)
+    return str(linker)
+
+
+def windows_lacks():
+    """What is missing to build for Windows, and how to get it; nothing where it can be built."""
+    standard = subprocess.run(
+        ["rustc", "--print", "target-libdir", "--target", WINDOWS], capture_output=True, text=True, check=False
+    )
+    if standard.returncode != 0 or not Path(standard.stdout.strip()).is_dir():
+        return f"no target {WINDOWS} (rustup target add {WINDOWS})"
+    return "" if shutil.which(MINGW) else f"no {MINGW} (apt-get install gcc-mingw-w64-x86-64-posix)"
 
 
 def build(release):
     """Builds eixo; the platforms in it and its path."""
     platforms, environment = ["linux64"], dict(os.environ)
     if command := zig():
-        linker = OUT / "zig-cc"
-        linker.write_text(f'#!/bin/sh\nexec {command} cc -target x86_64-linux-gnu.{OLD_GLIBC} "$@"\n')
-        linker.chmod(linker.stat().st_mode | stat.S_IXUSR)
-        environment["EIXO_LINKER_LINUX64"] = str(linker)
+        environment["EIXO_LINKER_LINUX64"] = old_linker(command, OUT)
     else:
         skip("linux64 against an old glibc: no zig (.venv/bin/python -m pip install ziglang==0.13.0)")
-    standard = subprocess.run(
-        ["rustc", "--print", "target-libdir", "--target", WINDOWS], capture_output=True, text=True, check=False
-    )
-    if standard.returncode != 0 or not Path(standard.stdout.strip()).is_dir():
-        skip(f"win64: no target {WINDOWS} (rustup target add {WINDOWS})")
-    elif not shutil.which(MINGW):
-        skip(f"win64: no {MINGW} (apt-get install gcc-mingw-w64-x86-64-posix)")
+    if lacks := windows_lacks():
+        skip(f"win64: {lacks}")
     else:
         environment["EIXO_PLATFORMS"] = "win64"
         platforms.append("win64")
@@ -107,11 +117,8 @@ def largest_difference(one, other):
 
 
 def glibc(library):
-    if not shutil.which("objdump"):
-        skip("the glibc that linux64 asks for: no objdump (apt-get install binutils)")
-        return
-    versions = {tuple(map(int, v.split("."))) for v in re.findall(r"GLIBC_([0-9.]+)", run("objdump", "-T", library))}
-    print(f"linux64: runs with glibc {'.'.join(map(str, max(versions)))} and later")
+    """The newest version of glibc that a program or library asks for, as (2, 17)."""
+    return max(tuple(map(int, v.split("."))) for v in re.findall(r"GLIBC_([0-9.]+)", run("objdump", "-T", library)))
 
 
 def main():
@@ -129,7 +136,10 @@ def main():
     references = {v.attrib["name"]: v.attrib["valueReference"] for v in description.iter("ScalarVariable")}
     cases = [[f"{references[name]}={value!r}" for name, value in case.items()] for case in CASES]
     linux = OUT / "axis/binaries/linux64/eixo.so"
-    glibc(linux)
+    if shutil.which("objdump"):
+        print(f"linux64: runs with glibc {'.'.join(map(str, glibc(linux)))} and later")
+    else:
+        skip("the glibc that linux64 asks for: no objdump (apt-get install binutils)")
     native = driver("cc", "platform", "-ldl", "-lm")
     if native is None:
         skip("running the libraries: no C compiler (apt-get install gcc libc6-dev)")

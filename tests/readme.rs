@@ -12,6 +12,8 @@ use std::process::Command;
 mod compare;
 #[path = "readme/prepare.rs"]
 mod prepare;
+#[path = "program/skip.rs"]
+mod skip;
 
 /// How a block begins that is not run, and why.
 const NOT_RUN: &[(&str, &str)] = &[
@@ -26,6 +28,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("$ .venv/bin/python scripts/dask_fleet.py", "a scheduler on another computer; tests/dask.rs runs it on this one"),
     ("$ scripts/venv.sh", "installs from the network; tests/importers.rs runs what it shows"),
     ("importer               difference", "the output of scripts/table.py, which tests/table.rs runs"),
+    ("$ python3 scripts/wheels.py", "builds with full optimisation and installs; python/tests runs the module"),
     ("$ python3 scripts/platforms.py", "builds with zig and mingw; .ci/run runs it"),
     ("scripts/blind/full.sh", "hours; a small sealed set runs with the tests of scripts/blind"),
     (".venv/bin/python scripts/blind/conditions.py", "hours"),
@@ -113,16 +116,21 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Runs a command in a shell that finds the program: exit code, what it said (with its errors where it could not run).
+/// Runs a command in a shell that finds the program and, as behind `pip install`, its Python module: exit code, what it said (with its errors where it could not run).
 fn shell(folder: &Path, command: &str) -> (Option<i32>, String) {
     let program = PathBuf::from(env!("CARGO_BIN_EXE_eixo"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut path = program.parent().unwrap().as_os_str().to_owned();
-    path.push(":");
-    path.push(std::env::var_os("PATH").unwrap_or_default());
+    for folder in [root.join(".venv/bin").into_os_string(), std::env::var_os("PATH").unwrap_or_default()] {
+        path.push(":");
+        path.push(folder);
+    }
     let mut bash = Command::new("bash");
     bash.args(["-c", command])
         .current_dir(folder)
         .env("PATH", path)
+        .env("EIXO_PROGRAM", &program)
+        .env("PYTHONPATH", root.join("python"))
         .env_remove("COLUMNS")
         .stdin(std::process::Stdio::null());
     let done = bash.output().unwrap();
@@ -154,6 +162,9 @@ fn follow(part: usize) {
         for shown in commands(first, &lines) {
             if let Some(skipped) = prepare::before(folder.path(), &shown.command, &shown.output, &shell) {
                 eprintln!("SKIPPED: README.md:{}: {}: {skipped}", shown.line, shown.command);
+                continue;
+            }
+            if shown.command.starts_with("python3 ") && skip::python("pandas").is_none() {
                 continue;
             }
             let began = std::time::Instant::now();
