@@ -5,9 +5,19 @@
 /// Bytes that the C library has handed out and not got back.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub(super) fn heap() -> Option<i64> {
-    // SAFETY: the call only reads the allocator's counters.
-    let info = unsafe { libc::mallinfo2() };
-    Some(info.uordblks as i64 + info.hblkhd as i64)
+    type Counters = unsafe extern "C" fn() -> libc::mallinfo2;
+    // `mallinfo2` came with glibc 2.33. It is looked up, not linked: the program runs with older ones, too.
+    // SAFETY: what has this name in the C library is a function of this type; the calls only read the allocator's counters.
+    unsafe {
+        let found = libc::dlsym(libc::RTLD_DEFAULT, c"mallinfo2".as_ptr());
+        if found.is_null() {
+            // Its counters begin again at 4 GiB, which looks like a fall: it may hide a leak, and makes up none.
+            let info = libc::mallinfo();
+            return Some(i64::from(info.uordblks.cast_unsigned()) + i64::from(info.hblkhd.cast_unsigned()));
+        }
+        let info = std::mem::transmute::<*mut libc::c_void, Counters>(found)();
+        Some(info.uordblks as i64 + info.hblkhd as i64)
+    }
 }
 
 /// Bytes that the C library has handed out and not got back.
