@@ -19,8 +19,11 @@ const LEFT: f64 = 0.25;
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
-/// Probability from which an effect may be named: more likely than not.
-pub const LIKELY: f64 = 0.5;
+/// Probability from which an effect may be named beside others: as likely as one of two that the record cannot tell, and a remainder
+/// beside them.
+pub const LIKELY: f64 = 0.35;
+/// The same of a cause on its own, with which the verdict stands and falls: more likely than not.
+const ALONE: f64 = 0.5;
 /// The same where no cause is named, white or not: more than the error of a measured current (one to five per cent).
 const UNCAUSED: f64 = 0.08;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
@@ -139,7 +142,8 @@ impl Search<'_> {
                 of * decisive * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
             })
             .collect();
-        let likely = |p: &f64| *p >= LIKELY;
+        let least_likely = if chosen.terms.len() == 1 { ALONE } else { LIKELY };
+        let likely = |p: &f64| *p >= least_likely;
         // One that is not likely explains nothing that needs a cause.
         if let [only] = probabilities[..]
             && !likely(&only)

@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn every_form_of_an_effect_is_looked_at_once_the_plain_ones_first() {
-        for e in EFFECTS {
+        for &e in EFFECTS {
             let mut all = forms(e, false);
             assert!(all.contains(&(e, 0)), "{e:?}");
             all.extend(forms(e, true));
