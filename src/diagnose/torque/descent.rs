@@ -205,11 +205,6 @@ impl<'a> Descent<'a> {
 
     pub fn done(self) -> Fit {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
-        // An effect beside which a data sheet would be ten times wrong is none.
-        let at_end = |(c, x): (&Coordinate, &f64)| {
-            matches!(c.free, Free::Base(_)) && c.bounds.iter().any(|b| (x - b).abs() < 1e-6)
-        };
-        let at_bound = self.leaves || self.coordinates.iter().zip(&x).any(at_end);
         let std = self.std.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect();
         Fit {
             terms: self.terms.to_vec(),
@@ -224,7 +219,7 @@ impl<'a> Descent<'a> {
             rows: self.at.rows,
             iterations: self.iterations,
             settled: false,
-            at_bound,
+            at_bound: self.leaves,
         }
     }
 }
