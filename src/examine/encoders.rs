@@ -20,6 +20,66 @@ fn goes_along(input: &Input<'_>) -> bool {
     deviation(&twist) < ALONG * deviation(x1)
 }
 
+/// How many times as far as the motor the table moves, beside what its coupling makes of it, by the lines that show both; and what is
+/// wrong with that: it counts the other way round, or in another unit.
+pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
+    // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
+    let total: f64 = lines.iter().map(|f| s.power(MAIN, *f)).sum();
+    let mut sum = 0.0;
+    let low: Vec<usize> = lines
+        .iter()
+        .copied()
+        .take_while(|f| {
+            let take = sum < 0.1 * total;
+            sum += s.power(MAIN, *f);
+            take
+        })
+        .collect();
+    let Some(&middle) = low.get(low.len() / 2) else { return (1.0, None) };
+    let cross: Complex<f64> = low.iter().map(|f| s.of(MAIN, TABLE, *f)).sum();
+    let power: f64 = low.iter().map(|f| s.power(MAIN, *f)).sum();
+    let gain = cross / power;
+    let expected = input.nominal.filter(|n| n.structure == Structure::TwoInertia).map_or(1.0, |n| {
+        let p = n.parameters;
+        let w = s.omega(middle);
+        let spring = Complex::new(p.k, w * p.b);
+        (spring / (spring - p.i2 * w * w)).re
+    });
+    // Near the table's resonance against the motor, and above it, the size and the sign of its motion are the coupling's.
+    let ratio = if (0.5..2.0).contains(&expected) { gain.re / expected } else { 1.0 };
+    // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
+    let turned = gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0;
+    let against = || {
+        Finding::new(
+            "sign",
+            Severity::Refuse,
+            "theta2",
+            "theta2 runs against theta1.",
+            "One of the two encoders counts the other way round.",
+            "Give its column scale = -1 in [signals] of the axis file.",
+        )
+    };
+    (ratio, if turned { Some(against()) } else { unit(input, ratio) })
+}
+
+/// That the table moves so many times as far as the motor because one of them is in another unit.
+fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
+    let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
+    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
+    let words = lead
+        .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
+        .or_else(|| factor(ratio).map(str::to_owned))
+        .filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25)?;
+    Some(Finding::new(
+        "units",
+        Severity::Refuse,
+        "theta2",
+        format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {words}."),
+        "One of the two columns is in another unit than the file says.",
+        "Give the unit in the header or in [signals] (unit = \"deg\"), or scale by the gear ratio.",
+    ))
+}
+
 /// The two encoders against each other: sign, scale, and which one is the motor's.
 pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
     let coherent: Vec<usize> =
@@ -45,55 +105,9 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     if coherent.is_empty() {
         return;
     }
-    // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
-    let total: f64 = coherent.iter().map(|f| s.power(MAIN, *f)).sum();
-    let mut sum = 0.0;
-    let low: Vec<usize> = coherent
-        .iter()
-        .copied()
-        .take_while(|f| {
-            let take = sum < 0.1 * total;
-            sum += s.power(MAIN, *f);
-            take
-        })
-        .collect();
-    let cross: Complex<f64> = low.iter().map(|f| s.of(MAIN, TABLE, *f)).sum();
-    let power: f64 = low.iter().map(|f| s.power(MAIN, *f)).sum();
-    let gain = cross / power;
-    let expected = input.nominal.filter(|n| n.structure == Structure::TwoInertia).map_or(1.0, |n| {
-        let p = n.parameters;
-        let w = s.omega(low[low.len() / 2]);
-        let spring = Complex::new(p.k, w * p.b);
-        (spring / (spring - p.i2 * w * w)).re
-    });
-    // Near the table's resonance against the motor, and above it, the size and the sign of its motion are the coupling's.
-    let ratio = if (0.5..2.0).contains(&expected) { gain.re / expected } else { 1.0 };
-    // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
-    if gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0 {
-        findings.push(Finding::new(
-            "sign",
-            Severity::Refuse,
-            "theta2",
-            "theta2 runs against theta1.",
-            "One of the two encoders counts the other way round.",
-            "Give its column scale = -1 in [signals] of the axis file.",
-        ));
-        return;
-    }
-    let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
-    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
-    let words = lead
-        .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
-        .or_else(|| factor(ratio).map(str::to_owned));
-    if let Some(words) = words.filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25) {
-        findings.push(Finding::new(
-            "units",
-            Severity::Refuse,
-            "theta2",
-            format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {words}."),
-            "One of the two columns is in another unit than the file says.",
-            "Give the unit in the header or in [signals] (unit = \"deg\"), or scale by the gear ratio.",
-        ));
+    let (ratio, finding) = counted(input, s, &coherent);
+    if let Some(finding) = finding {
+        findings.push(finding);
         return;
     }
     if !(0.6..1.67).contains(&ratio.abs()) {

@@ -11,7 +11,7 @@
 
 use rustfft::num_complex::Complex;
 
-use super::encoders::{encoders, motor_side};
+use super::encoders::{counted, encoders, motor_side};
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::pairs::factor;
@@ -128,6 +128,9 @@ fn whole_record(
             "Record longer, with more reversals.",
         ));
         return;
+    }
+    if spectra.has(TABLE) {
+        findings.extend(counted(input, &spectra, &lines).1);
     }
     *inertia = weigh(input, &spectra, &lines, collocated, findings);
 }

@@ -329,3 +329,16 @@ fn a_broken_record_is_refused_by_the_name_of_its_defect() {
     }
     assert!(missed.is_empty(), "{missed:#?}");
 }
+
+#[test]
+fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_period_too() {
+    let sound = axis(Kind::Schroeder, 2048, 1, &Settings::default(), 1e-4);
+    let found = |by: f64| {
+        let mut columns = sound.clone();
+        columns.v[3].iter_mut().for_each(|v| *v *= by);
+        refused(&Input { nominal: Some(NOMINAL), ..columns.positions() })
+    };
+    assert_eq!(found(1.0), [""; 0]);
+    assert!(found(-1.0).contains(&"sign"), "{:?}", found(-1.0));
+    assert!(found(57.3).contains(&"units"), "{:?}", found(57.3));
+}

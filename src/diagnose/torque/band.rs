@@ -130,9 +130,10 @@ fn thinning(most: usize) -> (usize, usize) {
 
 /// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
 /// the band it is the one that acted.
-pub fn decimate(record: &Record, limit: f64) -> Record {
+/// The samples are no further apart than `longest` s.
+pub fn decimate(record: &Record, limit: f64, longest: f64) -> Record {
     use crate::axis::Hold;
-    let (every, instants) = thinning((1.0 / (record.dt * KEPT * limit)).floor() as usize);
+    let (every, instants) = thinning(((1.0 / (KEPT * limit)).min(longest) / record.dt).floor() as usize);
     let n = record.len();
     if every < 2 || n < 64 {
         return record.clone();
@@ -244,7 +245,7 @@ mod tests {
             idle: Vec::new(),
         };
         // 10 rad/s are 1.6 Hz.
-        let slow = decimate(&record, 4.0);
+        let slow = decimate(&record, 4.0, f64::INFINITY);
         let every = (slow.dt / record.dt).round() as usize;
         assert!(every > 10, "{every}");
         let y = slow.channels[0].as_ref().expect("a position");

@@ -136,17 +136,24 @@ fn split(case: &Case<'_>) -> (Record, Record) {
 /// Noises up to which the parameters alone follow a record that is searched at its own rate: the one of the band is not that exact.
 const EXACT: f64 = 10.0;
 
+/// Turn of the axis' own vibration in a sample, rad, up to which both of its sides can be held to a record: a quarter.
+const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+
 /// The record in the band of its motion; and at its own rate, where that of its band is another and accounts near the noise are settled.
 fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
     let whole = record.part(0..band::smooth(record.len()));
     let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
     let searched = |r: &Record| referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit);
     if nominal.structure == Structure::Rigid {
-        return (searched(&band::decimate(&whole, limit)).0, None);
+        return (searched(&band::decimate(&whole, limit, f64::INFINITY)).0, None);
     }
     let (own, left) = searched(&whole);
-    let slow = band::decimate(&whole, limit);
-    if left < EXACT || slow.instants() == 1 { (own, None) } else { (searched(&slow).0, Some(own)) }
+    let slow = band::decimate(&whole, limit, QUARTER / nominal.parameters.modal().wn);
+    if left < EXACT || slow.instants() == 1 {
+        return (own, None);
+    }
+    let (slow, left) = searched(&slow);
+    if left.is_finite() { (slow, Some(own)) } else { (own, None) }
 }
 
 /// The effects of the likeliest hypotheses.
