@@ -23,10 +23,9 @@ fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
 }
 
 const PARAMETERS: &[ParameterInfo] = &[
-    ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia that swings")
-        .nominal(1e-6)
+    ParameterInfo::size("inertia", "kg.m2", 0.0, 1e6, "Inertia that swings").nominal(1e-6).start(Start::Mode),
+    ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the axis and it")
         .start(Start::Mode),
-    ParameterInfo::shape("stiffness", "N.m/rad", 1.0, 1e-9, 1e12, "Stiffness between the axis and it").start(Start::Mode),
     ParameterInfo::shape("damping", "N.m.s/rad", 0.0, 0.0, 1e9, "Damping between the axis and it").start(Start::Mode),
 ];
 const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0, 1, 2] }];
