@@ -17,6 +17,7 @@ mod encoders;
 mod finding;
 mod least;
 mod momentum;
+mod nominal;
 mod pairs;
 mod robust;
 mod spectra;

@@ -14,6 +14,7 @@ use rustfft::num_complex::Complex;
 use super::encoders::{counted, encoders, motor_side};
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
+use super::nominal::explains;
 use super::pairs::factor;
 use super::robust::{quantile, span};
 use super::spectra::Spectra;
@@ -331,47 +332,6 @@ impl MomentumBalance<'_> {
 /// Averages from which a delay is told from the phase of a slow motion.
 const AVERAGED: f64 = 3.0;
 
-/// Share of the torque's impulse that the nominal inertias explain where nothing is wrong with the torque, and the factors of theirs
-/// that are one unit.
-const FOLLOWED: f64 = 0.9;
-const ONE_UNIT: std::ops::Range<f64> = 0.5..2.0;
-
-/// The inertia that moves, where the nominal axis' momentum alone follows the torque's impulse: then the torque is this axis' own, in its
-/// unit and at its time. An impulse asks little of the upper lines, where a controller answers the encoder's noise with a torque of its
-/// own sign and time.
-fn followed(input: &Input<'_>, s: &Spectra, collocated: bool) -> Option<f64> {
-    let Nominal { structure, parameters: p } = input.nominal?;
-    let all = p.i1 + p.i2;
-    let both = structure == Structure::TwoInertia && collocated && s.has(TABLE);
-    let [main, table] = if both { [p.i1, p.i2] } else { [all, 0.0] };
-    let (mut own, mut cross, mut impulse) = (0.0, 0.0, 0.0);
-    let total: f64 = (0..s.lines).map(|f| s.power(MAIN, f)).sum();
-    let mut moved = 0.0;
-    for f in 0..s.lines {
-        if moved > 0.98 * total {
-            break;
-        }
-        moved += s.power(MAIN, f);
-        let w = s.omega(f);
-        let of = |column: usize| {
-            if table > 0.0 {
-                main * s.of(column, MAIN, f) + table * s.of(column, TABLE, f)
-            } else {
-                main * s.of(column, MAIN, f)
-            }
-        };
-        own += main * of(MAIN).re + if table > 0.0 { table * of(TABLE).re } else { 0.0 };
-        // The impulse's spectrum is the torque's over jw.
-        cross += (of(T) * Complex::new(0.0, w)).re / (w * w);
-        impulse += s.power(T, f) / (w * w);
-    }
-    if own <= 0.0 || impulse <= 0.0 {
-        return None;
-    }
-    let ratio = cross / own;
-    (cross > 0.0 && cross * cross / (own * impulse) > FOLLOWED && ONE_UNIT.contains(&ratio)).then_some(ratio * all)
-}
-
 /// Signs, delay and size of the torque; gives the inertia that moves, where it makes a part of the torque.
 fn weigh(
     input: &Input<'_>,
@@ -385,9 +345,9 @@ fn weigh(
     if total <= 0.0 {
         return None;
     }
-    if let Some(mass) = followed(input, s, collocated) {
-        return Some(mass);
-    }
+    // What the nominal axis explains has nothing wrong with it, whatever a balance of free coefficients makes of a resonance.
+    let mut none = Vec::new();
+    let findings = if explains(input, s, lines) { &mut none } else { findings };
     let rigid = input.nominal.is_some_and(|n| n.structure == Structure::Rigid);
     let negative = |right: &[f64]| right.iter().map(|r| -r).collect::<Vec<_>>();
     if collocated && !s.has(TABLE) && !rigid {

@@ -342,3 +342,13 @@ fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_p
     assert!(found(-1.0).contains(&"sign"), "{:?}", found(-1.0));
     assert!(found(57.3).contains(&"units"), "{:?}", found(57.3));
 }
+
+#[test]
+fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
+    let held = axis(Kind::Schroeder, 4096, 4, &effect("coulomb_table", &[("level", 0.05)]), 1e-5);
+    let looked_at = |columns: &Columns| refused(&Input { nominal: Some(NOMINAL), ..columns.positions() });
+    assert_eq!(looked_at(&held), [""; 0]);
+    let mut dead = axis(Kind::Schroeder, 4096, 4, &Settings::default(), 1e-5);
+    dead.v[3].clone_from(&held.v[3]);
+    assert!(looked_at(&dead).contains(&"foreign"), "{:?}", looked_at(&dead));
+}

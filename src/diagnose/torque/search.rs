@@ -200,7 +200,9 @@ impl Search<'_> {
             }
             // What was named first was named without the others, however little they leave together.
             let other = self.exchanged(best.clone(), pool);
-            if other.terms == best.terms {
+            // Where next to nothing is left, a freer account only follows what no log is true to.
+            let freer = enough && other.coordinates.len() > best.coordinates.len();
+            if other.terms == best.terms || freer {
                 break;
             }
             best = self.pruned(other, pool);
