@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex;
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
-use super::nominal::explains;
+use super::nominal::explains_the_table;
 use super::pairs::factor;
 use super::spectra::Spectra;
 use super::{Input, Structure};
@@ -94,7 +94,7 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     let motion: f64 = driven().map(|f| s.power(MAIN, f)).sum();
     let unlike = (own as f64) < 0.1 * lines.len() as f64 && common < chance.max(0.3) * motion;
     // A table that friction holds, or that swings on a soft belt, twists the coupling as the torque says.
-    if unlike && !goes_along(input) && !explains(input, s, lines) {
+    if unlike && !goes_along(input) && !explains_the_table(input, s, lines) {
         findings.push(Finding::new(
             "foreign",
             Severity::Refuse,
