@@ -186,11 +186,13 @@ impl Search<'_> {
     fn climb(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
         for _ in 0..2 * MOST {
-            if self.at_floor(&best) {
+            // What is left of a large gap may still be a machine's remainder, which tells no two accounts apart; next to none of the torque
+            // does.
+            let enough = self.is_negligible(&best);
+            if self.at_floor(&best) || self.leaves_little(&best) && !enough {
                 break;
             }
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
-            let enough = self.leaves_little(&best) || self.is_negligible(&best);
             if !enough && let Some(next) = self.joined(&best, pool) {
                 best = self.pruned(next, pool);
                 continue;
