@@ -90,7 +90,7 @@ def ask_of_glibc(what, library):
     print(f"{what}: runs with glibc {'.'.join(map(str, asked))} and later", flush=True)
 
 
-def library_of(program, folder):
+def fmu_binary(program, folder):
     """The FMU's library for linux64, out of an FMU that the program exports."""
     run(program, "export", folder / "axis.fmu")
     with zipfile.ZipFile(folder / "axis.fmu") as fmu:
@@ -107,7 +107,7 @@ def look_at(platform, wheel, program, tools):
         return
     ask_of_glibc("the program", program)
     with tempfile.TemporaryDirectory() as folder:
-        ask_of_glibc("the FMU's library", library_of(program, Path(folder)))
+        ask_of_glibc("the FMU's library", fmu_binary(program, Path(folder)))
     said = run(tools.parent / "auditwheel", "show", wheel)
     if '"manylinux_2_17_x86_64"' not in said and '"manylinux_2_12_x86_64"' not in said and '"manylinux_2_5_x86_64"' not in said:
         raise SystemExit(f"FAILED: auditwheel: {said}")

@@ -18,7 +18,7 @@ def test_a_library_that_asks_for_a_newer_glibc_is_refused(tmp_path, monkeypatch,
     if not shutil.which("objdump"):
         pytest.skip("no objdump (apt-get install binutils)")
     # The library out of an FMU that the program of these tests exports: whatever it was linked against.
-    library = wheels.library_of(eixo.program(), tmp_path)
+    library = wheels.fmu_binary(eixo.program(), tmp_path)
     asked = platforms.glibc(library)
     assert (2, 2) <= asked < (3, 0)
     said = ".".join(map(str, asked))
