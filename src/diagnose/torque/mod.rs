@@ -1,7 +1,7 @@
 //! A rigid axis diagnosed by the torque that its model lacks to follow the record.
 //!
-//! [`search`] is the procedure, top to bottom, [`conclusion`] its end; [`likelihood`] the one evidence, with sensor noise and model discrepancy in it;
-//! [`tracking`] what a model lacks; [`fit`] a hypothesis fitted; [`gap`] how far the gap shrinks on data that no fit has seen. A
+//! [`search`] is the procedure, top to bottom, [`conclusion`] its end; [`likelihood`] the one evidence, with sensor noise and model
+//! discrepancy in it; [`tracking`] what a model lacks; [`fit`] a hypothesis fitted; [`gap`] how far the gap shrinks on data that no fit has seen. A
 //! machine's log is made under control, its model never complete: its verdict must not be sought at the noise floor of a simulation
 //! (Gautier, Khalil, and the inverse dynamics of robot identification; Kennedy, O'Hagan, JRSS B 63(3), 2001, for the discrepancy).
 //!

@@ -51,6 +51,9 @@ impl<'a> Look<'a> {
     }
 }
 
+/// Share of a column's square that the present columns must leave of it for it to say anything of its own.
+const COLLINEAR: f64 = 1e-9;
+
 /// Projects the present columns out, and regresses.
 struct Regression {
     q: Vec<Vec<f64>>,
@@ -95,7 +98,7 @@ impl Regression {
             })
             .collect();
         for i in 0..k {
-            if a[(i, i)].is_nan() || a[(i, i)] <= 1e-9 * full[i] {
+            if a[(i, i)].is_nan() || a[(i, i)] <= COLLINEAR * full[i] {
                 return None;
             }
         }
@@ -119,7 +122,7 @@ impl Regression {
         let v = p.band.whiten(column, &self.weights, self.s);
         let own = dot(&v, &v) - self.q.iter().map(|q| dot(q, &v).powi(2)).sum::<f64>();
         let along = -dot(&v, &self.z);
-        (own > 1e-9 * dot(&v, &v)).then(|| (along / own, 0.5 * along * along / own))
+        (own > COLLINEAR * dot(&v, &v)).then(|| (along / own, 0.5 * along * along / own))
     }
 
     fn residual(&self) -> &[f64] {
@@ -215,9 +218,10 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
     Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
 }
 
-/// Natural frequency of a mode over that of the next one looked at, and damping ratios looked at; the same about the best of them.
-const COARSE: (f64, &[f64]) = (1.03, &[0.03]);
-const FINE: (f64, &[f64]) = (1.005, &[0.005, 0.02, 0.08]);
+/// Damping ratios of the modes looked at, and about the best of these: what steel and belts have. The frequencies lie half the
+/// half-power width of the first apart.
+const COARSE: &[f64] = &[0.03];
+const FINE: &[f64] = &[0.005, 0.02, 0.08];
 /// Modes that are gone on from.
 const MODES: usize = 3;
 
@@ -237,16 +241,17 @@ fn modes(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Ve
             .filter_map(|&w| ratios.iter().filter_map(|r| looked_at(w, *r)).max_by(|a, b| a.0.total_cmp(&b.0)))
             .collect()
     };
+    let [step, fine] = [COARSE, FINE].map(|ratios| 1.0 + ratios[0]);
     let top = 2.0 * p.band.omega.last()?;
-    let rungs = (top / p.band.omega[2]).ln() / COARSE.0.ln();
-    let coarse = best_of((0..=rungs as i32).map(|i| top / COARSE.0.powi(i)).collect(), COARSE.1);
+    let rungs = (top / p.band.omega[2]).ln() / step.ln();
+    let coarse = best_of((0..=rungs as i32).map(|i| top / step.powi(i)).collect(), COARSE);
     let gains: Vec<f64> = coarse.iter().map(|c| c.0).collect();
-    let about = (COARSE.0.ln() / FINE.0.ln()) as i32;
-    let fine = peaks(&gains, MODES).into_iter().filter_map(|m| {
-        let near = (-about..=about).map(|i| coarse[m].1 * FINE.0.powi(i)).collect();
-        best_of(near, FINE.1).into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    let about = (step.ln() / fine.ln()) as i32;
+    let refined = peaks(&gains, MODES).into_iter().filter_map(|m| {
+        let near = (-about..=about).map(|i| coarse[m].1 * fine.powi(i)).collect();
+        best_of(near, FINE).into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
     });
-    Some(fine.map(|(.., mode)| mode).collect())
+    Some(refined.map(|(.., mode)| mode).collect())
 }
 
 /// Starts of one form of an effect beside the fit's, the best first.
