@@ -1,23 +1,22 @@
 //! Builds the FMU's shared library for the command line to carry.
 //!
 //! `eixo export` must work wherever the program is installed, `cargo install` included, which installs no library. So
-//! the lean library (the crate without its `cli` feature) is compiled here and embedded in the program. It has no
-//! dependencies, which lets one direct call of the compiler do: no nested cargo, no lock, no network, no recursion
-//! (the call has no `cli`, and runs no build script). It is always optimised, in a debug build too, and gets none of
-//! the user's `RUSTFLAGS`: an FMU leaves the machine it was built on.
+//! the library is compiled here, of `crates/fmu` over `crates/model`, and embedded in the program. Those two have no other
+//! dependency, which lets two direct calls of the compiler do: no nested cargo, no lock, no network. It is optimised in the same way
+//! in a debug build as in a release, and gets none of the user's `RUSTFLAGS`: an FMU leaves the machine it was built on.
 //!
 //! `EIXO_PLATFORMS=win64` in the environment embeds the library for more platforms than the program's own, each named as
 //! FMI names its folder and needing its target of rustup and a linker; `EIXO_LINKER_LINUX64=...` names another linker for
 //! one of them. `scripts/platforms.py` sets both.
 
 use std::env;
+use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, exit};
 
-/// What the lean library is made of.
-const SOURCES: [&str; 8] =
-    ["src/lib.rs", "src/scalar.rs", "src/axis", "src/drive", "src/effects", "src/fmi2", "src/fmi3", "src/variables"];
+/// The crates that the library is made of, each after those it imports: folder under `crates/`, name.
+const CRATES: [(&str, &str); 2] = [("model", "eixo_model"), ("fmu", "eixo_fmu")];
 
 /// Platforms that can be asked for: folder of FMI 2.0, target, extension.
 const PLATFORMS: [(&str, &str, &str); 2] =
@@ -26,11 +25,8 @@ const PLATFORMS: [(&str, &str, &str); 2] =
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=EIXO_PLATFORMS");
-    for source in SOURCES {
-        println!("cargo::rerun-if-changed={source}");
-    }
-    if env::var_os("CARGO_FEATURE_CLI").is_none() {
-        return;
+    for (folder, _) in CRATES {
+        println!("cargo::rerun-if-changed=crates/{folder}/src");
     }
     let (own, extension) = own_platform();
     let target = variable("TARGET");
@@ -71,32 +67,56 @@ fn own_platform() -> (String, &'static str) {
     (format!("{system}{}", variable("CARGO_CFG_TARGET_POINTER_WIDTH")), extension)
 }
 
-/// Compiles the lean library for a target.
+/// Compiles the library for a target: every crate but the last for the next one, the last as the shared library.
 fn compile(target: &str, folder: &str, library: &Path) {
-    let root = variable("CARGO_MANIFEST_DIR");
+    let named = format!("EIXO_LINKER_{}", folder.to_uppercase());
+    println!("cargo::rerun-if-env-changed={named}");
     let foreign = target != variable("TARGET");
+    let linker = env::var_os(named).or_else(|| env::var_os("RUSTC_LINKER").filter(|_| !foreign));
+    let [below @ .., last] = &CRATES;
+    let mut imports = Vec::new();
+    for one in below {
+        let import = library.with_file_name(format!("lib{}_{folder}.rlib", one.1));
+        // As cargo has it under link-time optimisation: no machine code yet.
+        run(
+            rustc(target, one, &imports).args(["--crate-type", "rlib", "-C", "linker-plugin-lto", "-o"]).arg(&import),
+            folder,
+        );
+        imports.push((one.1, import));
+    }
+    let mut shared = rustc(target, last, &imports);
+    // Link-time optimisation over all of them and the standard library. Without it a DLL asks for libraries that only code never
+    // called needs, and that some systems lack.
+    shared.args(["--crate-type", "cdylib", "-C", "lto=fat", "-C", "strip=symbols", "-o"]).arg(library);
+    if let Some(linker) = linker {
+        shared.arg("-C").arg(format!("linker={}", linker.to_string_lossy()));
+    }
+    run(&mut shared, folder);
+}
+
+/// The compiler's call for one of the crates, with those it imports.
+fn rustc(target: &str, (folder, name): &(&str, &str), imports: &[(&str, PathBuf)]) -> Command {
+    let root = variable("CARGO_MANIFEST_DIR");
     let mut rustc = Command::new(variable("RUSTC"));
     rustc
-        .arg(Path::new(&root).join("src/lib.rs"))
-        .args(["--crate-name", "eixo", "--edition", "2024", "--crate-type", "cdylib", "--cap-lints", "allow"])
-        .args(["-C", "opt-level=3", "-C", "codegen-units=1", "-C", "panic=unwind", "-C", "strip=symbols"])
+        .arg(Path::new(&root).join("crates").join(folder).join("src/lib.rs"))
+        .args(["--crate-name", name, "--edition", "2024", "--cap-lints", "allow"])
+        .args(["-C", "opt-level=3", "-C", "codegen-units=1", "-C", "panic=unwind"])
         // The same bytes wherever it is built, and no path of this machine in them.
-        .arg(format!("--remap-path-prefix={root}=eixo"))
-        .arg("-o")
-        .arg(library);
-    // Without it a DLL asks for libraries that only code never called needs, and that some systems lack.
-    if foreign || variable("PROFILE") == "release" {
-        rustc.args(["-C", "lto=fat"]);
-    }
+        .arg(format!("--remap-path-prefix={root}=eixo"));
     if target != variable("HOST") {
         rustc.args(["--target", target]);
     }
-    let named = format!("EIXO_LINKER_{}", folder.to_uppercase());
-    println!("cargo::rerun-if-env-changed={named}");
-    let linker = env::var_os(named).or_else(|| env::var_os("RUSTC_LINKER").filter(|_| !foreign));
-    if let Some(linker) = linker {
-        rustc.arg("-C").arg(format!("linker={}", linker.to_string_lossy()));
+    for (name, import) in imports {
+        let mut pair = OsString::from(format!("{name}="));
+        pair.push(import);
+        rustc.arg("--extern").arg(pair);
     }
+    rustc
+}
+
+/// Runs the compiler, which must succeed.
+fn run(rustc: &mut Command, folder: &str) {
     match rustc.output() {
         Ok(done) if done.status.success() => {}
         Ok(done) => fail(&format!(

@@ -21,9 +21,9 @@ fi
 
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
 if cargo nextest --version >/dev/null 2>&1; then
-    cargo nextest run --all-features --no-fail-fast --show-progress none --status-level fail --final-status-level fail || failed=1
+    cargo nextest run --workspace --all-features --no-fail-fast --show-progress none --status-level fail --final-status-level fail || failed=1
 else
-    cargo test --all-features --no-fail-fast --lib --bins --tests || failed=1
+    cargo test --workspace --all-features --no-fail-fast --lib --bins --tests || failed=1
 fi
 sort -u "$EIXO_SKIPPED" >&2
 [ "$failed" = 0 ] || echo "FAILED: see above" >&2

@@ -4,35 +4,19 @@
 //! Imports run downward only: `cli -> fleet -> report -> diagnose -> identify -> trace -> axis -> effects`,
 //! `cli -> examine -> trace`, `diagnose, identify, examine -> numerics`, `cli -> serve -> trace`, `cli -> fmu -> variables -> axis`, `fmi2 -> variables` and `fmi3 -> fmi2`.
 
-pub mod axis;
-pub mod drive;
-pub mod effects;
-pub mod fmi2;
-pub mod fmi3;
-pub mod scalar;
-pub mod variables;
+pub use eixo_fmu::{fmi2, fmi3, variables};
+pub use eixo_model::{axis, drive, effects, scalar};
 
-#[cfg(feature = "cli")]
 pub mod circle;
-#[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "cli")]
 pub mod diagnose;
-#[cfg(feature = "cli")]
 pub mod examine;
-#[cfg(feature = "cli")]
 pub mod fleet;
-#[cfg(feature = "cli")]
 pub mod fmu;
-#[cfg(feature = "cli")]
 pub mod identify;
-#[cfg(feature = "cli")]
 pub mod numerics;
-#[cfg(feature = "cli")]
 pub mod report;
-#[cfg(feature = "cli")]
 pub mod serve;
-#[cfg(feature = "cli")]
 pub mod trace;
 
 // What a machine lacks is said in one way by unit tests and by the program's.

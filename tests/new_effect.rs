@@ -67,7 +67,7 @@ fn copied(target: &Path) -> PathBuf {
         std::fs::remove_dir_all(&copied).unwrap();
     }
     std::fs::create_dir_all(&copied).unwrap();
-    for name in ["Cargo.toml", "Cargo.lock", "build.rs", "src", "benches", "modelDescription", "LICENSE"] {
+    for name in ["Cargo.toml", "Cargo.lock", "build.rs", "crates", "src", "benches", "modelDescription", "LICENSE"] {
         copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join(name), &copied.join(name));
     }
     copied
@@ -79,24 +79,24 @@ fn a_new_effect_is_one_file_and_one_line() {
     let program = std::env::current_exe().unwrap();
     let target = program.ancestors().nth(3).unwrap();
     let copied = copied(target);
-    std::fs::write(copied.join("src/effects/cubic_drag.rs"), FILE).unwrap();
-    let list = copied.join("src/effects/mod.rs");
+    std::fs::write(copied.join("crates/model/src/effects/cubic_drag.rs"), FILE).unwrap();
+    let list = copied.join("crates/model/src/effects/mod.rs");
     let text = std::fs::read_to_string(&list).unwrap();
     assert!(text.ends_with(";\n}\n") && text.contains("\neffects! {\n"), "the list ends the file");
     std::fs::write(&list, format!("{}{LINE}}}\n", &text[..text.len() - "}\n".len()])).unwrap();
 
-    let check = |switches: &[&str]| {
+    let check = |package: &str| {
         let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.args(["check", "--quiet", "--lib", "--locked", "--offline"]).args(switches);
+        cargo.args(["check", "--quiet", "--lib", "--locked", "--offline", "--package", package]);
         let done = cargo.current_dir(&copied).env("CARGO_TARGET_DIR", target).output().unwrap();
         (done.status.success(), String::from_utf8_lossy(&done.stderr).into_owned())
     };
-    let (fine, said) = check(&[]);
+    let (fine, said) = check("eixo");
     assert!(fine, "{said}");
     assert!(!said.contains("cubic_drag"), "not even a warning: {said}");
     // And the copy with its new line is what was compiled: without the file it is no program.
-    std::fs::remove_file(copied.join("src/effects/cubic_drag.rs")).unwrap();
-    let (fine, said) = check(&["--no-default-features"]);
+    std::fs::remove_file(copied.join("crates/model/src/effects/cubic_drag.rs")).unwrap();
+    let (fine, said) = check("eixo-model");
     assert!(!fine && said.contains("cubic_drag"), "{said}");
     std::fs::remove_dir_all(&copied).unwrap();
 }

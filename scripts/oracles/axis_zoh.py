@@ -1,4 +1,4 @@
-"""Oracle of src/axis/tests.rs: the paper's axis under an exact zero-order hold, by scipy.
+"""Oracle of crates/model/src/axis/tests.rs: the paper's axis under an exact zero-order hold, by scipy.
 
 Writes scripts/oracles/axis_zoh.txt: theta1, omega1, theta2, omega2 after 40 steps of 5 ms, T(k) = 0.03*cos(k),
 from theta1 = 0.1.

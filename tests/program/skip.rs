@@ -80,8 +80,10 @@ fn without(name: &str, why: impl Display) {
     }
 }
 
+/// The project's folder, of the program's tests and of those of the crates below it: where the lock file stands.
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    own.ancestors().find(|folder| folder.join("Cargo.lock").is_file()).unwrap_or(own)
 }
 
 fn folder(variable: &str, usual: &str) -> PathBuf {

@@ -23,13 +23,14 @@ pub use family::{Contrast, Family};
 pub use info::{EffectInfo, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 use law::{Absent, Forced, Sliding};
-pub(crate) use law::{Law, WithLaw};
+pub use law::{Law, WithLaw};
 pub use sensor::{Reading, Seen, SensorHistory};
-pub use settings::MEMORY;
-pub use settings::{ActiveEffects, Memory, Settings, UnknownEffect};
-pub(crate) use settings::{Forces, Internals, MEMORY_OF_ONE, PARAMETERS, StepMotion, effect_scope, memory_of};
-pub use shapes::{Base, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip};
-pub(crate) use shapes::{Coordinate, Modes};
+pub use settings::{ActiveEffects, MEMORY, Memory, PARAMETERS, Settings, UnknownEffect, effect_scope, memory_of};
+pub(crate) use settings::{Forces, Internals, MEMORY_OF_ONE, StepMotion};
+pub(crate) use shapes::Modes;
+pub use shapes::{
+    Base, Coordinate, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip,
+};
 
 use crate::scalar::Scalar;
 
@@ -186,7 +187,7 @@ macro_rules! effects {
 
             /// Does it with the effect's law on the motion.
             #[inline]
-            pub(crate) fn with_law<W: WithLaw>(self, work: W) -> W::Output {
+            pub fn with_law<W: WithLaw>(self, work: W) -> W::Output {
                 match self {
                     $(Self::$name => when!(
                         force,

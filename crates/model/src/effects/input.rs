@@ -165,7 +165,7 @@ impl<S: Scalar> TorqueHistory<S> {
 
 impl TorqueHistory<f64> {
     /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
-    pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+    pub fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
         for (ramp, length) in self.past.iter_mut().zip(&mut self.lengths) {
             word(&mut ramp.start);
             word(&mut ramp.end);

@@ -15,7 +15,6 @@ pub mod simulation;
 pub mod stored;
 
 pub use abi::*;
-#[cfg(feature = "cli")]
 pub use baked::bake;
 pub(crate) use baked::starts;
 pub use exports::*;

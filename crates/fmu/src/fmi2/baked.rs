@@ -7,7 +7,6 @@
 #![allow(unsafe_code)]
 
 use crate::axis::Motion;
-#[cfg(feature = "cli")]
 use crate::variables::Causality;
 use crate::variables::{COUNT, Model, Starts};
 
@@ -66,7 +65,6 @@ pub(crate) fn starts() -> Starts {
 ///
 /// # Errors
 /// Says why, when the library is not one of this interface.
-#[cfg(feature = "cli")]
 pub fn bake(library: &mut [u8], starts: &Starts) -> Result<(), &'static str> {
     let mut places = library.windows(MARK.len()).enumerate().filter(|(_, w)| *w == MARK).map(|(at, _)| at);
     let at_ = places.next().ok_or("it holds no block of start values")?;
@@ -85,7 +83,7 @@ pub fn bake(library: &mut [u8], starts: &Starts) -> Result<(), &'static str> {
     Ok(())
 }
 
-#[cfg(all(test, feature = "cli"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

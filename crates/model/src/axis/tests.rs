@@ -105,7 +105,7 @@ fn newmark_with_the_papers_weights_is_the_trapezoidal_rule() {
 fn the_exact_scheme_is_scipys_zero_order_hold() {
     // scripts/oracles/axis_zoh.py: scipy.signal.cont2discrete(A, C, 'zoh') of the paper's axis at 5 ms, 40 steps of
     // T(k) = 0.03*cos(k).
-    let expected = include_str!("../../scripts/oracles/axis_zoh.txt");
+    let expected = include_str!("../../../../scripts/oracles/axis_zoh.txt");
     let values: Vec<f64> = expected.split_whitespace().map(|v| v.parse().expect("a number")).collect();
     let torque: Vec<f64> = (0..41).map(|k| 0.03 * f64::from(k).cos()).collect();
     let options = SimulateOptions { start: 0.0, dt: 5e-3, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 1 };

@@ -36,12 +36,13 @@ const MEMORY_OFFSETS: [usize; COUNT + 1] = {
 
 /// Where an effect's internal states lie.
 #[inline]
-pub(crate) fn memory_of(effect: Effect) -> Range<usize> {
+#[must_use]
+pub fn memory_of(effect: Effect) -> Range<usize> {
     MEMORY_OFFSETS[effect as usize]..MEMORY_OFFSETS[effect as usize + 1]
 }
 
 /// Number of effect parameters in all.
-pub(crate) const PARAMETERS: usize = OFFSETS[COUNT];
+pub const PARAMETERS: usize = OFFSETS[COUNT];
 /// Number of internal states of all effects.
 pub const MEMORY: usize = MEMORY_OFFSETS[COUNT];
 /// Most internal states of one effect.
@@ -149,13 +150,13 @@ impl<S: Scalar> Settings<S> {
 
     /// The settings from every effect's parameters in the order of the list.
     #[must_use]
-    pub(crate) fn from_flat(values: [S; PARAMETERS]) -> Self {
+    pub fn from_flat(values: [S; PARAMETERS]) -> Self {
         Self { values }
     }
 
     /// Every effect's parameters in the order of the list.
-    #[cfg(feature = "cli")]
-    pub(crate) fn flat(&self) -> &[S; PARAMETERS] {
+    #[must_use]
+    pub fn flat(&self) -> &[S; PARAMETERS] {
         &self.values
     }
 
@@ -286,7 +287,7 @@ impl<S: Scalar> WithLaw for React<'_, S> {
 }
 
 /// Hands the effects that are marked, one flag an effect of the list, to `f` as a slice; without heap.
-pub(crate) fn effect_scope<R>(marked: &[bool; COUNT], f: impl FnOnce(&[Effect]) -> R) -> R {
+pub fn effect_scope<R>(marked: &[bool; COUNT], f: impl FnOnce(&[Effect]) -> R) -> R {
     let mut few = Few::default();
     EFFECTS.iter().zip(marked).filter(|(_, m)| **m).for_each(|(e, _)| few.push(*e));
     f(few.as_slice())

@@ -6,7 +6,7 @@ use super::shapes::{Base, Coordinate, DryFriction, Force, Internal, Moment, Reac
 use crate::scalar::Scalar;
 
 /// A torque along the coordinate of its effect.
-pub(crate) trait Law {
+pub trait Law {
     /// What it sees and acts on.
     const COORDINATE: Coordinate;
     /// Number of internal states.
@@ -19,7 +19,7 @@ pub(crate) trait Law {
 }
 
 /// Something to be done with the law of an effect, compiled for each law.
-pub(crate) trait WithLaw {
+pub trait WithLaw {
     /// What comes of it.
     type Output;
 

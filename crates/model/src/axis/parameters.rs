@@ -31,7 +31,6 @@ pub enum Structure {
 
 /// Whether the axis is described in rotary units (kg.m2, rad, N.m) or by the paper's linear analogue (kg, m, N).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum Motion {
     /// Inertias in kg.m2, angles in rad, torques in N.m.
     #[default]

@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 
 /// What a torque from the motion sees and acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Coordinate {
+pub enum Coordinate {
     /// `theta1`.
     Motor,
     /// `theta2`.
@@ -31,7 +31,7 @@ impl Coordinate {
 impl Place {
     /// The coordinate of the effects there.
     #[inline]
-    pub(crate) const fn coordinate(self) -> Coordinate {
+    pub const fn coordinate(self) -> Coordinate {
         match self {
             Self::Table => Coordinate::Table,
             Self::Coupling => Coordinate::Twist,

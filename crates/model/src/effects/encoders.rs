@@ -28,12 +28,14 @@ impl<S: Scalar> Settings<S> {
     }
 
     /// How long before the log's stamp both encoders are read, s; negative after it.
-    pub(crate) fn late(&self, on: &ActiveEffects) -> S {
+    #[must_use]
+    pub fn late(&self, on: &ActiveEffects) -> S {
         on.sensors().iter().fold(S::default(), |sum, &e| sum + e.late(self.of(e)))
     }
 
     /// Time constant of the filter before both encoders are read, s.
-    pub(crate) fn filter(&self, on: &ActiveEffects) -> S {
+    #[must_use]
+    pub fn filter(&self, on: &ActiveEffects) -> S {
         on.sensors().iter().fold(S::default(), |sum, &e| sum + e.filter(self.of(e)))
     }
 }

@@ -219,7 +219,7 @@ impl<S: Scalar> Seen<'_, S> {
 
 impl SensorHistory<f64> {
     /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
-    pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+    pub fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
         for r in self.past.iter_mut().chain([&mut self.motion]) {
             [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2].into_iter().for_each(&mut *word);
         }

@@ -64,7 +64,7 @@ impl State<f64> {
     }
 
     /// Hands every number of the state to `word`, which may change it: the one way in and out of a stored state.
-    pub(crate) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+    pub fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
         let numbers = self.linear.iter_mut().chain(&mut self.friction).chain(&mut self.force).chain(&mut self.memory);
         numbers.for_each(&mut *word);
         for mode in self.modes.dry.iter_mut().chain([&mut self.modes.contact]) {

@@ -3,10 +3,8 @@
 use std::array;
 
 use super::{COUNT, FIXED, Model, Slot, all};
-#[cfg(feature = "cli")]
 use super::{DriveSlot, NO_LIMIT};
 use crate::axis::{Motion, Parameters, Scheme, Structure};
-#[cfg(feature = "cli")]
 use crate::drive::Gains;
 use crate::effects::{PARAMETERS, Settings};
 use crate::scalar::Scalar;
@@ -33,7 +31,6 @@ impl Default for Starts {
     }
 }
 
-#[cfg(feature = "cli")]
 impl Starts {
     /// The start values of a machine.
     #[must_use]
@@ -124,7 +121,7 @@ impl<S: Scalar> Values<S> {
     }
 }
 
-#[cfg(all(test, feature = "cli"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
