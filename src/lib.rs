@@ -6,6 +6,7 @@
 
 pub use eixo_fmu::{fmi2, fmi3, variables};
 pub use eixo_model::{axis, drive, effects, scalar};
+pub use eixo_records as trace;
 
 pub mod circle;
 pub mod cli;
@@ -17,7 +18,6 @@ pub mod identify;
 pub mod numerics;
 pub mod report;
 pub mod serve;
-pub mod trace;
 
 // What a machine lacks is said in one way by unit tests and by the program's.
 #[cfg(test)]

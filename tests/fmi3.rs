@@ -1,6 +1,6 @@
 //! FMI 3.0: `eixo simulate` on the Reference FMUs beside FMPy, and the axis exported as FMI 3.0 beside the one of 2.0.
 
-#![cfg(all(unix, feature = "cli"))]
+#![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::Path;

@@ -29,6 +29,7 @@ fn refusal(table: &Table, name: &str) -> String {
 }
 
 #[test]
+#[cfg(feature = "parquet")]
 fn parquet_files_of_every_codec_and_encoding_hold_the_numbers_that_were_written() {
     for name in ["none", "snappy", "gzip", "zstd", "lz4", "version2"] {
         let table = Table::read(&data(&format!("{name}.parquet"))).unwrap();
@@ -42,6 +43,7 @@ fn parquet_files_of_every_codec_and_encoding_hold_the_numbers_that_were_written(
 }
 
 #[test]
+#[cfg(feature = "parquet")]
 fn a_parquet_trace_has_its_units_in_its_column_names_as_csv_does() {
     let trace = load(&data("snappy.parquet"), &Mapping::default()).unwrap().trace;
     assert_eq!(trace.len(), 200);
@@ -50,6 +52,7 @@ fn a_parquet_trace_has_its_units_in_its_column_names_as_csv_does() {
 }
 
 #[test]
+#[cfg(feature = "parquet")]
 fn time_stamps_decimals_and_whole_numbers_are_numbers_and_nulls_and_text_are_named_only_when_used() {
     let table = Table::read(&data("types.parquet")).unwrap();
     for k in 0..200 {

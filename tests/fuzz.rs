@@ -193,6 +193,7 @@ fn matlab_files_are_read_or_refused() {
 }
 
 #[test]
+#[cfg(feature = "parquet")]
 fn parquet_files_are_read_or_refused() {
     let fixtures = ["types", "version2", "zstd"].map(|n| format!("tests/data/formats/{n}.parquet"));
     let folder = tempfile::tempdir().expect("a folder");

@@ -4,6 +4,8 @@
 //! is neither run nor listed fails, and so does an entry of the list that the README no longer has.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+// It writes and reads Parquet, and shows the help of the whole program.
+#![cfg(feature = "parquet")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

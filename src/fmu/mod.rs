@@ -12,4 +12,5 @@ pub mod reference;
 pub mod rules;
 pub mod simulate;
 pub mod validation;
-pub mod xml;
+
+pub use eixo_records::xml;

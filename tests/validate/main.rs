@@ -4,7 +4,7 @@
 //! The corpus is one small C FMU with switchable defects (`tests/corpus/fmu.c`, compiled here with `cc`) and mutations
 //! of its `modelDescription.xml` and archive. Without a C compiler the behavioural part says so and is skipped.
 
-#![cfg(all(unix, feature = "cli"))]
+#![cfg(unix)]
 // Helpers beside the test functions may fail as these do.
 #![allow(clippy::unwrap_used)]
 

@@ -13,7 +13,7 @@ use super::error::TraceError;
 use super::forms::Filled;
 use super::table::{Table, header};
 use super::units::Unit;
-use crate::fmu::xml::{Document, Element};
+use crate::xml::{Document, Element};
 
 /// Whether XML is what the text begins as.
 pub(super) fn is_xml(text: &[u8]) -> bool {

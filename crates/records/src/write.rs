@@ -66,7 +66,7 @@ pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), Trac
 }
 
 /// Appends the shortest text that reads back as the same number.
-pub(crate) fn append_number(text: &mut String, value: f64) {
+pub fn append_number(text: &mut String, value: f64) {
     use std::fmt::Write as _;
     let size = value.abs();
     let written =
@@ -347,16 +347,36 @@ mod tests {
     }
 
     #[test]
-    fn numbers_without_bound_are_not_written_and_a_parquet_name_makes_parquet() {
+    fn numbers_without_bound_are_not_written() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let error = write_columns(&at("a.csv"), &[("T", &[1.0, f64::NAN])]).unwrap_err().to_string();
         assert!(error.contains("column T") && error.contains("row 2"), "{error}");
         assert!(!at("a.csv").exists());
+    }
+
+    #[test]
+    #[cfg(feature = "parquet")]
+    fn a_parquet_name_makes_parquet() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
         let values: Vec<f64> = (0..40).map(f64::from).collect();
         write_columns(&at("a.parquet"), &[("time [s]", &values), ("T [N.m]", &values)]).unwrap();
         let trace = load(&at("a.parquet"), &Mapping::default()).unwrap().trace;
         assert_eq!(trace.get(Signal::T).unwrap(), values);
+    }
+
+    #[test]
+    #[cfg(not(feature = "parquet"))]
+    fn without_parquet_reading_and_writing_say_how_to_get_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        let error = write_columns(&path, &[("T", &[1.0])]).unwrap_err().to_string();
+        assert!(error.contains("a.parquet") && error.contains("--features parquet"), "{error}");
+        assert!(!path.exists());
+        std::fs::write(&path, "PAR1 and so on PAR1").unwrap();
+        let error = load(&path, &Mapping::default()).unwrap_err().to_string();
+        assert!(error.contains("a.parquet") && error.contains("--features parquet"), "{error}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! Traces of the axis: sampled signals in memory, their files (CSV, Excel, Parquet, MATLAB 5, NumPy,
-//! JSON, logs of LinuxCNC, TwinCAT, Sinumerik and TNCscope), and the machine description `axis.toml`.
+//! Records of the axis: sampled signals in memory, their files (CSV, Excel, Parquet, MATLAB 5, NumPy,
+//! JSON, logs of LinuxCNC, TwinCAT, Sinumerik and TNCscope), and the machine description `axis.toml`. It knows files, units and time
+//! stamps, and of the model its parameters; it estimates nothing and knows no FMI.
 //!
 //! A [`Trace`] is one uniformly sampled record: `time(k) = start + k*dt`, never accumulated. Everything is SI: T in N.m
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
@@ -15,6 +16,10 @@ mod lost;
 pub mod machine;
 mod mat;
 mod packed;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(not(feature = "parquet"))]
+#[path = "no_parquet.rs"]
 mod parquet;
 mod sampling;
 mod signal;
@@ -24,21 +29,31 @@ mod units;
 mod vendors;
 mod wrap;
 mod write;
+pub mod xml;
+
+// What a machine lacks is said in one way by all tests.
+#[cfg(test)]
+#[path = "../../../tests/program/skip.rs"]
+mod skip;
 
 use std::ops::Range;
 
+use eixo_model::{axis, drive, effects};
+
 pub use crate::axis::Hold;
 pub use error::TraceError;
-pub(crate) use error::nearest;
+pub use error::nearest;
 pub use load::{Column, Loaded, LoadedPieces, Mapping, from_table, load, load_pieces};
-pub(crate) use lost::bridge;
+pub use lost::bridge;
 pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
 pub use signal::{Motion, Quantity, Signal};
 pub use table::{Header, Table};
 pub use units::Unit;
-pub(crate) use write::append_number;
-pub use write::{writable, write_columns, write_csv, write_text};
+pub use write::{append_number, writable, write_columns, write_csv, write_text};
+
+/// What is said of a Parquet file by a build without the feature `parquet`.
+pub const WITHOUT_PARQUET: &str = "this eixo was built without Parquet; build it with `--features parquet`, or use CSV";
 
 /// One uniformly sampled record of the axis, SI units.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::super::signal::Motion;
 use super::Machine;
+use crate::Column;
 use crate::axis::{Hold, Structure};
 use crate::effects::EFFECTS;
-use crate::trace::Column;
 
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()

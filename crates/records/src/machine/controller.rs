@@ -19,8 +19,8 @@
 use super::super::signal::Signal;
 use super::reader::{Reader, Section};
 use super::{MachineError, column};
+use crate::Mapping;
 use crate::drive::Gains;
-use crate::trace::Mapping;
 
 /// The drive that a log was made under.
 #[derive(Debug, Clone, Copy, PartialEq)]
