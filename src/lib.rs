@@ -4,18 +4,15 @@
 //! Imports run downward only: `cli -> fleet -> report -> diagnose -> identify -> trace -> axis -> effects`,
 //! `cli -> examine -> trace`, `diagnose, identify, examine -> numerics`, `cli -> serve -> trace`, `cli -> fmu -> variables -> axis`, `fmi2 -> variables` and `fmi3 -> fmi2`.
 
+pub use eixo_estimation::{diagnose, examine, identify, numerics};
 pub use eixo_fmu::{fmi2, fmi3, variables};
 pub use eixo_model::{axis, drive, effects, scalar};
 pub use eixo_records as trace;
 
 pub mod circle;
 pub mod cli;
-pub mod diagnose;
-pub mod examine;
 pub mod fleet;
 pub mod fmu;
-pub mod identify;
-pub mod numerics;
 pub mod report;
 pub mod serve;
 

@@ -1,6 +1,5 @@
 //! `eixo circle --measured` as a user runs it, on a machine whose errors are known: scripts/oracles/ballbar.py.
 
-
 use std::path::Path;
 use std::process::{Command, Output};
 

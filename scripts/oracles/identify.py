@@ -1,8 +1,8 @@
-"""Oracle for src/identify: scipy and numpy on a small two-inertia record. Prints the numbers the tests expect.
+"""Oracle for crates/estimation/src/identify: scipy and numpy on a small two-inertia record. Prints the numbers the tests expect.
 
     .venv/bin/python scripts/oracles/identify.py
 
-The record is made here and, by the same formulas, in src/identify/tests.rs: the paper's axis (Table 3) under two
+The record is made here and, by the same formulas, in crates/estimation/src/identify/tests.rs: the paper's axis (Table 3) under two
 periods of a flat Schroeder torque (512 samples, lines 1 to 25, rms 0.03 N.m, held over the sample), sampled every
 2e-3 s by the exact zero-order-hold discretisation, with uniform noise from a 64-bit linear congruential generator.
 """

@@ -1,4 +1,4 @@
-"""Oracle of src/diagnose/location/kalman.rs: the same Gaussian written out as one dense normal distribution.
+"""Oracle of crates/estimation/src/diagnose/location/kalman.rs: the same Gaussian written out as one dense normal distribution.
 
 The axis of the paper with unknown torques on motor and table that walk at random; theta1, omega1 and theta2 are read with
 white noise. No filter here: the joint covariance of all states and all readings is built from the model's definition

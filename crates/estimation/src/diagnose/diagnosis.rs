@@ -1,4 +1,4 @@
-//! The diagnosis as typed data. Its sentences, pages and files are made of it in [`crate::report::diagnose`].
+//! The diagnosis as typed data. Its sentences, pages and files are made of it in the program's `report`.
 
 use std::fmt;
 

@@ -205,8 +205,9 @@ fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_
 #[test]
 fn real_records_are_sound() {
     let Some(data) = crate::skip::traces("") else { return };
-    let machine =
-        |name: &str| Machine::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)).unwrap();
+    let machine = |name: &str| {
+        Machine::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/data").join(name)).unwrap()
+    };
     let mapped = |t: &str, x: &str| Mapping {
         time: Column::named("t_s"),
         signals: vec![(Signal::T, Column::named(t)), (Signal::Theta1, Column::named(x))],
