@@ -12,7 +12,7 @@ use super::abi::{self, Call, Functions};
 use super::instance::Instance;
 use super::logger::lossy;
 use super::{HostError, Status, note};
-use crate::fmu::description::Value;
+use crate::description::Value;
 pub use layout::Layout;
 use layout::Plan;
 

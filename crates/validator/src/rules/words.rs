@@ -1,7 +1,7 @@
 //! The words of FMI 3.0 for what the list of rules and the rules' messages say in those of FMI 2.0.
 
 use super::{Id, Rule, id};
-use crate::fmu::description::Fmi;
+use crate::description::Fmi;
 
 /// Functions and attributes by another name, longest first where one begins with another.
 const NAMES: [(&str, &str); 27] = [

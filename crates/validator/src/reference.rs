@@ -136,7 +136,7 @@ fn columns(table: &Table, time_at: usize, description: &Description) -> (Vec<Str
     let names =
         table.headers.iter().enumerate().filter(|(at, _)| *at != time_at).map(|(_, header)| header.name.clone());
     names.partition(|name| {
-        let named = |v: &&crate::fmu::description::Variable| v.name == *name && v.base() != BaseType::String;
+        let named = |v: &&crate::description::Variable| v.name == *name && v.base() != BaseType::String;
         description.variables.iter().find(named).is_some_and(|v| v.causality != Causality::Input)
     })
 }

@@ -10,8 +10,8 @@ use super::super::archive::{Archive, Limits};
 use super::super::xml::Document;
 use super::{Static, check_archive, check_description};
 
-const DESCRIPTION: &str = include_str!("../../../tests/corpus/modelDescription.xml");
-const DESCRIPTION3: &str = include_str!("../../../tests/corpus/modelDescription3.xml");
+const DESCRIPTION: &str = include_str!("../../../../tests/corpus/modelDescription.xml");
+const DESCRIPTION3: &str = include_str!("../../../../tests/corpus/modelDescription3.xml");
 
 /// One of the two versions of FMI.
 fn descriptions() -> impl Strategy<Value = &'static str> {

@@ -339,7 +339,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fmu::description::Kind;
+    use crate::description::Kind;
 
     #[test]
     fn every_type_has_a_variable_and_a_definition() {

@@ -9,7 +9,7 @@ use super::abi::{self, CALLS, Call};
 use super::instance::{ALLOCATION_FAILS, Instance};
 use super::logger::lossy;
 use super::{Binary, HostError, Status, note};
-use crate::fmu::description::Fmi;
+use crate::description::Fmi;
 
 /// Calls of callbacks through the structure after it was poisoned.
 static POISON: AtomicU32 = AtomicU32::new(0);

@@ -11,7 +11,7 @@ use super::super::instance::Instance;
 use super::super::{HostError, note};
 use super::layout::{Run, runs};
 use super::{check, status_of};
-use crate::fmu::description::{Kind, Value};
+use crate::description::{Kind, Value};
 
 /// Reads the values of a run by its type's function, each brought into another type.
 macro_rules! get {

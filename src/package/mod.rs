@@ -36,8 +36,8 @@ struct Library {
 /// One a platform, from `build.rs`; the program's own first.
 static LIBRARIES: &[Library] = &include!(concat!(env!("OUT_DIR"), "/libraries.rs"));
 /// The picture of the axis, from `scripts/draw_model.py`.
-static PICTURE: &[u8] = include_bytes!("../../../modelDescription/model.png");
-static LICENSE: &str = include_str!("../../../LICENSE");
+static PICTURE: &[u8] = include_bytes!("../../modelDescription/model.png");
+static LICENSE: &str = include_str!("../../LICENSE");
 /// Name of the model where no machine gives one.
 const NAME: &str = "eixo";
 

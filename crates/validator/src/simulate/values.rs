@@ -1,8 +1,8 @@
 //! Values in and out of an instance by name, whatever their types.
 
 use super::{Column, Inputs, Record, SimulateError, is_output, numeric};
-use crate::fmu::description::{BaseType, Causality, Description, Kind, Variability, Variable};
-use crate::fmu::host::{Fmu, HostError, Instance};
+use crate::description::{BaseType, Causality, Description, Kind, Variability, Variable};
+use crate::host::{Fmu, HostError, Instance};
 use crate::trace::{Hold, nearest};
 
 /// A value for a variable, as text: `name=value`.

@@ -1,6 +1,6 @@
 //! Input signals over time, between whose samples a run interpolates.
 
-use crate::fmu::description::{BaseType, Causality, Description};
+use crate::description::{BaseType, Causality, Description};
 use crate::trace::{Hold, Sampling, Table, Trace, TraceError, Unit, grid, nearest};
 
 use super::SimulateError;

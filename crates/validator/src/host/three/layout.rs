@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::fmu::description::{Cell, Description, Fmi, Kind, Value};
+use crate::description::{Cell, Description, Fmi, Kind, Value};
 
 /// What lies behind the handles of a description of FMI 3.0.
 #[derive(Debug, Default)]

@@ -9,7 +9,7 @@ use super::super::host::{Binary, Instance, InstanceOptions, Status, abuse, resou
 use super::measure;
 use super::probe::{Learned, Probe, Tested};
 use super::{Setup, settable_real};
-use crate::fmu::host::HostError;
+use crate::host::HostError;
 
 pub(in super::super) fn load(setup: &Setup) -> Tested {
     match Binary::load(&setup.binary_path, true) {
