@@ -3,8 +3,11 @@
 use super::naming::{lower, short_title, title, variable};
 use super::percent;
 use crate::diagnose::location::{Appearance, Location, OwnFrequency, Shape, Spread};
-use crate::diagnose::{Cause, ClosedLoop, Confusable, Diagnosis, LoopRanked, RoundingRole, Verdict};
+use crate::diagnose::{
+    AxisParameter, BaseParameter, Cause, ClosedLoop, Confusable, Diagnosis, LoopRanked, RoundingRole, Verdict,
+};
 use crate::effects::{Contrast, Effect};
+use crate::examine::NOMINAL_OFF;
 use crate::report::format::{self, Medium};
 use crate::trace::Motion;
 
@@ -104,7 +107,22 @@ pub fn warnings(d: &Diagnosis) -> Vec<String> {
          part (--from, --to) to have all of it."
             .to_owned()
     });
-    rounding.chain(cut_short).collect()
+    rounding.chain(run_off(d)).chain(cut_short).collect()
+}
+
+/// That the inertia that fits is far from the nominal one, whatever else was found.
+fn run_off(d: &Diagnosis) -> Option<String> {
+    let inertia = |of: &dyn Fn(&AxisParameter) -> f64| -> f64 {
+        d.parameters.iter().filter(|p| matches!(p.parameter, BaseParameter::I1 | BaseParameter::I2)).map(of).sum()
+    };
+    let ratio = inertia(&|p| p.fitted.value) / inertia(&|p| p.nominal);
+    (!(1.0 / NOMINAL_OFF..NOMINAL_OFF).contains(&ratio) && ratio.is_finite()).then(|| {
+        format!(
+            "The inertia that fits this record is {} times the nominal one: check the units and signs of the log, its torque constant and \
+             [parameters] of the axis file before anything else.",
+            significant(ratio)
+        )
+    })
 }
 
 /// Where the gap shows.

@@ -7,6 +7,7 @@ use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
 use super::nominal::explains_the_table;
 use super::pairs::factor;
+use super::rigid::{Slow, rigid_up_to};
 use super::spectra::Spectra;
 use super::{Input, Structure};
 use crate::numerics::level::deviation;
@@ -21,9 +22,45 @@ fn goes_along(input: &Input<'_>) -> bool {
     deviation(&twist) < ALONG * deviation(x1)
 }
 
+/// Coherence of both encoders over all lines of slow motion from which they are of one body.
+const ONE_BODY: f64 = 0.9;
+
+/// How many times as far as the motor the table moves below the nominal coupling's resonance, where both are one body; None where the
+/// record does not show that.
+fn of_one_body(input: &Input<'_>) -> Option<f64> {
+    let (Some(x1), Some(x2)) = (input.theta1, input.theta2) else { return None };
+    let slow = Slow::new(&[x1, x2], 0..2, input.dt, rigid_up_to(input.nominal?))?;
+    let sum = |i: usize, k: usize| slow.lines.iter().map(|f| slow.spectra.of(i, k, *f)).sum::<Complex<f64>>();
+    let (one, two, both) = (sum(0, 0).re, sum(1, 1).re, sum(0, 1));
+    (both.re * both.re > ONE_BODY * one * two).then(|| both.re / one)
+}
+
+/// What the slow motion says of the two encoders alone, where the record is too short for more.
+pub(super) fn slowly(input: &Input<'_>) -> Option<Finding> {
+    of_one_body(input).and_then(|ratio| miscounted(input, ratio, ratio < 0.0))
+}
+
+/// What is wrong where the table moves so many times as far as the motor: it counts the other way round, or in another unit.
+fn miscounted(input: &Input<'_>, ratio: f64, turned: bool) -> Option<Finding> {
+    if turned && (-2.0..-0.5).contains(&ratio) {
+        return Some(Finding::new(
+            "sign",
+            Severity::Refuse,
+            "theta2",
+            "theta2 runs against theta1.",
+            "One of the two encoders counts the other way round.",
+            "Give its column scale = -1 in [signals] of the axis file.",
+        ));
+    }
+    unit(input, ratio)
+}
+
 /// How many times as far as the motor the table moves, beside what its coupling makes of it, by the lines that show both; and what is
 /// wrong with that: it counts the other way round, or in another unit.
 pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
+    if let Some(ratio) = of_one_body(input) {
+        return (ratio, miscounted(input, ratio, ratio < 0.0));
+    }
     // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
     let total: f64 = lines.iter().map(|f| s.power(MAIN, *f)).sum();
     let mut sum = 0.0;
@@ -49,18 +86,8 @@ pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, 
     // Near the table's resonance against the motor, and above it, the size and the sign of its motion are the coupling's.
     let ratio = if (0.5..2.0).contains(&expected) { gain.re / expected } else { 1.0 };
     // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
-    let turned = gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs() && ratio < -0.5 && ratio > -2.0;
-    let against = || {
-        Finding::new(
-            "sign",
-            Severity::Refuse,
-            "theta2",
-            "theta2 runs against theta1.",
-            "One of the two encoders counts the other way round.",
-            "Give its column scale = -1 in [signals] of the axis file.",
-        )
-    };
-    (ratio, if turned { Some(against()) } else { unit(input, ratio) })
+    let turned = gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs();
+    (ratio, miscounted(input, ratio, turned))
 }
 
 /// That the table moves so many times as far as the motor because one of them is in another unit.

@@ -1,9 +1,16 @@
-//! Least squares with coefficients that may not be negative.
+//! Least squares with coefficients within bounds.
 
-/// Least squares with coefficients of at least zero: `gram*x = right`; gives x and the energy explained, `2*x.right - x.gram.x`.
+/// Least squares with coefficients of at least zero: see [`bounded`].
 pub(super) fn non_negative(gram: &[Vec<f64>], right: &[f64]) -> (Vec<f64>, f64) {
     let p = right.len();
-    let mut x = vec![0.0; p];
+    bounded(gram, right, &vec![0.0; p], &vec![f64::INFINITY; p])
+}
+
+/// Least squares with coefficients from `low` to `high`: `gram*x = right`, of columns of about one size; gives x and the energy explained,
+/// `2*x.right - x.gram.x`, which is below zero where the bounds force more than there is.
+pub(super) fn bounded(gram: &[Vec<f64>], right: &[f64], low: &[f64], high: &[f64]) -> (Vec<f64>, f64) {
+    let p = right.len();
+    let mut x: Vec<f64> = low.iter().zip(high).map(|(l, h)| 0.0_f64.clamp(*l, *h)).collect();
     for _ in 0..400 {
         let mut moved = 0.0_f64;
         for i in 0..p {
@@ -11,7 +18,7 @@ pub(super) fn non_negative(gram: &[Vec<f64>], right: &[f64]) -> (Vec<f64>, f64) 
                 continue;
             }
             let rest: f64 = (0..p).filter(|j| *j != i).map(|j| gram[i][j] * x[j]).sum();
-            let new = ((right[i] - rest) / gram[i][i]).max(0.0);
+            let new = ((right[i] - rest) / gram[i][i]).clamp(low[i], high[i]);
             moved = moved.max((new - x[i]).abs() * gram[i][i].sqrt());
             x[i] = new;
         }

@@ -19,6 +19,7 @@ mod least;
 mod momentum;
 mod nominal;
 mod pairs;
+mod rigid;
 mod robust;
 mod spectra;
 mod stamps;
@@ -33,6 +34,9 @@ pub use finding::{Finding, Severity};
 
 use crate::axis::{Motion, Parameters, Structure};
 use crate::trace::{Machine, Signal, Trace, bridge};
+
+/// Times that the inertia that moves may be off its nominal value, either way: beyond it the record is of another axis, unit or sign.
+pub const NOMINAL_OFF: f64 = 5.0;
 
 /// The nominal model, where one is known.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,14 +11,14 @@
 
 use rustfft::num_complex::Complex;
 
-use super::encoders::{counted, encoders, motor_side};
+use super::encoders::{counted, encoders, motor_side, slowly};
 use super::finding::{Finding, Severity};
-use super::least::non_negative;
+use super::least::bounded;
 use super::nominal::explains;
-use super::pairs::factor;
+use super::rigid::{self, WORSE, Weight, other_unit};
 use super::robust::{quantile, span};
 use super::spectra::Spectra;
-use super::{Input, Nominal, Structure};
+use super::{Input, NOMINAL_OFF, Nominal, Structure};
 
 /// Coherence from which a line tells something of the motion, where the averages do not ask for more.
 pub(super) const COHERENT: f64 = 0.4;
@@ -26,6 +26,8 @@ pub(super) const COHERENT: f64 = 0.4;
 const EXPLAINED: f64 = 0.2;
 /// From this share on the balance speaks of signs and delays.
 const CLEAR: f64 = 0.5;
+/// Share from which the balance tells a log that no drive makes: a ripple or a foreign torque takes more than the rest of it.
+const SURE: f64 = 0.8;
 /// Delays that are tried, samples.
 const DELAYS: i32 = 64;
 /// Delay that is worth a word, samples.
@@ -68,6 +70,7 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
     let mut columns: Vec<&[f64]> = vec![&torque[..n - 1], main, &sign];
     columns.extend(table.map(Vec::as_slice));
     let lengths = [power_of_two((n - 1) / 8).clamp(32, 8192), power_of_two((n - 1) / 3).clamp(32, 65_536)];
+    let nominal = rigid::weigh(input);
     let mut lines = None;
     for length in lengths {
         let spectra = Spectra::new(&columns, length, input.dt);
@@ -78,7 +81,7 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
         }
     }
     let Some((spectra, lines)) = lines else {
-        whole_record(input, &columns, collocated, inertia, findings);
+        whole_record(input, &columns, collocated, nominal, inertia, findings);
         return None;
     };
     // A line that stands alone passed by chance.
@@ -91,7 +94,7 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
     if table.is_some() {
         encoders(input, &spectra, &lines, findings);
     }
-    *inertia = weigh(input, &spectra, &lines, collocated, findings);
+    *inertia = believed(nominal, weigh(input, &spectra, &lines, collocated), findings);
     excitation(input.nominal, band, findings);
     Some(band)
 }
@@ -102,6 +105,7 @@ fn whole_record(
     input: &Input<'_>,
     columns: &[&[f64]],
     collocated: bool,
+    nominal: Option<Weight>,
     inertia: &mut Option<f64>,
     findings: &mut Vec<Finding>,
 ) {
@@ -117,23 +121,47 @@ fn whole_record(
         })
         .collect();
     if lines.len() < LEAST_LINES {
-        findings.push(Finding::new(
-            "too_short",
-            Severity::Note,
-            "T",
-            format!(
-                "The motion is so slow, or the record so short, that {} lines of its spectrum hold it.",
-                lines.len()
-            ),
-            "Whether the torque is this axis' own cannot be told from so few.",
-            "Record longer, with more reversals.",
-        ));
+        findings.extend(slowly(input));
+        let nothing = if nominal.is_some() { Vec::new() } else { vec![too_short(lines.len())] };
+        believed(nominal, (None, nothing), findings);
         return;
     }
     if spectra.has(TABLE) {
         findings.extend(counted(input, &spectra, &lines).1);
     }
-    *inertia = weigh(input, &spectra, &lines, collocated, findings);
+    *inertia = believed(nominal, weigh(input, &spectra, &lines, collocated), findings);
+}
+
+/// What a balance of free coefficients found, but of sign and unit what the nominal axis says of them, where it says anything.
+fn believed(
+    nominal: Option<Weight>,
+    (inertia, found): (Option<f64>, Vec<Finding>),
+    findings: &mut Vec<Finding>,
+) -> Option<f64> {
+    let known = nominal.is_some();
+    findings.extend(found.into_iter().filter(|f| !(known && ["sign", "units", "inertia"].contains(&f.id))));
+    // An encoder that counts in another unit than the motor's makes both of one inertia: it is what is wrong.
+    let of_the_table = findings.iter().any(|f| f.severity == Severity::Refuse && f.signal == "theta2");
+    match nominal {
+        Some(Weight::Wrong(finding)) if !of_the_table => {
+            let kept = inertia.filter(|_| finding.id != "sign");
+            findings.push(finding);
+            kept
+        }
+        _ => inertia,
+    }
+}
+
+/// A record whose motion so few lines hold that nothing is said of its torque.
+fn too_short(lines: usize) -> Finding {
+    Finding::new(
+        "too_short",
+        Severity::Note,
+        "T",
+        format!("The motion is so slow, or the record so short, that {} lines of its spectrum hold it.", lines),
+        "Whether the torque is this axis' own cannot be told from so few.",
+        "Record longer, with more reversals.",
+    )
 }
 
 /// Lines below which the balance of a record as a whole says nothing: each of its six coefficients takes half a line.
@@ -315,11 +343,20 @@ impl MomentumBalance<'_> {
     }
 
     fn solve(&self, gram: &[Vec<f64>], right: &[f64]) -> Found {
+        self.within(gram, right, [[0.0, f64::INFINITY]; 2])
+    }
+
+    /// The balance with M1 and M2 within bounds.
+    fn within(&self, gram: &[Vec<f64>], right: &[f64], inertias: [[f64; 2]; 2]) -> Found {
         // Columns of unit size, so that one bound serves all.
         let size: Vec<f64> = (0..6).map(|i| gram[i][i].sqrt().max(f64::MIN_POSITIVE)).collect();
         let scaled: Vec<Vec<f64>> = (0..6).map(|i| (0..6).map(|k| gram[i][k] / size[i] / size[k]).collect()).collect();
         let right: Vec<f64> = (0..6).map(|i| right[i] / size[i]).collect();
-        let (x, explained) = non_negative(&scaled, &right);
+        let (mut low, mut high) = ([0.0; 6], [f64::INFINITY; 6]);
+        for (i, [least, most]) in inertias.into_iter().enumerate() {
+            (low[i], high[i]) = (least * size[i], most * size[i]);
+        }
+        let (x, explained) = bounded(&scaled, &right, &low, &high);
         let inertia: f64 = (0..2).map(|i| (0..2).map(|k| x[i] * scaled[i][k] * x[k]).sum::<f64>()).sum();
         Found {
             x: (0..6).map(|i| x[i] / size[i]).collect(),
@@ -333,7 +370,18 @@ impl MomentumBalance<'_> {
 const AVERAGED: f64 = 3.0;
 
 /// Signs, delay and size of the torque; gives the inertia that moves, where it makes a part of the torque.
-fn weigh(
+fn weigh(input: &Input<'_>, s: &Spectra, lines: &[usize], collocated: bool) -> (Option<f64>, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let inertia = balance(input, s, lines, collocated, &mut findings);
+    // What the nominal axis explains has nothing wrong with it, whatever a balance of free coefficients makes of a resonance.
+    if explains(input, s, lines) {
+        findings.clear();
+    }
+    (inertia, findings)
+}
+
+/// The balance of free coefficients.
+fn balance(
     input: &Input<'_>,
     s: &Spectra,
     lines: &[usize],
@@ -345,9 +393,6 @@ fn weigh(
     if total <= 0.0 {
         return None;
     }
-    // What the nominal axis explains has nothing wrong with it, whatever a balance of free coefficients makes of a resonance.
-    let mut none = Vec::new();
-    let findings = if explains(input, s, lines) { &mut none } else { findings };
     let rigid = input.nominal.is_some_and(|n| n.structure == Structure::Rigid);
     let negative = |right: &[f64]| right.iter().map(|r| -r).collect::<Vec<_>>();
     if collocated && !s.has(TABLE) && !rigid {
@@ -429,7 +474,7 @@ fn weigh(
         let (ahead, behind) = (plus.0 < -AHEAD, plus.0 > BEHIND);
         findings.push(Finding::new(
             "misaligned",
-            if ahead || behind { Severity::Refuse } else { Severity::Warn },
+            if (ahead || behind) && plus.1 > SURE { Severity::Refuse } else { Severity::Warn },
             "T",
             if plus.0 < 0 {
                 format!("The motion comes about {} samples ({late:.4e} s) before its torque.", -plus.0)
@@ -444,35 +489,26 @@ fn weigh(
             "Log torque and positions in one task; a known delay of the drive belongs into [effects.delay] of the axis file.",
         ));
     }
-    let found = balance.solve(&gram, &at(if clocked && between { plus.0 } else { here.0 }));
+    let late = if clocked && between { plus.0 } else { here.0 };
+    let found = balance.solve(&gram, &at(late));
     let mass = found.x[0] + if collocated { found.x[1] } else { 0.0 };
     // Shares of the torque from which the inertia shows at all, and from which it speaks of units.
     let shown = (found.inertial > 0.05 && mass > 0.0 && mass.is_finite()).then_some(mass);
     let (Some(nominal), true) = (input.nominal, found.inertial > 0.3) else { return shown };
     let p = nominal.parameters;
     let ratio = mass / (p.i1 + p.i2);
-    if ratio <= 0.0 || !ratio.is_finite() || (0.2..5.0).contains(&ratio) {
+    if ratio <= 0.0 || !ratio.is_finite() || (1.0 / NOMINAL_OFF..NOMINAL_OFF).contains(&ratio) {
         return shown;
     }
-    let unit = super::Motion::unit(input.motion, "kg.m2");
-    findings.push(match factor(ratio) {
-        Some(words) => Finding::new(
-            "units",
-            Severity::Refuse,
-            "T",
-            format!("The inertia that moves is {mass:.4e} {unit}, {ratio:.4e} times the nominal one, which looks like a factor of {words}."),
-            "Torque, angle or time is in another unit than the file says: every parameter is off by it.",
-            "Give the unit in the header or in [signals] (unit = \"mN.m\", \"deg\", \"ms\"), or mend [parameters].",
-        ),
-        None => Finding::new(
-            "inertia",
-            Severity::Warn,
-            "T",
-            format!("The inertia that moves is {mass:.4e} {unit}, {ratio:.4} times the nominal one."),
-            "The nominal inertia, a gear ratio, the torque constant or a unit is off.",
-            "Check [parameters] and the scale of T in [signals]; `eixo identify` reads the inertia from this record.",
-        ),
-    });
+    // Beside a resonance that is off, a ripple or a foreign torque the inertia is what the others leave of it.
+    let near = |m: f64| [m / NOMINAL_OFF, m * NOMINAL_OFF];
+    let both = collocated && !rigid;
+    let bounds = if both { [near(p.i1), near(p.i2)] } else { [near(p.i1 + p.i2), [0.0, f64::INFINITY]] };
+    let own = balance.within(&gram, &at(late), bounds).share;
+    if 1.0 - own <= WORSE * (1.0 - found.share) {
+        return shown;
+    }
+    findings.push(other_unit(input, mass, ratio, false));
     shown
 }
 

@@ -353,3 +353,52 @@ fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
     dead.v[3].clone_from(&held.v[3]);
     assert!(looked_at(&dead).contains(&"foreign"), "{:?}", looked_at(&dead));
 }
+
+/// Two slow moves to and fro along `s(10 - 15 s + 6 s^2)s^2`, of which averaged spectra show few lines or none, and the torque that the
+/// equation of motion gives for them beside Coulomb and viscous friction; noise on both encoders.
+fn slow_moves() -> Columns {
+    let p = Parameters::PAPER;
+    let (dt, duration, way) = (1e-3, 0.5, 1.5);
+    let samples = (duration / dt) as usize;
+    let inertia = p.i1 + p.i2;
+    // The largest torque of acceleration; friction is half of it, the current's noise a hundredth.
+    let largest = inertia * 10.0 / 3.0_f64.sqrt() * way / (duration * duration);
+    let (mut torque, mut x1) = (Vec::new(), Vec::new());
+    let mut e = noise(17, 1e-5);
+    let mut of_current = noise(18, 0.01 * largest);
+    for (start, sense) in [(0.0, 1.0), (way, -1.0), (0.0, 1.0), (way, -1.0)] {
+        for k in 0..samples {
+            let s = k as f64 / samples as f64;
+            let x = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+            let v = 30.0 * s * s * (1.0 - s).powi(2) / duration;
+            let a = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration.powi(2);
+            let of = |y: f64| sense * way * y;
+            x1.push(start + of(x));
+            torque.push(inertia * of(a) + 0.01 * largest * of(v) + 0.5 * largest * of(v).signum() + of_current());
+        }
+    }
+    let x2 = x1.iter().map(|x| x + e()).collect();
+    let x1 = x1.iter().map(|x| x + e()).collect();
+    Columns { dt, v: [torque, x1, Vec::new(), x2, Vec::new()] }
+}
+
+#[test]
+fn slow_moves_under_friction_tell_sign_and_unit_of_torque_and_table() {
+    let looked_at = |change: &dyn Fn(&mut Columns)| {
+        let mut columns = slow_moves();
+        change(&mut columns);
+        let two = Input { nominal: Some(NOMINAL), ..columns.positions() };
+        let rigid = Nominal { structure: Structure::Rigid, ..NOMINAL };
+        let one = Input { nominal: Some(rigid), ..columns.motor_only() };
+        [refused(&two), refused(&one)]
+    };
+    let torque = |by: f64| looked_at(&|c| c.v[0].iter_mut().for_each(|t| *t *= by));
+    let table = |by: f64| looked_at(&|c| c.v[3].iter_mut().for_each(|x| *x *= by))[0].clone();
+    assert_eq!(torque(1.0), [Vec::<&str>::new(), Vec::new()]);
+    assert_eq!(torque(-1.0), [["sign"], ["sign"]]);
+    for by in [1000.0, 1e-3, 57.3, 8.0 * std::f64::consts::PI] {
+        assert_eq!(torque(by), [["units"], ["units"]], "{by}");
+    }
+    assert_eq!(table(-1.0), ["sign"]);
+    assert_eq!(table(57.3), ["units"]);
+}

@@ -2,10 +2,12 @@
 
 use std::sync::atomic::Ordering;
 
+use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::fit::Fit;
 use super::search::{ALIKE, Search, is_more};
 use crate::effects::Effect;
+use crate::examine::NOMINAL_OFF;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
@@ -117,7 +119,8 @@ impl Search<'_> {
         } else {
             &given
         };
-        let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
+        let nominal = &self.problem.nominal;
+        let chosen = if chosen.terms.is_empty() || is_run_off(&chosen, nominal) { plain.clone() } else { chosen };
         let explained = self.explained(&parameters, &chosen);
         let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let settled = self.at_floor(&chosen) || white;
@@ -170,6 +173,7 @@ impl Search<'_> {
         let verdict = match chosen.terms.is_empty() {
             false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
+            true if is_run_off(&chosen, nominal) => Verdict::Unexplained,
             true if left > UNCAUSED => Verdict::Unexplained,
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
@@ -267,6 +271,12 @@ impl Search<'_> {
     }
 }
 
+/// Whether the inertia that moves is so far from the nominal one that what is fitted beside it says nothing of this axis.
+fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
+    let inertia = |m: &Model| m.parameters.i1 + m.parameters.i2;
+    (inertia(&fit.model) / inertia(nominal)).ln().abs() > NOMINAL_OFF.ln()
+}
+
 /// The likeliest fit of all effects of another but one, each in its form: another form of one may do what the missing one does, and
 /// which of the two it is the evidence says.
 fn plainer<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
@@ -297,7 +307,6 @@ fn confusable(chosen: &Fit, ranking: &[Weighed], evidence: f64) -> Vec<Confusabl
 mod tests {
     use super::*;
     use crate::axis::{Parameters, Structure};
-    use crate::diagnose::model::Model;
     use crate::effects::Settings;
 
     fn fit(effects: &[Effect], log_likelihood: f64) -> Fit {
@@ -336,6 +345,15 @@ mod tests {
         assert!(decision(scaled([1.25, 1.2, 1.3, 1.25])).torque_gain().is_some());
         assert!(decision(scaled([1.25, 1.0, 1.25, 1.25])).torque_gain().is_none());
         assert!(decision(scaled([1.01; 4])).torque_gain().is_none());
+    }
+
+    #[test]
+    fn an_inertia_ten_times_the_nominal_one_has_run_off_and_one_of_three_times_has_not() {
+        let nominal = scaled([1.0; 4]).model;
+        let run_off = |by: f64| is_run_off(&scaled([by, by, 1.0, 1.0]), &nominal);
+        assert_eq!([0.1, 0.3, 1.0, 3.0, 10.0].map(run_off), [true, false, false, false, true]);
+        // Of one encoder's record the share of the table may be anything while the whole is told.
+        assert!(!is_run_off(&scaled([1.0, 0.1, 1.0, 1.0]), &nominal));
     }
 
     #[test]
