@@ -1,7 +1,7 @@
 //! Estimation: from records to parameters, and from what the parameters leave unexplained to a cause. It knows the model, the record
 //! and statistics; it reads no file, knows no FMI and writes no sentence for a reader.
 //!
-//! Imports run downward only: `diagnose -> identify -> numerics`, `examine -> numerics`, each over [`eixo_records`] and
+//! Imports run downward only: `diagnose -> identify -> numerics`, `diagnose -> examine -> numerics`, each over [`eixo_records`] and
 //! [`eixo_model`].
 
 pub mod diagnose;
