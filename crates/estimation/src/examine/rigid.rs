@@ -97,7 +97,8 @@ pub(super) fn other_unit(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -
     let unit = Motion::unit(input.motion, "kg.m2");
     let seen = format!("The inertia that moves is {mass:.4e} {unit}, {ratio:.4} times the nominal one");
     let words = factor(ratio);
-    if words.is_none() && !(sure && !(1.0 / BEYOND..BEYOND).contains(&ratio)) {
+    let of_a_nominal = !sure || (1.0 / BEYOND..BEYOND).contains(&ratio);
+    if words.is_none() && of_a_nominal {
         return Finding::new(
             "inertia",
             Severity::Warn,
