@@ -168,6 +168,9 @@ pub fn run(
     work: &(dyn Fn(&Item) -> Result<Found, String> + Sync),
     tell: &(dyn Fn(&Item, &str) + Sync),
 ) -> Result<Outcome, FleetError> {
+    if let Some(path) = plan.summary.filter(|_| !plan.part) {
+        summary::check(path)?;
+    }
     let store = store::Store::open(plan)?;
     let next = AtomicUsize::new(0);
     let rows: Mutex<Rows> = Mutex::new(Rows::new());

@@ -76,11 +76,26 @@ fn columns(facts: &[&str], rows: &[Placed]) -> Vec<(String, Column)> {
     columns
 }
 
+/// Whether a summary is written as Parquet.
+fn is_packed(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet") || e.eq_ignore_ascii_case("pq"))
+}
+
+/// That this build can write such a summary, before any work is done for it.
+///
+/// # Errors
+/// For Parquet in a build without it.
+pub(super) fn check(path: &Path) -> Result<(), FleetError> {
+    if is_packed(path) && cfg!(not(feature = "parquet")) {
+        return Err(FleetError::Parquet { path: path.to_owned(), reason: crate::trace::WITHOUT_PARQUET.to_owned() });
+    }
+    Ok(())
+}
+
 /// Writes the summary: Parquet where the name ends so, else CSV.
 pub(super) fn write(path: &Path, facts: &[&str], rows: &[Placed]) -> Result<(), FleetError> {
     let columns = columns(facts, rows);
-    let to_pack = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet") || e.eq_ignore_ascii_case("pq"));
-    let bytes = if to_pack {
+    let bytes = if is_packed(path) {
         packed::pack(&columns, rows.len())
             .map_err(|e| FleetError::Parquet { path: path.to_owned(), reason: e.to_string() })?
     } else {

@@ -38,11 +38,11 @@ pub fn verdict(examination: &Examination) -> Verdict {
         (n, _) => (Tone::Unsure, format!("The record is not to be believed as it is, for {n} reasons.")),
     };
     let detail = examination.band.map_or_else(String::new, |[low, high]| {
-        format!(
-            "The motion follows the torque from {} to {} Hz.",
-            format::number(low, 3, Medium::Page),
-            format::number(high, 3, Medium::Page)
-        )
+        let [low, high] = [low, high].map(|f| format::number(f, 3, Medium::Page));
+        if low == high {
+            return format!("The motion follows the torque at {low} Hz.");
+        }
+        format!("The motion follows the torque from {low} to {high} Hz.")
     });
     Verdict { tone, sentence, detail, figures: Vec::new() }
 }

@@ -59,6 +59,10 @@ pub fn estimate(value: f64, std: f64, medium: Medium) -> String {
     }
     let scale = 10f64.powi(common);
     let decimals = usize::try_from(common - last).unwrap_or(0);
+    // Of a value far below its standard error no digit stands.
+    if value.abs() < 0.5 * 10f64.powi(last) {
+        return format!("0 ± {}", number(std, 2, medium));
+    }
     if medium == Medium::Terminal {
         return format!("{}e{common} ± {}", format_args!("{:.decimals$}", value / scale), number(std, 2, medium));
     }
@@ -228,6 +232,8 @@ mod tests {
             (54.532, 0.031, "54.532 ± 0.031"),
             (0.0, 0.5, "0.00 ± 0.50"),
             (3.0, 250.0, "3 ± 250"),
+            (1e3, 1.7e7, "0 ± 1.7e7"),
+            (0.0, 2e-9, "0 ± 2.0e-9"),
             (1.0, 0.0996, "1.00 ± 0.10"),
             (1.0, f64::NAN, "1.0000"),
             (1.0, 0.0, "1.0000"),

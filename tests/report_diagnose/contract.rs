@@ -30,7 +30,9 @@ fn the_fields_stand_in_their_order() {
         ("/where/by_state/0", "residual unit against against_unit bins explained"),
         ("/where/by_state/0/bins/0", "x mean std count"),
         ("/remainder", "torque_rms share noise_multiple place summary"),
-        ("/gap", "train holdout closure closure_of_effect interval closure_of holdout_is"),
+        ("/gap", "train holdout closure closure_of_effect interval closure_of holdout_is ways"),
+        ("/gap/ways", "free_run windows torque"),
+        ("/gap/ways/torque", "before reidentified after noise_floor closure closure_of_effect interval"),
         ("/gap/train", "before reidentified after noise_floor signals multiples"),
         ("/parameters/I1", "nominal reidentified fitted std unit"),
     ] {

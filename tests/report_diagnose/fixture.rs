@@ -5,7 +5,7 @@ use eixo::diagnose::location::{
 };
 use eixo::diagnose::{
     AxisParameter, BaseParameter, Cause, ClosureOf, Confusable, Diagnosis, Estimate, Figures, GapReport, HeldOut,
-    Hypothesis, Levels, Location, Overlay, Ranked, Remainder, Rounding, RoundingRole, Site, Verdict, Where,
+    Hypothesis, Levels, Location, Overlay, Ranked, Remainder, Rounding, RoundingRole, Site, Verdict, Way, Where,
 };
 use eixo::effects::{Effect, Place};
 
@@ -15,6 +15,11 @@ pub fn figures(before: f64, reidentified: f64, after: f64) -> Figures {
         signals: Vec::new(),
         multiples: [before / 0.008, reidentified / 0.008, after / 0.008],
     }
+}
+
+fn way(of: ClosureOf, [before, reidentified, after]: [f64; 3], closure: f64) -> Way {
+    let levels = Levels { before, reidentified, after, noise_floor: 0.008 };
+    Way { of, levels, closure, closure_of_effect: 0.5 * closure, interval: [closure - 0.003, 1.0] }
 }
 
 /// What the friction of the motor leaves.
@@ -96,6 +101,11 @@ pub fn friction(machine: &str) -> Diagnosis {
         remainder: Remainder { torque_rms: 1e-5, share: 1e-3, noise_multiple: 1.0, site: motor, looks: looks() },
         gap: GapReport {
             closure_of: ClosureOf::Windows,
+            ways: [
+                way(ClosureOf::FreeRun, [3.1, 2.2, 1.9], 0.62),
+                way(ClosureOf::Windows, [0.184, 0.097, 0.0084], 0.991),
+                way(ClosureOf::Torque, [0.31, 0.12, 0.009], 0.998),
+            ],
             train: figures(0.182, 0.094, 0.0081),
             holdout: figures(0.184, 0.097, 0.0084),
             closure: 0.991,

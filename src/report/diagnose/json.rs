@@ -156,19 +156,32 @@ fn remainder(r: &Remainder) -> Value {
 }
 
 fn gap(g: &GapReport) -> Value {
-    let closure_of = match g.closure_of {
-        ClosureOf::FreeRun => "free_run",
-        ClosureOf::Windows => "windows",
-    };
+    let ways = g.ways.iter().map(|w| {
+        let mut all = levels(&w.levels);
+        all["closure"] = json!(w.closure);
+        all["closure_of_effect"] = json!(w.closure_of_effect);
+        all["interval"] = json!(w.interval);
+        (way(w.of), all)
+    });
     json!({
         "train": figures(&g.train),
         "holdout": figures(&g.holdout),
         "closure": g.closure,
         "closure_of_effect": g.closure_of_effect,
         "interval": g.interval,
-        "closure_of": closure_of,
+        "closure_of": way(g.closure_of),
         "holdout_is": held_out(g.holdout_is),
+        "ways": map(ways),
     })
+}
+
+/// The name of a way of measuring the gap.
+const fn way(of: ClosureOf) -> &'static str {
+    match of {
+        ClosureOf::FreeRun => "free_run",
+        ClosureOf::Windows => "windows",
+        ClosureOf::Torque => "torque",
+    }
 }
 
 fn figures(f: &Figures) -> Value {

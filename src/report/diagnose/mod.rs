@@ -73,6 +73,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
         blocks.push(Block::Table(tables::causes(d)));
     }
     blocks.push(Block::Table(tables::levels(d)));
+    blocks.extend(words::why_this_way(d).map(Block::Paragraph));
     blocks.extend(words::remainder(d, f.motion).map(Block::Paragraph));
     blocks.extend(controlled::short(d));
     blocks.push(Block::Table(tables::ranking(d, 5)));
@@ -126,6 +127,7 @@ fn what(d: &Diagnosis) -> Vec<Block> {
 fn how_far(f: &Findings) -> Vec<Block> {
     let d = f.diagnosis;
     let mut blocks = vec![Block::Table(tables::levels(d))];
+    blocks.extend(words::why_this_way(d).map(Block::Paragraph));
     blocks.extend(words::remainder(d, f.motion).map(Block::Paragraph));
     blocks.extend(words::beyond_parameters(d).map(Block::Paragraph));
     for o in f.overlays {

@@ -1,7 +1,7 @@
 //! Hypotheses, effects and signals as people call them.
 
 use crate::diagnose::location::{Side, StateVariable};
-use crate::diagnose::{Diagnosis, HeldOut, Hypothesis, Verdict};
+use crate::diagnose::{ClosureOf, Diagnosis, HeldOut, Hypothesis, Verdict};
 use crate::effects::EffectInfo;
 
 /// A hypothesis in words.
@@ -44,6 +44,15 @@ pub const fn held_out(what: HeldOut) -> &'static str {
     match what {
         HeldOut::SecondRecord => "a second record",
         HeldOut::LastThird => "the last third of the record",
+    }
+}
+
+/// A way of measuring the gap, as a column's head says it.
+pub const fn way(of: ClosureOf) -> &'static str {
+    match of {
+        ClosureOf::FreeRun => "free run",
+        ClosureOf::Windows => "windows",
+        ClosureOf::Torque => "torque",
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::naming;
 use crate::diagnose::location::{FrequencyPart, PartOf, Side, StateCurve};
-use crate::diagnose::{ClosureOf, Location, Overlay, Site, Where};
+use crate::diagnose::{ClosureOf, Location, Overlay, Site, TORQUE, Where};
 use crate::effects::Place;
 use crate::report::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
 use crate::report::{Block, Cell, Figure, Table};
@@ -57,10 +57,13 @@ pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: Moti
         .mark(Mark::Y(2.0 * o.noise, "2 standard deviations of the noise".into()))
         .mark(Mark::Y(-2.0 * o.noise, String::new()));
     let caption = match of {
+        _ if o.channel == TORQUE => {
+            "The torque that acted, and the torque that each model needs for the measured motion, in the band of that motion."
+        }
         ClosureOf::FreeRun => {
             "Each model runs freely from one fitted state at the beginning, under the logged torque alone."
         }
-        ClosureOf::Windows => {
+        ClosureOf::Windows | ClosureOf::Torque => {
             "Each window starts from its own fitted state, so that an error does not run on into the next."
         }
     };

@@ -1,6 +1,6 @@
 //! The tables of a diagnosis.
 
-use super::naming::{improved, title};
+use super::naming::{improved, title, way};
 use crate::diagnose::{AxisParameter, Diagnosis, Estimate, Hypothesis, Levels, Verdict};
 use crate::report::{Cell, Table};
 
@@ -28,25 +28,37 @@ pub fn causes(d: &Diagnosis) -> Table {
     table
 }
 
-/// The errors of the models on both records.
-pub fn levels(d: &Diagnosis) -> Table {
-    let mut table =
-        Table::new("Error of the model, rms over rms of the signal", ["model", "fitted trace", "held-out trace"]);
-    let mut row = |name: &str, of: fn(&Levels) -> f64, strong: bool| {
-        let cells = vec![
-            Cell::text(name),
-            Cell::Percent(of(&d.gap.train.combined)),
-            Cell::Percent(of(&d.gap.holdout.combined)),
-        ];
-        if strong { table.strong_row(cells) } else { table.row(cells) }
-    };
-    row("as given", |l| l.before, false);
-    row("parameters re-identified", |l| l.reidentified, false);
+/// A model in the table of errors: its name, its level, whether it is the answer.
+type Line = (&'static str, fn(&Levels) -> f64, bool);
+
+/// The models that the table tells.
+fn lines(d: &Diagnosis) -> Vec<Line> {
+    let mut lines: Vec<Line> =
+        vec![("as given", |l| l.before, false), ("parameters re-identified", |l| l.reidentified, false)];
     match d.verdict {
-        Verdict::Effect | Verdict::Unexplained => row(improved(d), |l| l.after, d.verdict == Verdict::Effect),
+        Verdict::Effect | Verdict::Unexplained => lines.push((improved(d), |l| l.after, d.verdict == Verdict::Effect)),
         Verdict::Parameters | Verdict::NoGap => {}
     }
-    row("noise floor", |l| l.noise_floor, false);
+    lines.push(("noise floor", |l| l.noise_floor, false));
+    lines
+}
+
+/// The errors of the models on both records: on the held-out one by every way of measuring them.
+pub fn levels(d: &Diagnosis) -> Table {
+    let gap = &d.gap;
+    let heads = ["model".to_owned(), format!("fitted trace, {}", way(gap.closure_of))]
+        .into_iter()
+        .chain(gap.ways.iter().map(|w| format!("held out, {}", way(w.of))));
+    let mut table = Table::new("Error of the model, rms over rms of signal or torque", heads);
+    for (name, of, strong) in lines(d) {
+        let held = gap.ways.iter().map(|w| Cell::Percent(of(&w.levels)));
+        let cells = [Cell::text(name), Cell::Percent(of(&gap.train.combined))].into_iter().chain(held).collect();
+        if strong { table.strong_row(cells) } else { table.row(cells) }
+    }
+    if matches!(d.verdict, Verdict::Effect | Verdict::Parameters | Verdict::Unexplained) {
+        let closed = gap.ways.iter().map(|w| Cell::Percent(w.closure));
+        table.row([Cell::text("gap closed"), Cell::Empty].into_iter().chain(closed).collect());
+    }
     table
 }
 

@@ -3,7 +3,7 @@
 use super::naming::{held_out, lower, short_title, title};
 use super::percent;
 use super::words::REMAINS;
-use crate::diagnose::{Cause, Diagnosis, Hypothesis, Verdict as Answer};
+use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, Verdict as Answer};
 use crate::report::{Cell, Tone, Verdict};
 
 /// Error over noise below which a model explains a trace.
@@ -20,8 +20,9 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
     let (tone, sentence, detail) = match d.verdict {
         Answer::NoGap => {
             figures.clear();
+            let (what, of) = measured(d);
             let levels = format!(
-                "Its error on held-out data is {} of the signal, the noise {}.",
+                "On held-out data {what} is {} of the {of}, the noise {}.",
                 percent(held.before),
                 percent(held.noise_floor)
             );
@@ -59,14 +60,23 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
 /// How the error changes on held-out data.
 fn fall(d: &Diagnosis) -> String {
     let held = &d.gap.holdout.combined;
+    let (what, of) = measured(d);
     format!(
-        "On held-out data ({}) the model's error {} from {} of the signal to {}; the noise alone is {}.",
+        "On held-out data ({}) {what} {} from {} of the {of} to {}; the noise alone is {}.",
         held_out(d.gap.holdout_is),
         if held.after > held.before { "rises" } else { "falls" },
         percent(held.before),
         percent(held.after),
         percent(held.noise_floor)
     )
+}
+
+/// What the figures of the held-out data are, and what they are a share of.
+const fn measured(d: &Diagnosis) -> (&'static str, &'static str) {
+    match d.gap.closure_of {
+        ClosureOf::FreeRun | ClosureOf::Windows => ("the model's error", "signal"),
+        ClosureOf::Torque => ("the torque that the model lacks", "torque"),
+    }
 }
 
 fn left_out(causes: &[Cause]) -> String {

@@ -4,7 +4,8 @@ use super::naming::{lower, short_title, title, variable};
 use super::percent;
 use crate::diagnose::location::{Appearance, Location, OwnFrequency, Shape, Spread};
 use crate::diagnose::{
-    AxisParameter, BaseParameter, Cause, ClosedLoop, Confusable, Diagnosis, LoopRanked, RoundingRole, Verdict,
+    AxisParameter, BaseParameter, Cause, ClosedLoop, ClosureOf, Confusable, Diagnosis, LoopRanked, RoundingRole,
+    Verdict,
 };
 use crate::effects::{Contrast, Effect};
 use crate::examine::NOMINAL_OFF;
@@ -14,13 +15,14 @@ use crate::trace::Motion;
 /// The verdict in a sentence.
 pub fn sentence(d: &Diagnosis) -> String {
     let percent = |v: f64| format!("{:.1} %", 100.0 * v.clamp(-9.99, 1.0));
+    let gap = if d.gap.closure_of == ClosureOf::Torque { "the gap in torque" } else { "the gap" };
     match d.verdict {
         Verdict::NoGap => "No gap: the model as given explains the record down to the noise.".to_owned(),
         Verdict::Parameters if !d.causes.is_empty() => {
             "Parameters: every nominal parameter is off by the same factor, as from a wrong torque constant.".to_owned()
         }
         Verdict::Parameters => format!(
-            "Parameters: the structure is right, its parameters are off; with them fitted {} of the gap closes.",
+            "Parameters: the structure is right, its parameters are off; with them fitted {} of {gap} closes.",
             percent(d.gap.closure)
         ),
         Verdict::Effect => {
@@ -32,7 +34,7 @@ pub fn sentence(d: &Diagnosis) -> String {
             if d.gap.closure < 0.0 {
                 format!("{names}, by the fitted record; the held-out record contradicts it: the error grows there.")
             } else {
-                format!("{names}: {} of the gap on held-out data closes with it.", percent(d.gap.closure))
+                format!("{names}: {} of {gap} on held-out data closes with it.", percent(d.gap.closure))
             }
         }
         Verdict::Unexplained if is_rounding(d) => {
@@ -189,6 +191,28 @@ pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
         format::number(r.noise_multiple, 2, Medium::Page),
         looks(&r.looks)
     ))
+}
+
+/// Why the figures of the gap are of what they are; none where the strictest way tells them.
+pub fn why_this_way(d: &Diagnosis) -> Option<String> {
+    let best = |of: ClosureOf| {
+        d.gap.ways.iter().find(|w| w.of == of).map_or(f64::NAN, |w| w.levels.reidentified.min(w.levels.after))
+    };
+    match d.gap.closure_of {
+        ClosureOf::FreeRun => None,
+        ClosureOf::Windows => Some(format!(
+            "No model's free run follows the whole held-out record (the best is off by {} of the signal): a small torque adds up to a \
+             large position. The closure is therefore that of windows, each run from a state fitted to it.",
+            percent(best(ClosureOf::FreeRun))
+        )),
+        ClosureOf::Torque => Some(format!(
+            "No model's run follows the held-out record, neither freely (the best is off by {} of the signal) nor in windows ({}): a \
+             small torque adds up to a large position. The closure is therefore that of the torque that a model lacks when it is held to \
+             the measured motion.",
+            percent(best(ClosureOf::FreeRun)),
+            percent(best(ClosureOf::Windows))
+        )),
+    }
 }
 
 /// What the effects close beyond new parameters; none where no effect is named.

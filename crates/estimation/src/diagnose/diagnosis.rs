@@ -193,6 +193,23 @@ pub enum ClosureOf {
     FreeRun,
     /// Runs of half a thousand samples, their initial states fitted.
     Windows,
+    /// The torque that the model lacks, held to the measured motion.
+    Torque,
+}
+
+/// The held-out gap by one way of measuring it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Way {
+    /// The way.
+    pub of: ClosureOf,
+    /// Errors of the three models.
+    pub levels: Levels,
+    /// `1 - (after^2 - floor^2)/(before^2 - floor^2)`.
+    pub closure: f64,
+    /// The same from the re-identified model.
+    pub closure_of_effect: f64,
+    /// 95 % interval of `closure`.
+    pub interval: [f64; 2],
 }
 
 /// What the fits do not see.
@@ -260,8 +277,10 @@ pub struct GapReport {
     pub closure_of_effect: f64,
     /// 95 % interval of `closure`.
     pub interval: [f64; 2],
-    /// What `closure` and the levels are measured on.
+    /// What `closure` and the levels are measured on: the first way, in the order of `ways`, by which a model follows the record.
     pub closure_of: ClosureOf,
+    /// The held-out gap by every way: free run, windows, torque.
+    pub ways: [Way; 3],
     /// What the held-out data are.
     pub holdout_is: HeldOut,
 }

@@ -17,12 +17,12 @@ pub use assess::{Case, Outcome, Replay};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
 pub use diagnosis::{
     AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Hypothesis, Levels, Ranked,
-    Remainder, Rounding, RoundingRole, Site, Where,
+    Remainder, Rounding, RoundingRole, Site, Way, Where,
 };
 pub use location::Location;
 pub use model::{BaseParameter, Model};
 pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
 pub use overlay::Overlay;
-pub use record::{CHANNELS, Record};
+pub use record::{CHANNELS, Record, TORQUE};
 pub use torque::{Confusable, Decision, Fit, Weighed, diagnose};
 pub use verdict::Verdict;

@@ -1,9 +1,10 @@
 //! Held-out signals with the models' runs: what the report draws.
 
-/// A measured channel and the models' runs, window by window; a missing value stands between two windows.
+/// A measured channel and the models' runs, window by window, or the torque and what each model needs for the measured motion; a missing
+/// value stands where nothing is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlay {
-    /// Name of the channel, see [`CHANNELS`](super::CHANNELS).
+    /// Name of the channel, see [`CHANNELS`](super::CHANNELS), or [`TORQUE`](super::TORQUE).
     pub channel: &'static str,
     /// Time of each sample, s.
     pub time: Vec<f64>,

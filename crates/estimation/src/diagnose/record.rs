@@ -6,6 +6,9 @@ use crate::effects::Ramp;
 /// Names of the channels, in the order of [`Record::channels`].
 pub const CHANNELS: [&str; 4] = ["theta1", "omega1", "theta2", "omega2"];
 
+/// Name of the torque.
+pub const TORQUE: &str = "T";
+
 /// One uniformly sampled record of the axis, SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {

@@ -2,22 +2,30 @@
 //!
 //! A *free run* starts once, at the state of the record's beginning, and follows the torque alone to the end, as the FMU would. In
 //! *windows* the model starts anew every half thousand samples, from states fitted to each window. In *torque* it is held to the
-//! measured motion, and what it lacks is counted ([`super::tracking`]). All three models have the same freedom in each.
+//! measured motion, and what it lacks is counted ([`super::tracking`]). All three models have the same freedom in each. The headline is
+//! the first of the three by which a model follows the record.
 
 use nalgebra::{DMatrix, DVector, Vector4};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use rustfft::FftPlanner;
 
-use super::super::diagnosis::{ClosureOf, Figures, Levels};
+use super::super::diagnosis::{ClosureOf, Figures, Levels, Way};
 use super::super::model::Model;
 use super::super::record::{CHANNELS, Record};
-use super::tracking::{Run, start_states};
+use super::Prepared;
+use super::fit::Fit;
+use super::hidden::settle_all;
+use super::likelihood::Sight;
+use super::tracking::{Resolution, Run, start_states, track};
 
 /// Samples in a window.
 const WINDOW: usize = 512;
 /// Windows at most: a longer record is sampled by so many, spread evenly.
 const MOST: usize = 32;
+/// Parts of a record at least, for the interval of what is lacking in torque.
+const LEAST_PARTS: usize = 16;
 /// Resamplings of the block bootstrap.
 const RESAMPLINGS: usize = 400;
 /// Its seed: the interval is the same from run to run.
@@ -41,7 +49,7 @@ pub struct Gap {
     pub closure_of_effect: f64,
     /// 95 % interval of `closure`.
     pub interval: [f64; 2],
-    /// The models' readings: as given, and at its best.
+    /// The models' readings, as given and at its best; in torque what the equations of motor and table lack, windowed.
     pub runs: [Vec<[f64; 4]>; 2],
     /// Samples that the runs cover.
     pub covered: Vec<std::ops::Range<usize>>,
@@ -57,19 +65,146 @@ struct Pieces {
     initial: [f64; 4],
 }
 
-/// Measures the gap of the model as given, re-identified and improved: by the free run where that follows, else in windows.
-#[must_use]
-pub fn measure(record: &Record, models: &[Model; 3]) -> Gap {
-    let whole = std::iter::once(0..record.len()).collect::<Vec<_>>();
-    let free: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &whole)).collect();
-    let of_free = gap(record, &free, ClosureOf::FreeRun);
-    if of_free.figures.combined.after < FOLLOWS {
-        // The interval needs more than one piece: errors of the free run by window.
-        return of_free;
+/// The gap on one record by each way of measuring it.
+#[derive(Debug, Clone)]
+pub struct Gaps {
+    free_run: Gap,
+    windows: Gap,
+    torque: Gap,
+}
+
+impl Gaps {
+    /// Measures the gap that three fits, the model as given, re-identified and improved, leave on a record.
+    #[must_use]
+    pub fn measure(record: &Record, seen: &Prepared, fits: [&Fit; 3]) -> Self {
+        let models = fits.map(|f| f.model);
+        Self {
+            free_run: free_run(record, &models),
+            windows: in_windows(record, &models),
+            torque: in_torque(seen, fits),
+        }
     }
+
+    /// Every way, the one that asks most of a model first.
+    #[must_use]
+    pub fn all(&self) -> [&Gap; 3] {
+        [&self.free_run, &self.windows, &self.torque]
+    }
+
+    /// The way that asks most of a model and is met by one: of models that all drift away a run says only how fast.
+    #[must_use]
+    pub fn headline(&self) -> &Gap {
+        self.all().into_iter().find(|g| g.is_followed()).unwrap_or(&self.torque)
+    }
+
+    /// One way.
+    #[must_use]
+    pub fn by(&self, of: ClosureOf) -> &Gap {
+        self.all()[of as usize]
+    }
+
+    /// The runs that a plot shows: those of the headline, where that is of runs.
+    #[must_use]
+    pub fn shown(&self) -> &Gap {
+        if self.free_run.is_followed() { &self.free_run } else { &self.windows }
+    }
+}
+
+impl Gap {
+    fn is_followed(&self) -> bool {
+        let l = &self.figures.combined;
+        l.reidentified.min(l.after) < FOLLOWS
+    }
+
+    /// Its figures alone.
+    #[must_use]
+    pub fn way(&self) -> Way {
+        Way {
+            of: self.of,
+            levels: self.figures.combined,
+            closure: self.closure,
+            closure_of_effect: self.closure_of_effect,
+            interval: self.interval,
+        }
+    }
+}
+
+/// Closure of the gap from the model as given by one way alone.
+#[must_use]
+pub fn closure_by(of: ClosureOf, record: &Record, seen: &Prepared, fits: [&Fit; 3]) -> f64 {
+    let models = || fits.map(|f| f.model);
+    match of {
+        ClosureOf::FreeRun => free_run(record, &models()).closure,
+        ClosureOf::Windows => in_windows(record, &models()).closure,
+        ClosureOf::Torque => in_torque(seen, fits).closure,
+    }
+}
+
+fn free_run(record: &Record, models: &[Model; 3]) -> Gap {
+    let whole = std::iter::once(0..record.len()).collect::<Vec<_>>();
+    let runs: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &whole)).collect();
+    gap(record, &runs, ClosureOf::FreeRun)
+}
+
+fn in_windows(record: &Record, models: &[Model; 3]) -> Gap {
     let cut = windows(record.len());
-    let shot: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &cut)).collect();
-    gap(record, &shot, ClosureOf::Windows)
+    let runs: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &cut)).collect();
+    gap(record, &runs, ClosureOf::Windows)
+}
+
+/// What each fit lacks of the torque, in the band of the motion, in parts of the record.
+fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
+    let (record, band) = (&seen.record, &seen.band);
+    let n = record.len();
+    let parts = (n / WINDOW).max(LEAST_PARTS).min(n);
+    let ranges: Vec<std::ops::Range<usize>> = (0..parts).map(|p| p * n / parts..(p + 1) * n / parts).collect();
+    let (errors, lacking): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
+        .par_iter()
+        .map(|fit| {
+            let tracked = track(&fit.model, record, fit.bandwidth, Resolution::Full);
+            let Some(tracked) = tracked else {
+                return (vec![Errors::from_element(f64::INFINITY); parts], vec![[f64::NAN; 4]; n]);
+            };
+            let planner = &mut FftPlanner::new();
+            let mut rows = band.lacking(&fit.model, &tracked, planner).rows;
+            settle_all(band, &fits[2].model, &mut rows, planner);
+            let series = [0, 1].map(|i| band.in_time(&rows[i]));
+            let power = |i: usize, r: &std::ops::Range<usize>| -> f64 {
+                series[i].get(r.clone()).map_or(0.0, |s| s.iter().map(|v| v * v).sum())
+            };
+            let errors = ranges.iter().map(|r| Errors::new(power(0, r), power(1, r), 0.0, 0.0)).collect();
+            // Of one encoder's equation, which weighs both sides, the torque that its own side needs.
+            let shown = match band.sight {
+                Sight::Rigid | Sight::Both => series,
+                Sight::Motor => [band.filtered(&tracked.torque[0]), Vec::new()],
+                Sight::Table => [Vec::new(), band.filtered(&tracked.torque[1])],
+            };
+            let at = |i: usize, k: usize| shown[i].get(k).copied().unwrap_or(0.0);
+            (errors, (0..n).map(|k| [at(0, k), at(1, k), 0.0, 0.0]).collect())
+        })
+        .unzip();
+    let signal = seen.torque_rms.max(f64::MIN_POSITIVE);
+    let floor = band.noise_rms().powi(2);
+    let weigh = |e: &Errors| e.sum();
+    let total = [0, 1, 2].map(|m: usize| weigh(&errors[m].iter().fold(Errors::zeros(), |a, b| a + b)) / n as f64);
+    let closure_of = |from: &Errors, to: &Errors| closure(weigh(from), weigh(to), floor);
+    let relative = |v: f64| finite(v.max(0.0).sqrt() / signal);
+    let [before, reidentified, after] = total.map(relative);
+    let combined = Levels { before, reidentified, after, noise_floor: relative(floor) };
+    Gap {
+        of: ClosureOf::Torque,
+        figures: Figures {
+            combined,
+            signals: vec![("T", combined)],
+            multiples: total.map(|t| finite((t / floor.max(f64::MIN_POSITIVE)).sqrt())),
+        },
+        closure: closure(total[0], total[2], floor),
+        closure_of_effect: closure(total[1], total[2], floor),
+        interval: bootstrap(&ranges, [&errors[0], &errors[2]], &closure_of),
+        runs: [lacking[0].clone(), lacking[2].clone()],
+        covered: ranges,
+        initial: [0.0; 4],
+    }
 }
 
 /// Windows of the record, at most [`MOST`].
@@ -217,7 +352,7 @@ fn gap(record: &Record, pieces: &[Pieces], of: ClosureOf) -> Gap {
     let floor: f64 = present.iter().map(|&c| record.noise[c].powi(2) / scale[c].max(f64::MIN_POSITIVE).powi(2)).sum();
     let closure_of = |from: &Errors, to: &Errors| closure(weigh(from), weigh(to), floor);
     let [before, reidentified, after] = [0, 1, 2].map(|m| combine(weigh(&total[m])));
-    let interval = bootstrap(ranges, pieces, &closure_of);
+    let interval = bootstrap(ranges, [&pieces[0].errors, &pieces[2].errors], &closure_of);
     let flat = |p: &Pieces| p.readings.iter().flatten().copied().collect();
     Gap {
         of,
@@ -256,7 +391,7 @@ fn closure(before: f64, after: f64, floor: f64) -> f64 {
 /// Block bootstrap (Kunsch, Ann. Statist. 17(3), 1989): 95 % interval of the closure.
 fn bootstrap(
     ranges: &[std::ops::Range<usize>],
-    pieces: &[Pieces],
+    errors: [&[Errors]; 2],
     closure_of: &dyn Fn(&Errors, &Errors) -> f64,
 ) -> [f64; 2] {
     let n = ranges.len();
@@ -266,8 +401,8 @@ fn bootstrap(
             let (mut from, mut to, mut count) = (Errors::zeros(), Errors::zeros(), 0.0);
             for _ in 0..n {
                 let w = rng.random_range(0..n);
-                from += pieces[0].errors[w];
-                to += pieces[2].errors[w];
+                from += errors[0][w];
+                to += errors[1][w];
                 count += ranges[w].len() as f64;
             }
             closure_of(&(from / count), &(to / count))
@@ -279,8 +414,58 @@ fn bootstrap(
 }
 
 fn signal_rms(record: &Record, c: usize) -> f64 {
-    let Some(channel) = &record.channels[c] else { return 0.0 };
-    let n = channel.len() as f64;
-    let mean = channel.iter().sum::<f64>() / n;
-    (channel.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    record.channels[c].as_deref().map_or(0.0, rms_about_mean)
+}
+
+/// Rms of a series about its mean.
+pub fn rms_about_mean(series: &[f64]) -> f64 {
+    let n = series.len() as f64;
+    let mean = series.iter().sum::<f64>() / n;
+    (series.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(of: ClosureOf, reidentified: f64, after: f64) -> Gap {
+        let combined = Levels { before: 3.0, reidentified, after, noise_floor: 1e-4 };
+        Gap {
+            of,
+            figures: Figures { combined, signals: Vec::new(), multiples: [1.0; 3] },
+            closure: 0.5,
+            closure_of_effect: 0.5,
+            interval: [0.4, 0.6],
+            runs: [Vec::new(), Vec::new()],
+            covered: Vec::new(),
+            initial: [0.0; 4],
+        }
+    }
+
+    #[test]
+    fn the_headline_is_the_strictest_way_by_which_a_model_follows() {
+        use ClosureOf::{FreeRun, Torque, Windows};
+        let headline = |free: [f64; 2], windows: [f64; 2]| {
+            let gaps = Gaps {
+                free_run: of(FreeRun, free[0], free[1]),
+                windows: of(Windows, windows[0], windows[1]),
+                torque: of(Torque, 0.9, 0.8),
+            };
+            (gaps.headline().of, gaps.shown().of)
+        };
+        assert_eq!(headline([0.9, 0.1], [0.2, 0.1]), (FreeRun, FreeRun));
+        // That the effects drive the model away that followed without them is what the headline must tell.
+        assert_eq!(headline([0.1, 0.9], [0.2, 0.1]), (FreeRun, FreeRun));
+        assert_eq!(headline([2.0, 0.9], [0.2, 0.1]), (Windows, Windows));
+        assert_eq!(headline([2.0, 0.9], [1.2, f64::NAN]), (Torque, Windows));
+    }
+
+    #[test]
+    fn closure_counts_what_stands_above_the_noise() {
+        assert!((closure(1.01, 0.11, 0.01) - 0.9).abs() < 1e-12);
+        assert_eq!(closure(1.01, 0.005, 0.01), 1.0);
+        assert_eq!([closure(0.01, 0.01, 0.01), closure(0.01, 0.02, 0.01)], [1.0, 0.0]);
+        assert_eq!([closure(f64::INFINITY, 1.0, 0.0), closure(1.0, f64::NAN, 0.0)], [1.0, 0.0]);
+        assert!(closure(1.0, 2.0, 0.0) < 0.0);
+    }
 }

@@ -82,7 +82,20 @@ impl Hidden {
 /// Takes out of the rows of a model what the side without an encoder began with. A third inertia is no part of the axis, but an effect: to
 /// begin with a swing of its own choice would let the smallest explain anything that dies away.
 pub fn settle(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
-    let Some(hidden) = Hidden::across(model, band.sides()) else { return };
+    if let Some(hidden) = Hidden::across(model, band.sides()) {
+        take_vibration(band, &hidden, rows, planner);
+    }
+}
+
+/// The same for every inertia of a model without an encoder: a fit may not begin with the swing of a third one, but on a record that no
+/// fit has seen it was swinging already.
+pub fn settle_all(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+    for hidden in Hidden::of(model, band.sides()) {
+        take_vibration(band, &hidden, rows, planner);
+    }
+}
+
+fn take_vibration(band: &Band, hidden: &Hidden, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
     // Faster than the record shows it is no part of the band.
     let Some(of) = hidden.vibration().filter(|of| of.im * band.dt < std::f64::consts::PI) else { return };
     let step = (of * band.dt).exp();

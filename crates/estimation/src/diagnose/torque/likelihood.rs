@@ -566,6 +566,26 @@ impl Band {
         self.torque_rms(s) / rms.max(f64::MIN_POSITIVE)
     }
 
+    /// Rms in the band of the torque that the noise makes, N.m; of two equations together.
+    pub fn noise_rms(&self) -> f64 {
+        let noise = [0, 1].map(|i| if i < self.equations() { self.noise_power(i) } else { 0.0 });
+        self.torque_rms(noise)
+    }
+
+    /// A spectrum of an equation as a series in time; nothing of an equation that the record has not.
+    pub fn in_time(&self, row: &[C]) -> Vec<f64> {
+        if row.is_empty() {
+            return Vec::new();
+        }
+        let mut z = vec![C::default(); self.n];
+        for (m, v) in row.iter().enumerate() {
+            z[m] = *v;
+            z[(self.n - m) % self.n] = v.conj();
+        }
+        FftPlanner::new().plan_fft_inverse(self.n).process(&mut z);
+        z.iter().map(|v| v.re / (self.n as f64).sqrt()).collect()
+    }
+
     /// A series in the band, in time.
     pub fn filtered(&self, series: &[f64]) -> Vec<f64> {
         let mut planner = FftPlanner::new();

@@ -26,12 +26,14 @@ mod tracking;
 use rayon::prelude::*;
 
 use super::assess::{Case, HELD_OUT, Outcome, Replay};
-use super::diagnosis::{AxisParameter, Cause, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Remainder, Site, Where};
+use super::diagnosis::{
+    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Remainder, Site, Where,
+};
 use super::lattice;
 use super::location::{Location, Residual, along, without_offset};
 use super::model::{BaseParameter, Free, Model};
 use super::overlay::Overlay;
-use super::record::{CHANNELS, Record};
+use super::record::{CHANNELS, Record, TORQUE};
 use super::repair::bridged;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
@@ -40,7 +42,7 @@ use conclusion::LIKELY;
 pub use conclusion::{Confusable, Decision, Weighed};
 pub use fit::Fit;
 use fit::Problem;
-use gap::Gap;
+use gap::{Gap, Gaps, rms_about_mean};
 use likelihood::Band;
 use search::{Search, decide};
 use tracking::{Resolution, Tracked, track};
@@ -53,6 +55,9 @@ const NEAR: f64 = 30.0;
 /// Steps of the fit through which a band sees its noise.
 const REFERRED: usize = 24;
 
+/// Share of a window's height from which what it shows is drawn.
+const OPEN: f64 = 0.5;
+
 /// Hypotheses that are told, each with its own run over the held-out data.
 const TOLD: usize = 12;
 
@@ -60,6 +65,12 @@ const TOLD: usize = 12;
 struct Prepared {
     record: Record,
     band: Band,
+    /// The samples' longest distance, s: zero keeps the record's own rate.
+    longest: f64,
+    /// Upper end of the band, Hz.
+    limit: f64,
+    /// Torque that shares are told of, rms about its mean, N.m.
+    torque_rms: f64,
 }
 
 /// Diagnoses a record of a rigid axis.
@@ -82,15 +93,21 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         searched = own;
     }
     progress("held-out data");
-    let models = [decision.given.model, decision.parameters.model, decision.chosen.model];
-    let on_train = gap::measure(&searched.record, &models);
-    let on_held = gap::measure(&held, &models);
+    let fits = [&decision.given, &decision.parameters, &decision.chosen];
+    let models = fits.map(|f| f.model);
+    let seen = searched.alike(&held, &models[2]);
+    let on_train = Gaps::measure(&searched.record, &searched, fits);
+    let on_held = Gaps::measure(&held, &seen, fits);
     progress("where");
     let located = located(&searched, &models[1], decision.parameters.bandwidth);
-    let mut diagnosis = build(case, &decision, &searched, &held, on_train, &on_held, located);
+    let closure = |of, fit: &Fit| gap::closure_by(of, &held, &seen, [fits[0], fits[1], fit]);
+    let mut diagnosis = build(case, &decision, &searched, &closure, &on_train, &on_held, located);
     lattice::judge(case, &mut diagnosis);
-    let overlays = overlays(&held, &on_held);
-    let replay = Replay { initial: on_held.initial, record: held };
+    let mut overlays = overlays(&held, on_held.shown());
+    let of_torque = seen.torque_overlay(on_held.by(ClosureOf::Torque));
+    let first = if on_held.headline().of == ClosureOf::Torque { 0 } else { overlays.len() };
+    overlays.insert(first, of_torque);
+    let replay = Replay { initial: on_held.shown().initial, record: held };
     Outcome { diagnosis, improved: models[2], models, decision, overlays, replay }
 }
 
@@ -143,16 +160,18 @@ const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
     let whole = record.part(0..band::smooth(record.len()));
     let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
-    let searched = |r: &Record| referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit);
+    let at =
+        |r: &Record, longest: f64| referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit, longest);
     if nominal.structure == Structure::Rigid {
-        return (searched(&band::decimate(&whole, limit, f64::INFINITY)).0, None);
+        return (at(&band::decimate(&whole, limit, f64::INFINITY), f64::INFINITY).0, None);
     }
-    let (own, left) = searched(&whole);
-    let slow = band::decimate(&whole, limit, QUARTER / nominal.parameters.modal().wn);
+    let (own, left) = at(&whole, 0.0);
+    let longest = QUARTER / nominal.parameters.modal().wn;
+    let slow = band::decimate(&whole, limit, longest);
     if left < EXACT || slow.instants() == 1 {
         return (own, None);
     }
-    let (slow, left) = searched(&slow);
+    let (slow, left) = at(&slow, longest);
     if left.is_finite() { (slow, Some(own)) } else { (own, None) }
 }
 
@@ -167,13 +186,50 @@ fn likely(decision: &Decision) -> Vec<Effect> {
 
 /// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,
 /// in noises.
-fn referred(record: Record, nominal: &Model, limit: f64) -> (Prepared, f64) {
+fn referred(record: Record, nominal: &Model, limit: f64, longest: f64) -> (Prepared, f64) {
     let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);
     let fit = Problem::new(&record, &plain, *nominal).fit(nominal, &[], [f64::MAX; 2], REFERRED);
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
     let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
-    (Prepared { record, band }, left)
+    let torque_rms = rms_about_mean(&record.torque);
+    (Prepared { record, band, longest, limit, torque_rms }, left)
+}
+
+impl Prepared {
+    /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.
+    fn alike(&self, record: &Record, model: &Model) -> Self {
+        let whole = record.part(0..band::smooth(record.len()));
+        let slow = band::decimate(&whole, self.limit, self.longest);
+        let record = slow.part(0..band::smooth(slow.len()));
+        let band = Band::new(&record, model, self.limit, &band::mask(&record));
+        let torque_rms = rms_about_mean(&record.torque).max(self.torque_rms);
+        Self { record, band, torque_rms, ..*self }
+    }
+}
+
+impl Prepared {
+    /// The torque that moved the axis and what each model needs for that motion, in the band, where the window is open.
+    fn torque_overlay(&self, gap: &Gap) -> Overlay {
+        let (record, taper) = (&self.record, &self.band.taper);
+        let torque = self.band.filtered(&record.torque);
+        let mut o = Overlay {
+            channel: TORQUE,
+            time: Vec::new(),
+            measured: Vec::new(),
+            before: Vec::new(),
+            after: Vec::new(),
+            noise: self.band.noise_rms(),
+        };
+        let open = OPEN * taper.iter().copied().fold(0.0, f64::max);
+        for (k, w) in taper.iter().enumerate() {
+            let [before, after] = [0, 1].map(|m: usize| gap.runs[m][k][0] + gap.runs[m][k][1]);
+            let values = [torque[k], torque[k] + before, torque[k] + after];
+            let [measured, before, after] = if *w > open { values.map(|v| v / w) } else { [f64::NAN; 3] };
+            o.push([record.time(k), measured, before, after]);
+        }
+        o
+    }
 }
 
 /// Where the torque that a model lacks shows along the record.
@@ -191,11 +247,12 @@ fn build(
     case: &Case<'_>,
     decision: &Decision,
     searched: &Prepared,
-    held: &Record,
-    train: Gap,
-    holdout: &Gap,
+    closure: &(dyn Fn(ClosureOf, &Fit) -> f64 + Sync),
+    train: &Gaps,
+    held: &Gaps,
     located: Location,
 ) -> Diagnosis {
+    let holdout = held.headline();
     let structure = case.nominal.structure;
     let best = decision.ranking.first().map_or(0.0, |w| w.evidence);
     let ranking = decision
@@ -208,8 +265,7 @@ fn build(
             probability: w.probability,
             delta_bic: 2.0 * (best - w.evidence),
             chi2: searched.band.noise_multiple(&w.fit.rows).powi(2),
-            closure_holdout: gap::measure(held, &[decision.given.model, decision.parameters.model, w.fit.model])
-                .closure,
+            closure_holdout: closure(holdout.of, &w.fit),
         })
         .collect();
     let causes = match decision.torque_gain().zip(Effect::of_gain()) {
@@ -233,7 +289,8 @@ fn build(
             closure_of_effect: holdout.closure_of_effect,
             interval: holdout.interval,
             closure_of: holdout.of,
-            train: train.figures,
+            ways: held.all().map(Gap::way),
+            train: train.by(holdout.of).figures.clone(),
             holdout: holdout.figures.clone(),
             holdout_is: if case.holdout.is_some() { HeldOut::SecondRecord } else { HeldOut::LastThird },
         },

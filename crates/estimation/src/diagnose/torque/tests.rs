@@ -1,7 +1,7 @@
 //! Rigid axes under control, made by the axis' own step: what a drive's log looks like.
 
 use super::super::assess::{Case, Outcome};
-use super::super::diagnosis::Site;
+use super::super::diagnosis::{ClosureOf, Site};
 use super::super::model::Model;
 use super::super::noise::estimate_noise;
 use super::super::record::Record;
@@ -138,4 +138,7 @@ fn a_third_inertia_on_a_spring_is_found_at_its_frequency() {
     assert_eq!(named(&o), ["flexible_mode"], "{:#?}", told(&o));
     let [inertia, stiffness, _] = *o.improved.effects.of(Effect::MotorMode) else { unreachable!() };
     assert!(((stiffness / inertia).sqrt() / 4.0 - 1.0).abs() < 0.02, "{inertia} {stiffness}");
+    // The held-out third begins while it swings: that is no torque that the model lacks.
+    let ways = o.diagnosis.gap.ways;
+    assert!(ways[2].of == ClosureOf::Torque && ways[2].closure > 0.99, "{ways:?}");
 }
