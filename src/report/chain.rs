@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! command --> [input] --> T --> [motor: I1] == [coupling: K, B] == [table: I2] --> [sensor] --> trace
+//! command --> [input] --> T --> [rigid axis: I] --> [sensor] --> trace
 //! ```
 
 use std::fmt::Write as _;
@@ -46,6 +47,8 @@ pub enum Symbol {
     Coupling,
     /// An inertia on a slide.
     Table,
+    /// Motor, coupling and table as one inertia.
+    Axis,
     /// An encoder.
     Sensor,
 }
@@ -151,7 +154,7 @@ fn share(p: &Place, x: f64, y: f64, room: f64) -> Markup {
 
 /// Whether two neighbours are joined by a shaft rather than by a signal.
 fn is_shaft(a: Symbol, b: Symbol) -> bool {
-    let mechanical = |s| matches!(s, Symbol::Motor | Symbol::Coupling | Symbol::Table);
+    let mechanical = |s| matches!(s, Symbol::Motor | Symbol::Coupling | Symbol::Table | Symbol::Axis);
     mechanical(a) && mechanical(b)
 }
 
@@ -206,6 +209,12 @@ fn symbol(symbol: Symbol, cx: f64, cy: f64) -> Markup {
                     rect x="-40" y="-26" width="80" height="38" rx="3" {}
                     path d="M-48 22h96M-26 12v10M26 12v10" {}
                     text x="0" y="-2" text-anchor="middle" { "I₂" }
+                }
+                Symbol::Axis => {
+                    rect x="-40" y="-26" width="80" height="38" rx="3" {}
+                    circle cx="-20" cy="-7" r="12" {}
+                    path d="M-48 22h96M-26 12v10M26 12v10" {}
+                    text x="14" y="-2" text-anchor="middle" { "I" }
                 }
                 Symbol::Sensor => {
                     rect x="-40" y="-24" width="80" height="48" rx="4" {}

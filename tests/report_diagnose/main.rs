@@ -4,8 +4,8 @@ mod contract;
 mod fixture;
 mod words;
 
-use eixo::diagnose::{ClosedLoop, Commands, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Verdict};
-use eixo::effects::Effect;
+use eixo::diagnose::{ClosedLoop, Commands, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Site, Verdict};
+use eixo::effects::{Effect, Place};
 use eixo::report::diagnose::{Findings, report, short};
 use eixo::report::terminal::{self, Layout};
 use eixo::report::{Report, html};
@@ -57,6 +57,18 @@ fn the_other_answers_claim_no_cause() {
         assert!(!page.contains("leaves out"), "{sentence}");
         assert!(!page.contains("with the effect"), "{sentence}");
     }
+}
+
+#[test]
+fn a_rigid_axis_is_drawn_as_one_place() {
+    let mut d = friction("stage");
+    let [input, axis, sensor] = [Site::At(Place::Input), Site::Axis, Site::At(Place::Sensor)];
+    d.causes[0].site = axis;
+    d.location.site = Some(axis);
+    d.location.shares = vec![(input, 0.0), (axis, 1.0), (sensor, 0.0)];
+    let page = html::page(&made(&d));
+    assert!(page.contains("axis 100\u{a0}% (the gap is here)"), "the chain's own words");
+    assert!(!page.contains("table, guideways") && !page.contains("motor and screw</text>"));
 }
 
 #[test]

@@ -87,29 +87,25 @@ fn percent(share: f64) -> String {
 }
 
 fn chain(d: &Diagnosis) -> ChainDiagram {
-    let places = Place::ALL
-        .into_iter()
-        .map(|p| {
-            let (symbol, parts) = match p {
-                Place::Input => (Symbol::Input, "drive, command"),
-                Place::Motor => (Symbol::Motor, "motor and screw"),
-                Place::Coupling => (Symbol::Coupling, "K, B"),
-                Place::Table => (Symbol::Table, "table, guideways"),
-                Place::Sensor => (Symbol::Sensor, "encoders"),
-            };
-            let found: Vec<&str> =
-                d.causes.iter().map(|c| c.effect.info()).filter(|i| i.place == p).map(|i| i.id).collect();
-            let site = Site::At(p);
-            chain::Place {
-                name: p.as_str().to_owned(),
-                symbol,
-                note: if found.is_empty() { parts.to_owned() } else { found.join(", ") },
-                share: d.location.shares.iter().find(|(s, _)| *s == site).map(|(_, share)| *share),
-                marked: !found.is_empty() || (d.causes.is_empty() && d.location.site == Some(site)),
-            }
-        })
-        .collect();
-    ChainDiagram { title: String::new(), places }
+    let place = |&(site, share): &(Site, f64)| {
+        let (symbol, parts) = match site {
+            Site::At(Place::Input) => (Symbol::Input, "drive, command"),
+            Site::At(Place::Motor) => (Symbol::Motor, "motor and screw"),
+            Site::At(Place::Coupling) => (Symbol::Coupling, "K, B"),
+            Site::At(Place::Table) => (Symbol::Table, "table, guideways"),
+            Site::At(Place::Sensor) => (Symbol::Sensor, "encoders"),
+            Site::Axis => (Symbol::Axis, "all that moves"),
+        };
+        let found: Vec<&str> = d.causes.iter().filter(|c| c.site == site).map(|c| c.effect.info().id).collect();
+        chain::Place {
+            name: site.as_str().to_owned(),
+            symbol,
+            note: if found.is_empty() { parts.to_owned() } else { found.join(", ") },
+            share: Some(share),
+            marked: !found.is_empty() || (d.causes.is_empty() && d.location.site == Some(site)),
+        }
+    };
+    ChainDiagram { title: String::new(), places: d.location.shares.iter().map(place).collect() }
 }
 
 fn what(d: &Diagnosis) -> Vec<Block> {
