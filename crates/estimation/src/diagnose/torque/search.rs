@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use super::super::model::{Coordinate, Free};
+use super::super::model::{Coordinate, Free, Model};
 use super::conclusion::Decision;
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
@@ -309,20 +309,32 @@ impl Search<'_> {
         self.raced(probed, None)
     }
 
-    /// The fit without one of its effects, the known one where it was made.
+    /// The fit without one of its effects: the known one, unless the richer fit as it stands is likelier without that effect already,
+    /// which has then shown it a better place only.
     fn without(&self, fit: &Fit, i: usize, pool: &Pool) -> Option<Fit> {
         let mut terms = fit.terms.clone();
         terms.remove(i);
-        pool.settled(&terms).cloned().or_else(|| self.refitted(fit, i))
+        let bare = || {
+            let at = self.problem.along(&self.bare(fit, i), fit.bandwidth)?;
+            Some(self.band().log_likelihood(&at.rows, at.s))
+        };
+        let known = pool.settled(&terms).filter(|k| bare().is_none_or(|l| k.log_likelihood >= l));
+        known.cloned().or_else(|| self.refitted(fit, i))
+    }
+
+    /// The fit's model without one of its effects, all else as it is.
+    fn bare(&self, fit: &Fit, i: usize) -> Model {
+        let (gone, _) = fit.terms[i];
+        let mut model = fit.model;
+        model.effects.of_mut(gone).copy_from_slice(self.problem.nominal.effects.of(gone));
+        model
     }
 
     /// The fit without one of its effects, from where it stands.
     pub fn refitted(&self, fit: &Fit, i: usize) -> Option<Fit> {
         let mut terms = fit.terms.clone();
-        let (gone, _) = terms.remove(i);
-        let mut start = fit.model;
-        start.effects.of_mut(gone).copy_from_slice(self.problem.nominal.effects.of(gone));
-        let plain = self.problem.coarse().fit(&start, &terms, fit.discrepancy, PROBE)?;
+        terms.remove(i);
+        let plain = self.problem.coarse().fit(&self.bare(fit, i), &terms, fit.discrepancy, PROBE)?;
         self.problem.deepen(&plain)
     }
 
@@ -394,7 +406,6 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
 mod tests {
     use super::*;
     use crate::axis::Parameters;
-    use crate::diagnose::model::Model;
     use crate::effects::{EFFECTS, Settings};
 
     fn fit(terms: &[Term]) -> Fit {
