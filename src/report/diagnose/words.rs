@@ -195,22 +195,20 @@ pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
 
 /// Why the figures of the gap are of what they are; none where the strictest way tells them.
 pub fn why_this_way(d: &Diagnosis) -> Option<String> {
-    let best = |of: ClosureOf| {
-        d.gap.ways.iter().find(|w| w.of == of).map_or(f64::NAN, |w| w.levels.reidentified.min(w.levels.after))
-    };
+    let off = |of: ClosureOf| percent(d.gap.ways.iter().find(|w| w.of == of).map_or(f64::NAN, |w| w.levels.after));
     match d.gap.closure_of {
         ClosureOf::FreeRun => None,
         ClosureOf::Windows => Some(format!(
-            "No model's free run follows the whole held-out record (the best is off by {} of the signal): a small torque adds up to a \
-             large position. The closure is therefore that of windows, each run from a state fitted to it.",
-            percent(best(ClosureOf::FreeRun))
+            "The model's free run does not follow the whole held-out record (it is off by {} of the signal): a small error adds up to a \
+             large one. The closure is therefore that of windows, each run from a state fitted to it.",
+            off(ClosureOf::FreeRun)
         )),
         ClosureOf::Torque => Some(format!(
-            "No model's run follows the held-out record, neither freely (the best is off by {} of the signal) nor in windows ({}): a \
-             small torque adds up to a large position. The closure is therefore that of the torque that a model lacks when it is held to \
-             the measured motion.",
-            percent(best(ClosureOf::FreeRun)),
-            percent(best(ClosureOf::Windows))
+            "The model's run does not follow the held-out record, neither freely (off by {} of the signal) nor in windows ({}): a small \
+             torque adds up to a large position. The closure is therefore that of the torque that the model lacks when it is held to the \
+             measured motion.",
+            off(ClosureOf::FreeRun),
+            off(ClosureOf::Windows)
         )),
     }
 }

@@ -277,7 +277,7 @@ pub struct GapReport {
     pub closure_of_effect: f64,
     /// 95 % interval of `closure`.
     pub interval: [f64; 2],
-    /// What `closure` and the levels are measured on: the first way, in the order of `ways`, by which a model follows the record.
+    /// What `closure` and the levels are measured on: the first way, in the order of `ways`, by which the best model follows the record.
     pub closure_of: ClosureOf,
     /// The held-out gap by every way: free run, windows, torque.
     pub ways: [Way; 3],

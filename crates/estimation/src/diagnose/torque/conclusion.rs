@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::fit::Fit;
-use super::search::{ALIKE, Search, is_more};
+use super::search::{ALIKE, Search, is_lost, is_more};
 use crate::effects::Effect;
 use crate::examine::NOMINAL_OFF;
 
@@ -151,8 +151,8 @@ impl Search<'_> {
             .collect();
         let least_likely = if chosen.terms.len() == 1 { ALONE } else { LIKELY };
         let likely = |p: &f64| *p >= least_likely;
-        // One that does not stand out of what is left explains nothing that needs a cause.
-        let is_little = chosen.terms.len() == 1 && stands[0] < ALONE;
+        // One that does not stand out of what is left, or of its own error, explains nothing that needs a cause.
+        let is_little = chosen.terms.len() == 1 && (stands[0] < ALONE || is_lost(plain, &chosen, independent));
         if is_little && self.band().torque_share(plain.discrepancy, self.problem.record) <= UNCAUSED {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             let none = plain.clone();

@@ -3,7 +3,7 @@
 //! A *free run* starts once, at the state of the record's beginning, and follows the torque alone to the end, as the FMU would. In
 //! *windows* the model starts anew every half thousand samples, from states fitted to each window. In *torque* it is held to the
 //! measured motion, and what it lacks is counted ([`super::tracking`]). All three models have the same freedom in each. The headline is
-//! the first of the three by which a model follows the record.
+//! the first of the three by which the best model follows the record.
 
 use nalgebra::{DMatrix, DVector, Vector4};
 use rand::{RngExt, SeedableRng};
@@ -91,7 +91,7 @@ impl Gaps {
         [&self.free_run, &self.windows, &self.torque]
     }
 
-    /// The way that asks most of a model and is met by one: of models that all drift away a run says only how fast.
+    /// The way that asks most of the best model and is met by it: of one that drifts away a run says only how fast.
     #[must_use]
     pub fn headline(&self) -> &Gap {
         self.all().into_iter().find(|g| g.is_followed()).unwrap_or(&self.torque)
@@ -112,8 +112,7 @@ impl Gaps {
 
 impl Gap {
     fn is_followed(&self) -> bool {
-        let l = &self.figures.combined;
-        l.reidentified.min(l.after) < FOLLOWS
+        self.figures.combined.after < FOLLOWS
     }
 
     /// Its figures alone.
@@ -454,8 +453,8 @@ mod tests {
             (gaps.headline().of, gaps.shown().of)
         };
         assert_eq!(headline([0.9, 0.1], [0.2, 0.1]), (FreeRun, FreeRun));
-        // That the effects drive the model away that followed without them is what the headline must tell.
-        assert_eq!(headline([0.1, 0.9], [0.2, 0.1]), (FreeRun, FreeRun));
+        // A ripple makes a motion that runs on from the smallest error: true to the noise in windows, it may end anywhere.
+        assert_eq!(headline([0.1, 0.9], [0.2, 0.1]), (Windows, Windows));
         assert_eq!(headline([2.0, 0.9], [0.2, 0.1]), (Windows, Windows));
         assert_eq!(headline([2.0, 0.9], [1.2, f64::NAN]), (Torque, Windows));
     }
