@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::fit::Fit;
-use super::search::{ALIKE, Search, is_lost, is_more};
+use super::search::{ALIKE, Search, is_more};
 use crate::effects::Effect;
 use crate::examine::NOMINAL_OFF;
 
@@ -24,8 +24,7 @@ const DOUBT: f64 = 0.5;
 /// Probability from which an effect may be named beside others: as likely as one of two that the record cannot tell, and a remainder
 /// beside them.
 pub const LIKELY: f64 = 0.35;
-/// The same of a cause on its own, with which the verdict stands and falls: more likely than not. Of two families that stand out alike
-/// none is told.
+/// The same of a cause on its own, with which the verdict stands and falls: more likely than not.
 const ALONE: f64 = 0.5;
 /// Share of the torque that may be left where no cause is named, white or not: more than the error of a measured current (one to five
 /// per cent).
@@ -131,29 +130,29 @@ impl Search<'_> {
         let little = self.leaves_little(&chosen);
         let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
         pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
-        // How far each stands out of what is left, whatever else might do what it does.
-        let doubt = (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0);
-        let stands: Vec<f64> =
-            (0..chosen.terms.len()).map(|i| doubt * self.decisive(&chosen, i, &parameters, &pool)).collect();
+        let decisive: Vec<f64> =
+            (0..chosen.terms.len()).map(|i| self.decisive(&chosen, i, &parameters, &pool)).collect();
         let mut ranking = self.weighed(pool, independent);
         let probabilities: Vec<f64> = chosen
             .terms
             .iter()
-            .zip(&stands)
-            .map(|((e, _), stands)| {
+            .zip(&decisive)
+            .map(|((e, _), decisive)| {
                 let of: f64 = ranking
                     .iter()
                     .filter(|w| w.fit.terms.iter().any(|(o, _)| o.info().family == e.info().family))
                     .map(|w| w.probability)
                     .sum();
-                of * stands
+                of * decisive * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
             })
             .collect();
         let least_likely = if chosen.terms.len() == 1 { ALONE } else { LIKELY };
         let likely = |p: &f64| *p >= least_likely;
-        // One that does not stand out of what is left, or of its own error, explains nothing that needs a cause.
-        let is_little = chosen.terms.len() == 1 && (stands[0] < ALONE || is_lost(plain, &chosen, independent));
-        if is_little && self.band().torque_share(plain.discrepancy, self.problem.record) <= UNCAUSED {
+        // One that is not likely explains nothing that needs a cause.
+        if let [only] = probabilities[..]
+            && !likely(&only)
+            && self.band().torque_share(plain.discrepancy, self.problem.record) <= UNCAUSED
+        {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             let none = plain.clone();
             return self.conclude(given, parameters, none, pool);

@@ -385,7 +385,7 @@ pub fn is_more(fit: &Fit, than: &Fit) -> bool {
 }
 
 /// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
-pub fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
+fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
     rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|(effect, _)| {
         rich.coordinates
             .iter()
