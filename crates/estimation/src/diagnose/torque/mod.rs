@@ -163,11 +163,11 @@ fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
     let at =
         |r: &Record, longest: f64| referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit, longest);
     if nominal.structure == Structure::Rigid {
-        return (at(&band::decimate(&whole, limit, f64::INFINITY), f64::INFINITY).0, None);
+        return (at(&band::decimate(&whole, limit, f64::INFINITY, nominal.structure), f64::INFINITY).0, None);
     }
     let (own, left) = at(&whole, 0.0);
     let longest = QUARTER / nominal.parameters.modal().wn;
-    let slow = band::decimate(&whole, limit, longest);
+    let slow = band::decimate(&whole, limit, longest, nominal.structure);
     if left < EXACT || slow.instants() == 1 {
         return (own, None);
     }
@@ -200,7 +200,7 @@ impl Prepared {
     /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.
     fn alike(&self, record: &Record, model: &Model) -> Self {
         let whole = record.part(0..band::smooth(record.len()));
-        let slow = band::decimate(&whole, self.limit, self.longest);
+        let slow = band::decimate(&whole, self.limit, self.longest, model.structure);
         let record = slow.part(0..band::smooth(slow.len()));
         let band = Band::new(&record, model, self.limit, &band::mask(&record));
         let torque_rms = rms_about_mean(&record.torque).max(self.torque_rms);
