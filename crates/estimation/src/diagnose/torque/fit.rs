@@ -266,14 +266,6 @@ impl Problem<'_> {
         }
     }
 
-    /// The nominal parameters as a fit that has not moved.
-    pub fn unmoved(&self) -> Option<Fit> {
-        let given = self.given(&self.nominal)?;
-        let fit = Descent::new(self, &self.nominal, &[], given.discrepancy)?.done();
-        let columns = self.columns(&fit.model, &fit.coordinates, &fit.rows, fit.bandwidth)?;
-        Some(Fit { columns, ..fit })
-    }
-
     fn unfitted(&self, at: Along) -> Fit {
         Fit {
             terms: vec![],

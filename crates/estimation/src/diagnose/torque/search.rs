@@ -269,10 +269,11 @@ impl Search<'_> {
         self.band().torque_share(fit.discrepancy, self.problem.record) < least
     }
 
-    /// The nominal parameters, where fitted ones are far from them: they may have taken what an effect does.
+    /// The nominal parameters, held, where fitted ones are far from them: they may have taken what an effect does, and free beside it take
+    /// it again.
     fn unmoved(&self, parameters: &Fit) -> Option<Fit> {
         let moved = |c: &Coordinate| (c.value(&parameters.model) / c.value(&self.problem.nominal)).ln().abs() > MOVED;
-        parameters.coordinates.iter().any(moved).then(|| self.problem.unmoved())?
+        parameters.coordinates.iter().any(moved).then(|| self.problem.given(&self.problem.nominal))?
     }
 
     /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
