@@ -3,7 +3,8 @@
 //! A hypothesis is a set of effects in their forms beside the axis' own parameters. One function, [`Problem::evidence`], says how
 //! well the record speaks for it. One search raises it: from the axis alone and from the best of the textbook's combinations
 //! (bias, Coulomb, viscous and their asymmetry, all of them compared), an effect is added, dropped or exchanged as long as that
-//! helps. The verdict is the hypothesis at the end; what it leaves is the remainder.
+//! helps; then several at once, because of several large causes none helps alone. The verdict is the hypothesis at the end; what it
+//! leaves is the remainder.
 //!
 //! Held-out data have no part in it.
 
@@ -76,19 +77,22 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     let mut chosen = search.climb(parameters.clone(), &mut pool);
     // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
     let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
-    if !decided && !search.is_tired() && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
-        // All of the textbook's combinations, and whatever else helps beside the best of them.
+    if !decided && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
+        // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
         let textbook = search.textbook(&parameters, &chosen);
         pool.extend(textbook.iter().cloned());
         let share = search.independent(&textbook);
         if let Some(first) = search.best(&textbook, share).filter(|f| f.terms != chosen.terms).cloned() {
             let other = search.climb(first, &mut pool);
-            let share = search.independent(&[chosen.clone(), other.clone()]);
-            if search.evidence(&other, share) > search.evidence(&chosen, share) {
+            if search.is_likelier(&other, &chosen) {
                 chosen = other;
             }
         }
+    }
+    let ahead = search.ahead(chosen.clone(), &mut pool);
+    if search.is_likelier(&ahead, &chosen) {
+        chosen = search.climb(ahead, &mut pool);
     }
     // What was fitted along the way, and is likelier than where the way led, is gone on from.
     for _ in 0..AGAIN {
@@ -136,6 +140,12 @@ impl Search<'_> {
     pub fn independent(&self, fits: &[Fit]) -> f64 {
         let best = fits.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
         best.map_or(1.0, |f| self.band().independent(&f.rows, f.discrepancy))
+    }
+
+    /// Whether a fit is likelier than another, with as much of its residual independent as the one that fits better leaves so.
+    fn is_likelier(&self, fit: &Fit, than: &Fit) -> bool {
+        let share = self.independent(&[fit.clone(), than.clone()]);
+        self.evidence(fit, share) > self.evidence(than, share)
     }
 
     fn best<'f>(&self, fits: &'f [Fit], independent: f64) -> Option<&'f Fit> {
@@ -238,6 +248,22 @@ impl Search<'_> {
         let share = self.independent(&all);
         let next = self.best(&all, share)?;
         (self.evidence(next, share) > self.evidence(best, share)).then(|| next.clone())
+    }
+
+    /// Effects added as if all that is left were independent, and dropped at the end where it is not: each of several large causes leaves
+    /// what the others do, beside which it earns next to nothing on its own.
+    fn ahead(&self, from: Fit, pool: &mut Pool) -> Fit {
+        let mut at = from;
+        let ends = |f: &Fit| self.at_floor(f) || self.leaves_little(f) || self.is_negligible(f) || self.is_tired();
+        while at.terms.len() < MOST && !ends(&at) {
+            let mut all = self.extended(&at, at.terms.len(), pool);
+            all.retain(|f| self.is_material(&at, f));
+            match self.best(&all, 1.0) {
+                Some(next) if self.evidence(next, 1.0) > self.evidence(&at, 1.0) => at = next.clone(),
+                _ => break,
+            }
+        }
+        self.pruned(at, pool)
     }
 
     /// The fits with one effect more, each looked for once.
