@@ -266,6 +266,13 @@ impl Problem<'_> {
         }
     }
 
+    /// The same model with its parameters free, which have not moved.
+    pub fn freed(&self, held: &Fit) -> Option<Fit> {
+        let fit = Descent::new(self, &held.model, &held.terms, held.discrepancy)?.done();
+        let columns = self.columns(&fit.model, &fit.coordinates, &fit.rows, fit.bandwidth)?;
+        Some(Fit { columns, ..fit })
+    }
+
     fn unfitted(&self, at: Along) -> Fit {
         Fit {
             terms: vec![],

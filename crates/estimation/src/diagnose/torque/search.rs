@@ -272,10 +272,10 @@ impl Search<'_> {
             return known;
         }
         let mut added = self.added(fit, keep);
-        if fit.terms.is_empty()
-            && let Some(nominal) = self.unmoved(fit)
-        {
-            added.extend(self.added(&nominal, keep));
+        if fit.terms.is_empty() && self.is_moved(fit) {
+            let nominal = self.problem.given(&self.problem.nominal);
+            let freed = nominal.as_ref().and_then(|held| self.problem.freed(held));
+            added.extend([nominal, freed].iter().flatten().flat_map(|f| self.added(f, keep)));
         }
         pool.extend_all(&fit.terms, &added);
         added
@@ -295,11 +295,11 @@ impl Search<'_> {
         self.band().torque_share(fit.discrepancy, self.problem.record) < least
     }
 
-    /// The nominal parameters, held, where fitted ones are far from them: they may have taken what an effect does, and free beside it take
-    /// it again.
-    fn unmoved(&self, parameters: &Fit) -> Option<Fit> {
+    /// Whether fitted parameters are far from the nominal ones: they may have taken what an effect does, and free beside it even at their
+    /// nominal values take it again.
+    fn is_moved(&self, parameters: &Fit) -> bool {
         let moved = |c: &Coordinate| (c.value(&parameters.model) / c.value(&self.problem.nominal)).ln().abs() > MOVED;
-        parameters.coordinates.iter().any(moved).then(|| self.problem.given(&self.problem.nominal))?
+        parameters.coordinates.iter().any(moved)
     }
 
     /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
