@@ -146,6 +146,12 @@ impl Coordinate {
         matches!(self.free, Free::Effect(e, i) if e.info().parameters[i].role == Role::Shape)
     }
 
+    /// Whether it is one of the axis' own parameters.
+    #[must_use]
+    pub fn is_base(&self) -> bool {
+        matches!(self.free, Free::Base(_))
+    }
+
     /// x of the model's present value.
     #[must_use]
     pub fn x(&self, model: &Model) -> f64 {

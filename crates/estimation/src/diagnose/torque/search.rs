@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use super::super::model::{Coordinate, Free, Model};
+use super::super::model::{Free, Model};
 use super::conclusion::Decision;
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
@@ -32,6 +32,9 @@ const MINOR: f64 = 0.0025;
 /// less of it in its twist.
 const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
+/// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
+/// remainder is that small.
+const EXACT: f64 = 5e-3;
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
 /// Effects whose richer forms are looked at, too.
@@ -44,6 +47,8 @@ const WORK: u64 = 50_000_000;
 const AGAIN: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
+/// The same beside effects, which let most parameters be what they are: a factor of two.
+const MOVED_BESIDE: f64 = 0.7;
 /// Steps of a fit that is looked at.
 pub const PROBE: usize = 5;
 /// Difference of log evidence below which two hypotheses are alike.
@@ -196,10 +201,10 @@ impl Search<'_> {
     fn climb(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
         for _ in 0..2 * MOST {
-            // What is left of a large gap may still be a machine's remainder, which tells no two accounts apart; next to none of the torque
-            // does.
-            let enough = self.is_negligible(&best);
-            if self.at_floor(&best) || self.leaves_little(&best) && !enough {
+            // What is left of a large gap may still be a machine's remainder, which tells no two accounts apart; less of the torque than any
+            // drive is true to does.
+            let enough = self.leaves_little(&best) || self.is_negligible(&best);
+            if self.at_floor(&best) || enough && !self.is_exact(&best) {
                 break;
             }
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
@@ -272,11 +277,7 @@ impl Search<'_> {
             return known;
         }
         let mut added = self.added(fit, keep);
-        if fit.terms.is_empty() && self.is_moved(fit) {
-            let nominal = self.problem.given(&self.problem.nominal);
-            let freed = nominal.as_ref().and_then(|held| self.problem.freed(held));
-            added.extend([nominal, freed].iter().flatten().flat_map(|f| self.added(f, keep)));
-        }
+        added.extend(self.put_back(fit).iter().flat_map(|f| self.added(f, keep)));
         pool.extend_all(&fit.terms, &added);
         added
     }
@@ -292,14 +293,36 @@ impl Search<'_> {
             Structure::Rigid => NEGLIGIBLE,
             Structure::TwoInertia => NEGLIGIBLE_IN_TWIST,
         };
-        self.band().torque_share(fit.discrepancy, self.problem.record) < least
+        self.left(fit) < least
     }
 
-    /// Whether fitted parameters are far from the nominal ones: they may have taken what an effect does, and free beside it even at their
-    /// nominal values take it again.
-    fn is_moved(&self, parameters: &Fit) -> bool {
-        let moved = |c: &Coordinate| (c.value(&parameters.model) / c.value(&self.problem.nominal)).ln().abs() > MOVED;
-        parameters.coordinates.iter().any(moved)
+    /// Whether a fit leaves so little of the torque that another account may be told from it.
+    fn is_exact(&self, fit: &Fit) -> bool {
+        self.left(fit) < EXACT || self.is_negligible(fit)
+    }
+
+    /// Share of the torque that a fit leaves.
+    fn left(&self, fit: &Fit) -> f64 {
+        self.band().torque_share(fit.discrepancy, self.problem.record)
+    }
+
+    /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what
+    /// an effect does, and free beside it take it again.
+    fn put_back(&self, fit: &Fit) -> Vec<Fit> {
+        let nominal = &self.problem.nominal;
+        let far = if fit.terms.is_empty() { MOVED } else { MOVED_BESIDE };
+        if fit
+            .coordinates
+            .iter()
+            .filter(|c| c.is_base())
+            .all(|c| (c.value(&fit.model) / c.value(nominal)).ln().abs() < far)
+        {
+            return Vec::new();
+        }
+        let back = self.problem.given(&Model { parameters: nominal.parameters, ..fit.model });
+        let held = back.map(|given| Fit { terms: fit.terms.clone(), ..given });
+        let freed = held.as_ref().filter(|f| f.terms.is_empty()).and_then(|f| self.problem.freed(f));
+        held.into_iter().chain(freed).collect()
     }
 
     /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
@@ -431,6 +454,7 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::model::Coordinate;
     use super::*;
     use crate::axis::Parameters;
     use crate::effects::{EFFECTS, Settings};

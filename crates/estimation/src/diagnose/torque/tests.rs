@@ -142,3 +142,72 @@ fn a_third_inertia_on_a_spring_is_found_at_its_frequency() {
     let ways = o.diagnosis.gap.ways;
     assert!(ways[2].of == ClosureOf::Torque && ways[2].closure > 0.99, "{ways:?}");
 }
+
+/// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.
+fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, late: usize) -> Record {
+    let (n, dt) = (3000, 2e-3);
+    let axis = Axis::new(parameters, Structure::TwoInertia, effects, Scheme::Exact, 0.5 * dt);
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let acts = |t: f64| {
+        let tones = [(2.1, 0.3), (5.3, 1.7), (9.7, 4.1), (17.3, 2.9), (31.1, 5.3)];
+        amplitude * tones.iter().map(|(w, p)| (w * t + p).sin()).sum::<f64>()
+    };
+    let mut past = vec![0.0; late + 1];
+    let (mut torque, mut motor, mut table) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..2 * n {
+        let t = 0.5 * dt * f64::from(k);
+        past.push(state.theta2());
+        if k % 2 == 0 {
+            torque.push(acts(t));
+            motor.push(state.theta1());
+            table.push(past[past.len() - 1 - late]);
+        }
+        let held = acts(t - 0.5 * dt * f64::from(k % 2));
+        state = axis.advance(&state, Ramp { start: held, end: held }, t);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for theta in motor.iter_mut().chain(&mut table) {
+        *theta += 1e-5 * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
+    }
+    let channels = [Some(motor), None, Some(table), None];
+    Record { start: 0.0, dt, hold: Hold::Zoh, torque, between: None, channels, noise: [1e-5; 4], idle: Vec::new() }
+}
+
+fn diagnosed_open(record: &Record, nominal: Parameters) -> Outcome {
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let noise = estimate_noise(&record.torque, &channels, None);
+    let case = Case {
+        machine: "axis".to_owned(),
+        nominal: Model::new(nominal, Structure::TwoInertia, Settings::default()),
+        motion: Motion::Rotary,
+        train: record,
+        noise: &noise,
+        holdout: None,
+        suspects: EFFECTS.to_vec(),
+    };
+    diagnose(&case, &|_| ())
+}
+
+#[test]
+fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
+    // The twist is little more than the table's speed times the delay: free, the stiffness takes that and leaves the delay nothing.
+    let light = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5e-4, k: 0.018, rho: 1.0 };
+    let friction = with(&[(Effect::CoulombMotor, 0, 2e-3)]);
+    let o = diagnosed_open(&of_two_inertias(light, friction, 8e-3, 3), light);
+    assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", told(&o));
+    let delay = o.improved.effects.of(Effect::SensorDelay)[0];
+    assert!((delay / 3e-3 - 1.0).abs() < 0.05, "{delay}");
+}
+
+#[test]
+fn of_two_large_causes_neither_of_which_helps_alone_both_are_found() {
+    let hidden = [
+        (Effect::ExternalSpring, 0, 0.02),
+        (Effect::ExternalSpring, 1, -1.0),
+        (Effect::TorqueRipple, 0, 0.05),
+        (Effect::TorqueRipple, 1, 4.0),
+        (Effect::TorqueRipple, 2, 0.6),
+    ];
+    let o = diagnosed_open(&of_two_inertias(Parameters::PAPER, with(&hidden), 0.05, 0), Parameters::PAPER);
+    assert_eq!(named(&o), ["external_spring", "torque_ripple"], "{:#?}", told(&o));
+}
