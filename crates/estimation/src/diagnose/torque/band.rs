@@ -120,10 +120,18 @@ const KEPT: f64 = 8.0;
 /// inertias answers by more than the noise.
 const INSTANTS: [usize; 2] = [4, 5];
 
-/// Every how many samples one is kept, and the instants of the torque within: as many of both as there may be. A rigid axis answers no
-/// image: there the torque runs straight from sample to sample.
-fn thinning(most: usize, structure: Structure) -> (usize, usize) {
-    if structure == Structure::Rigid {
+/// The rate at which a record is searched.
+#[derive(Debug, Clone, Copy)]
+pub struct Rate {
+    /// The samples' longest distance, s: zero keeps the record's own rate.
+    pub longest: f64,
+    /// Whether the torque runs straight from sample to sample: an axis that does not swing answers its images by next to nothing.
+    pub straight: bool,
+}
+
+/// Every how many samples one is kept, and the instants of the torque within: as many of both as there may be.
+fn thinning(most: usize, straight: bool) -> (usize, usize) {
+    if straight {
         return (most, 1);
     }
     if most <= INSTANTS[1] {
@@ -134,10 +142,10 @@ fn thinning(most: usize, structure: Structure) -> (usize, usize) {
 
 /// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
 /// the band it is the one that acted.
-/// The samples are no further apart than `longest` s.
-pub fn decimate(record: &Record, limit: f64, longest: f64, structure: Structure) -> Record {
+pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     use crate::axis::Hold;
-    let (every, instants) = thinning(((1.0 / (KEPT * limit)).min(longest) / record.dt).floor() as usize, structure);
+    let (every, instants) =
+        thinning(((1.0 / (KEPT * limit)).min(rate.longest) / record.dt).floor() as usize, rate.straight);
     let n = record.len();
     if every < 2 || n < 64 {
         return record.clone();
@@ -231,9 +239,9 @@ mod tests {
 
     #[test]
     fn as_many_samples_are_left_out_as_the_torque_has_instants_for() {
-        let coupled = [1, 3, 5, 6, 10, 15, 16].map(|most| thinning(most, Structure::TwoInertia));
+        let coupled = [1, 3, 5, 6, 10, 15, 16].map(|most| thinning(most, false));
         assert_eq!(coupled, [(1, 1), (3, 3), (5, 5), (5, 5), (10, 5), (15, 5), (16, 4)]);
-        assert_eq!(thinning(11, Structure::Rigid), (11, 1));
+        assert_eq!(thinning(11, true), (11, 1));
     }
 
     #[test]
@@ -251,7 +259,7 @@ mod tests {
             idle: Vec::new(),
         };
         // 10 rad/s are 1.6 Hz.
-        let slow = decimate(&record, 4.0, f64::INFINITY, Structure::TwoInertia);
+        let slow = decimate(&record, 4.0, Rate { longest: f64::INFINITY, straight: false });
         let every = (slow.dt / record.dt).round() as usize;
         assert!(every > 10, "{every}");
         let y = slow.channels[0].as_ref().expect("a position");

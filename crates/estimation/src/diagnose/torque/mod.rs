@@ -38,6 +38,7 @@ use super::repair::bridged;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
+use band::Rate;
 use conclusion::LIKELY;
 pub use conclusion::{Confusable, Decision, Weighed};
 pub use fit::Fit;
@@ -65,8 +66,7 @@ const TOLD: usize = 12;
 struct Prepared {
     record: Record,
     band: Band,
-    /// The samples' longest distance, s: zero keeps the record's own rate.
-    longest: f64,
+    rate: Rate,
     /// Upper end of the band, Hz.
     limit: f64,
     /// Torque that shares are told of, rms about its mean, N.m.
@@ -156,23 +156,28 @@ const EXACT: f64 = 10.0;
 /// Turn of the axis' own vibration in a sample, rad, up to which both of its sides can be held to a record: a quarter.
 const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 
-/// The record in the band of its motion; and at its own rate, where that of its band is another and accounts near the noise are settled.
+/// The record in the band of its motion, as fast as it can be searched; and as exact as it can be, where accounts near the noise are
+/// settled, if that is something else.
 fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
     let whole = record.part(0..band::smooth(record.len()));
     let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
-    let at =
-        |r: &Record, longest: f64| referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit, longest);
-    if nominal.structure == Structure::Rigid {
-        return (at(&band::decimate(&whole, limit, f64::INFINITY, nominal.structure), f64::INFINITY).0, None);
-    }
-    let (own, left) = at(&whole, 0.0);
-    let longest = QUARTER / nominal.parameters.modal().wn;
-    let slow = band::decimate(&whole, limit, longest, nominal.structure);
-    if left < EXACT || slow.instants() == 1 {
+    let [exact, fast] = match nominal.structure {
+        Structure::Rigid => [false, true].map(|straight| Rate { longest: f64::INFINITY, straight }),
+        Structure::TwoInertia => {
+            [0.0, QUARTER / nominal.parameters.modal().wn].map(|longest| Rate { longest, straight: false })
+        }
+    };
+    let at = |rate: Rate| {
+        let r = band::decimate(&whole, limit, rate);
+        referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit, rate)
+    };
+    let (own, left) = at(exact);
+    if left < EXACT {
         return (own, None);
     }
-    let (slow, left) = at(&slow, longest);
-    if left.is_finite() { (slow, Some(own)) } else { (own, None) }
+    let (slow, left) = at(fast);
+    let alike = slow.record.len() == own.record.len() && slow.record.instants() == own.record.instants();
+    if left.is_finite() && !alike { (slow, Some(own)) } else { (own, None) }
 }
 
 /// The effects of the likeliest hypotheses.
@@ -186,21 +191,21 @@ fn likely(decision: &Decision) -> Vec<Effect> {
 
 /// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,
 /// in noises.
-fn referred(record: Record, nominal: &Model, limit: f64, longest: f64) -> (Prepared, f64) {
+fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate) -> (Prepared, f64) {
     let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);
     let fit = Problem::new(&record, &plain, *nominal).fit(nominal, &[], [f64::MAX; 2], REFERRED);
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
     let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
     let torque_rms = rms_about_mean(&record.torque);
-    (Prepared { record, band, longest, limit, torque_rms }, left)
+    (Prepared { record, band, rate, limit, torque_rms }, left)
 }
 
 impl Prepared {
     /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.
     fn alike(&self, record: &Record, model: &Model) -> Self {
         let whole = record.part(0..band::smooth(record.len()));
-        let slow = band::decimate(&whole, self.limit, self.longest, model.structure);
+        let slow = band::decimate(&whole, self.limit, self.rate);
         let record = slow.part(0..band::smooth(slow.len()));
         let band = Band::new(&record, model, self.limit, &band::mask(&record));
         let torque_rms = rms_about_mean(&record.torque).max(self.torque_rms);
