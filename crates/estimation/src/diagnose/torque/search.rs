@@ -95,8 +95,9 @@ pub fn decide(mut search: Search<'_>) -> Decision {
             }
         }
     }
+    // Several at once follow any torque by some way: they are believed where they explain it.
     let ahead = search.ahead(chosen.clone(), &mut pool);
-    if search.is_likelier(&ahead, &chosen) {
+    if search.is_exact(&ahead) && search.is_likelier(&ahead, &chosen) {
         chosen = search.climb(ahead, &mut pool);
     }
     // What was fitted along the way, and is likelier than where the way led, is gone on from.
