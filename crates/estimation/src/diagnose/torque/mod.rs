@@ -169,15 +169,16 @@ fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
     };
     let at = |rate: Rate| {
         let r = band::decimate(&whole, limit, rate);
-        referred(r.part(0..band::smooth(r.len().min(SEARCHED))), nominal, limit, rate)
+        r.part(0..band::smooth(r.len().min(SEARCHED)))
     };
-    let (own, left) = at(exact);
-    if left < EXACT {
+    let [own, slow] = [exact, fast].map(at);
+    let alike = slow.len() == own.len() && slow.instants() == own.instants();
+    let (own, left) = referred(own, nominal, limit, exact);
+    if alike || left < EXACT {
         return (own, None);
     }
-    let (slow, left) = at(fast);
-    let alike = slow.record.len() == own.record.len() && slow.record.instants() == own.record.instants();
-    if left.is_finite() && !alike { (slow, Some(own)) } else { (own, None) }
+    let (slow, left) = referred(slow, nominal, limit, fast);
+    if left.is_finite() { (slow, Some(own)) } else { (own, None) }
 }
 
 /// The effects of the likeliest hypotheses.

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use super::super::model::{Free, Model};
+use super::super::model::{Coordinate, Free, Model};
 use super::conclusion::Decision;
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy};
@@ -34,7 +34,7 @@ const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
 /// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
 /// remainder is that small.
-const EXACT: f64 = 5e-3;
+const TELLING: f64 = 5e-3;
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
 /// Effects whose richer forms are looked at, too.
@@ -204,7 +204,7 @@ impl Search<'_> {
         for _ in 0..2 * MOST {
             // What is left of a large gap may still be a machine's remainder, which tells no two accounts apart; less of the torque than any
             // drive is true to does.
-            let enough = self.leaves_little(&best) || self.is_negligible(&best);
+            let enough = self.is_enough(&best);
             if self.at_floor(&best) || enough && !self.is_exact(&best) {
                 break;
             }
@@ -260,7 +260,7 @@ impl Search<'_> {
     /// what the others do, beside which it earns next to nothing on its own.
     fn ahead(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut at = from;
-        let ends = |f: &Fit| self.at_floor(f) || self.leaves_little(f) || self.is_negligible(f) || self.is_tired();
+        let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_tired();
         while at.terms.len() < MOST && !ends(&at) {
             let mut all = self.extended(&at, at.terms.len(), pool);
             all.retain(|f| self.is_material(&at, f));
@@ -297,9 +297,14 @@ impl Search<'_> {
         self.left(fit) < least
     }
 
+    /// Whether what a fit leaves holds no further cause.
+    fn is_enough(&self, fit: &Fit) -> bool {
+        self.leaves_little(fit) || self.is_negligible(fit)
+    }
+
     /// Whether a fit leaves so little of the torque that another account may be told from it.
     fn is_exact(&self, fit: &Fit) -> bool {
-        self.left(fit) < EXACT || self.is_negligible(fit)
+        self.left(fit) < TELLING
     }
 
     /// Share of the torque that a fit leaves.
@@ -312,12 +317,8 @@ impl Search<'_> {
     fn put_back(&self, fit: &Fit) -> Vec<Fit> {
         let nominal = &self.problem.nominal;
         let far = if fit.terms.is_empty() { MOVED } else { MOVED_BESIDE };
-        if fit
-            .coordinates
-            .iter()
-            .filter(|c| c.is_base())
-            .all(|c| (c.value(&fit.model) / c.value(nominal)).ln().abs() < far)
-        {
+        let moved = |c: &Coordinate| c.is_base() && (c.value(&fit.model) / c.value(nominal)).ln().abs() >= far;
+        if !fit.coordinates.iter().any(moved) {
             return Vec::new();
         }
         let back = self.problem.given(&Model { parameters: nominal.parameters, ..fit.model });
@@ -455,7 +456,6 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::model::Coordinate;
     use super::*;
     use crate::axis::Parameters;
     use crate::effects::{EFFECTS, Settings};

@@ -19,12 +19,16 @@ fn parameters(i1: f64) -> Parameters {
     Parameters { i1, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 }
 }
 
+fn noise(rng: &mut ChaCha8Rng, size: f64) -> f64 {
+    size * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>()
+}
+
 /// A record of moves under a position controller; `foreign` is a torque that no model knows of.
 fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn(f64) -> f64, seed: u64) -> Record {
     let n = 6000;
     let axis = Axis::new(parameters(INERTIA), Structure::Rigid, effects, Scheme::Exact, DT);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut noise = |size: f64| size * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
+    let mut noise = |size: f64| noise(&mut rng, size);
     let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut torque, mut theta) = (Vec::new(), Vec::new());
     for k in 0..n {
@@ -49,11 +53,12 @@ fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn
     }
 }
 
-fn diagnosed(record: &Record, nominal: f64) -> Outcome {
-    let noise = estimate_noise(&record.torque, &[record.channels[0].as_deref(), None, None, None], None);
+fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> Outcome {
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let noise = estimate_noise(&record.torque, &channels, None);
     let case = Case {
-        machine: "stage".to_owned(),
-        nominal: Model::new(parameters(nominal), Structure::Rigid, Settings::default()),
+        machine: "axis".to_owned(),
+        nominal: Model::new(nominal, structure, Settings::default()),
         motion: Motion::Rotary,
         train: record,
         noise: &noise,
@@ -61,6 +66,10 @@ fn diagnosed(record: &Record, nominal: f64) -> Outcome {
         suspects: EFFECTS.to_vec(),
     };
     diagnose(&case, &|_| ())
+}
+
+fn diagnosed(record: &Record, inertia: f64) -> Outcome {
+    diagnosed_as(record, Structure::Rigid, parameters(inertia))
 }
 
 fn named(o: &Outcome) -> Vec<&'static str> {
@@ -167,25 +176,10 @@ fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, la
     }
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     for theta in motor.iter_mut().chain(&mut table) {
-        *theta += 1e-5 * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
+        *theta += noise(&mut rng, 1e-5);
     }
     let channels = [Some(motor), None, Some(table), None];
     Record { start: 0.0, dt, hold: Hold::Zoh, torque, between: None, channels, noise: [1e-5; 4], idle: Vec::new() }
-}
-
-fn diagnosed_open(record: &Record, nominal: Parameters) -> Outcome {
-    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
-    let noise = estimate_noise(&record.torque, &channels, None);
-    let case = Case {
-        machine: "axis".to_owned(),
-        nominal: Model::new(nominal, Structure::TwoInertia, Settings::default()),
-        motion: Motion::Rotary,
-        train: record,
-        noise: &noise,
-        holdout: None,
-        suspects: EFFECTS.to_vec(),
-    };
-    diagnose(&case, &|_| ())
 }
 
 #[test]
@@ -193,7 +187,7 @@ fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
     // The twist is little more than the table's speed times the delay: free, the stiffness takes that and leaves the delay nothing.
     let light = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5e-4, k: 0.018, rho: 1.0 };
     let friction = with(&[(Effect::CoulombMotor, 0, 2e-3)]);
-    let o = diagnosed_open(&of_two_inertias(light, friction, 8e-3, 3), light);
+    let o = diagnosed_as(&of_two_inertias(light, friction, 8e-3, 3), Structure::TwoInertia, light);
     assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", told(&o));
     let delay = o.improved.effects.of(Effect::SensorDelay)[0];
     assert!((delay / 3e-3 - 1.0).abs() < 0.05, "{delay}");
@@ -208,6 +202,7 @@ fn of_two_large_causes_neither_of_which_helps_alone_both_are_found() {
         (Effect::TorqueRipple, 1, 4.0),
         (Effect::TorqueRipple, 2, 0.6),
     ];
-    let o = diagnosed_open(&of_two_inertias(Parameters::PAPER, with(&hidden), 0.05, 0), Parameters::PAPER);
+    let paper = Parameters::PAPER;
+    let o = diagnosed_as(&of_two_inertias(paper, with(&hidden), 0.05, 0), Structure::TwoInertia, paper);
     assert_eq!(named(&o), ["external_spring", "torque_ripple"], "{:#?}", told(&o));
 }
