@@ -1,17 +1,27 @@
 //! The band of the motion, and the samples that count.
 
 use super::super::record::Record;
-use crate::axis::Structure;
 use rustfft::{FftPlanner, num_complex::Complex};
 
-/// Share of the acceleration's power that the band holds, and how far beyond it goes.
+/// Share of the acceleration's power that the band of the motion holds, and how far beyond it goes.
 const POWER: f64 = 0.995;
 const BEYOND: f64 = 1.5;
+/// Power of the acceleration over that of the encoders' noise with which the motion shows.
+const SHOWS: f64 = 4.0;
+/// The same with which it rules: under control feedback ties torque and noise together (Gautier & Khalil's practice).
+const RULES: f64 = 400.0;
 
-/// Power of the acceleration over that of the encoders' noise up to which the band goes: under control, where feedback ties torque and
-/// noise together, as far as the motion rules (Gautier & Khalil's practice), which a rigid axis is taken to be; else as far as it shows.
-const STANDS_RIGID: f64 = 400.0;
-const STANDS: f64 = 4.0;
+/// How far a band goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// As far as the motion is, where it rules.
+    Ruled,
+    /// As far as the motion is, where it shows.
+    Shown,
+    /// As far as anything of the motion shows.
+    Whole,
+}
+
 /// Samples over which the window falls to an idle stretch.
 const SOFT: usize = 24;
 
@@ -73,8 +83,9 @@ fn acceleration(record: &Record, side: usize, mask: &[f64]) -> Option<(Vec<f64>,
 }
 
 /// Upper end of the band, Hz.
-pub fn limit(record: &Record, mask: &[f64], structure: Structure) -> f64 {
-    let snr = if structure == Structure::Rigid { STANDS_RIGID } else { STANDS };
+pub fn limit(record: &Record, mask: &[f64], reach: Reach) -> f64 {
+    let snr = if reach == Reach::Ruled { RULES } else { SHOWS };
+    let (power, beyond) = if reach == Reach::Whole { (1.0, 1.0) } else { (POWER, BEYOND) };
     let n = record.len();
     let step = 1.0 / (n as f64 * record.dt);
     let mut best = 0.0_f64;
@@ -89,10 +100,10 @@ pub fn limit(record: &Record, mask: &[f64], structure: Structure) -> f64 {
             .iter()
             .position(|s| {
                 sum += s;
-                sum >= POWER * all
+                sum >= power * all
             })
             .unwrap_or(top);
-        let f = ((BEYOND * at as f64) as usize).min(top.max(8)) as f64 * step;
+        let f = ((beyond * at as f64) as usize).min(top.max(8)) as f64 * step;
         best = best.max(f);
     }
     best.min(0.4 / record.dt)

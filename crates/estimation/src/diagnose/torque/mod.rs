@@ -38,14 +38,14 @@ use super::repair::bridged;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
-use band::Rate;
+use band::{Rate, Reach};
 use conclusion::LIKELY;
 pub use conclusion::{Confusable, Decision, Weighed};
 pub use fit::Fit;
 use fit::Problem;
 use gap::{Gap, Gaps, rms_about_mean};
 use likelihood::Band;
-use search::{Search, decide};
+use search::{NEGLIGIBLE, Search, decide};
 use tracking::{Resolution, Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
@@ -53,6 +53,9 @@ const SEARCHED: usize = 16_384;
 
 /// Noises that an account at the rate of the band may leave for it to be settled at the record's own.
 const NEAR: f64 = 30.0;
+/// Share of the torque that an account of a rigid axis leaves where the band that its motion rules is understood, and a cause may lie
+/// beyond it: less than what any drive's measured current is true to.
+const UNDERSTOOD: f64 = 0.02;
 /// Steps of the fit through which a band sees its noise.
 const REFERRED: usize = 24;
 
@@ -77,20 +80,32 @@ struct Prepared {
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
-    let (mut searched, own) = prepared(&train, &case.nominal);
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
-    let suspects = case.suspects.iter().copied().filter(may).collect();
+    let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
     let decided = |p: &Prepared, suspects: Vec<Effect>| {
         let problem = Problem::new(&p.record, &p.band, case.nominal);
         decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress })
     };
-    let mut decision = decided(&searched, suspects);
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
     let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
-    if let Some(own) = own.filter(|_| near(&decision, &searched)) {
+    let settled = |(searched, own): (Prepared, Option<Prepared>)| {
+        let decision = decided(&searched, suspects.clone());
+        let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
-        decision = decided(&own, likely(&decision));
-        searched = own;
+        let decision = decided(&own, likely(&decision));
+        (own, decision)
+    };
+    let rules = case.nominal.structure == Structure::Rigid;
+    let reach = if rules { Reach::Ruled } else { Reach::Shown };
+    let (mut searched, mut decision) = settled(prepared(&train, &case.nominal, reach));
+    let left = searched.left(&decision.chosen);
+    if rules && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
+        progress("beyond the band that the motion rules");
+        let (wide, other) = settled(prepared(&train, &case.nominal, Reach::Whole));
+        // More to explain and less left of it: what was missing is there.
+        if wide.left(&other.chosen) < left {
+            (searched, decision) = (wide, other);
+        }
     }
     progress("held-out data");
     let fits = [&decision.given, &decision.parameters, &decision.chosen];
@@ -125,7 +140,7 @@ fn remains(p: &Prepared, fit: &Fit) -> Remainder {
     let shown = &series[usize::from(site == Site::At(Place::Table))];
     Remainder {
         torque_rms: p.band.torque_rms(fit.discrepancy),
-        share: p.band.torque_share(fit.discrepancy, &p.record),
+        share: p.left(fit),
         noise_multiple: p.band.noise_multiple(&fit.rows),
         site,
         looks: along(&p.record, &residual(shown, &tracked), site).looks,
@@ -158,9 +173,9 @@ const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 
 /// The record in the band of its motion, as fast as it can be searched; and as exact as it can be, where accounts near the noise are
 /// settled, if that is something else.
-fn prepared(record: &Record, nominal: &Model) -> (Prepared, Option<Prepared>) {
+fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option<Prepared>) {
     let whole = record.part(0..band::smooth(record.len()));
-    let limit = band::limit(&whole, &band::mask(&whole), nominal.structure);
+    let limit = band::limit(&whole, &band::mask(&whole), reach);
     let [exact, fast] = match nominal.structure {
         Structure::Rigid => [false, true].map(|straight| Rate { longest: f64::INFINITY, straight }),
         Structure::TwoInertia => {
@@ -203,6 +218,11 @@ fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate) -> (Prepare
 }
 
 impl Prepared {
+    /// Share of the torque that a fit leaves.
+    fn left(&self, fit: &Fit) -> f64 {
+        self.band.torque_share(fit.discrepancy, &self.record)
+    }
+
     /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.
     fn alike(&self, record: &Record, model: &Model) -> Self {
         let whole = record.part(0..band::smooth(record.len()));

@@ -30,7 +30,7 @@ const FIRST: f64 = 0.1;
 const MINOR: f64 = 0.0025;
 /// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling shows
 /// less of it in its twist.
-const NEGLIGIBLE: f64 = 2e-3;
+pub const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
 /// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
 /// remainder is that small.

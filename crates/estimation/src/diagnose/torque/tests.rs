@@ -152,6 +152,15 @@ fn a_third_inertia_on_a_spring_is_found_at_its_frequency() {
     assert!(ways[2].of == ClosureOf::Torque && ways[2].closure > 0.99, "{ways:?}");
 }
 
+#[test]
+fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
+    // Up to 50 rad/s, under a motion of 0.9 and 2.3.
+    let hidden = [(Effect::TorqueRipple, 0, 0.06), (Effect::TorqueRipple, 1, 30.0), (Effect::TorqueRipple, 2, 0.5)];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 1e-9, |_| 0.0, 6), INERTIA);
+    assert_eq!(named(&o), ["torque_ripple"], "{:#?}", told(&o));
+    assert!((o.improved.effects.of(Effect::TorqueRipple)[1] / 30.0 - 1.0).abs() < 1e-3);
+}
+
 /// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.
 fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, late: usize) -> Record {
     let (n, dt) = (3000, 2e-3);
@@ -194,7 +203,7 @@ fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
 }
 
 #[test]
-fn of_two_large_causes_neither_of_which_helps_alone_both_are_found() {
+fn of_two_large_causes_both_are_found() {
     let hidden = [
         (Effect::ExternalSpring, 0, 0.02),
         (Effect::ExternalSpring, 1, -1.0),
