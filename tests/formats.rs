@@ -1,4 +1,4 @@
-//! Parquet and MATLAB files as other programs write them (pyarrow, scipy; `scripts/fixtures/formats.py`).
+//! Parquet, MATLAB and HDF5 files as other programs write them (pyarrow, scipy, h5py; `scripts/fixtures/formats.py`).
 
 use std::path::{Path, PathBuf};
 
@@ -138,8 +138,48 @@ fn files_that_matlab_wrote_hold_what_matlab_put_there() {
     assert_eq!((doubles, matrices), (4, 4));
 }
 
+/// `matlab73.mat` is laid out as MATLAB 7.3 does it, `python.h5` by h5py; both hold what `row` says.
 #[test]
-fn an_hdf5_file_is_refused_with_the_way_out() {
+#[cfg(feature = "hdf5")]
+fn hdf5_files_of_matlab_and_python_are_columns() {
+    for name in ["matlab73.mat", "python.h5"] {
+        let table = Table::read(&data(name)).unwrap();
+        let expected = |c: usize| (0..200).map(|k| row(k)[c]).collect::<Vec<_>>();
+        for (c, column_name) in ["time", "T", "theta1"].into_iter().enumerate() {
+            assert_eq!(column(&table, column_name), expected(c), "{name}, {column_name}");
+        }
+        assert_eq!(column(&table, "both(:,1)"), expected(1), "{name}");
+        assert_eq!(column(&table, "both(:,2)"), expected(2), "{name}");
+        assert_eq!(column(&table, "counts")[149], 49.0, "{name}: a field of a structure, stored in two bytes");
+        assert!(refusal(&table, "wave").contains("complex"), "{name}");
+        assert!(refusal(&table, "short").contains("5 values"), "{name}");
+        for other in ["note", "cells", "fs", "sparse"] {
+            assert!(table.position(other).is_none(), "{name}: {}", table.names());
+        }
+    }
+}
+
+#[test]
+#[cfg(feature = "hdf5")]
+fn an_hdf5_file_that_asks_for_more_than_it_can_hold_is_refused() {
+    let whole = std::fs::read(data("python.h5")).unwrap();
+    // The size of time, 200, in its data space: rank, version and flags stand before it.
+    let size = 200_u64.to_le_bytes();
+    let mut refused = 0;
+    for at in (0..whole.len() - 8).filter(|at| whole[*at..at + 8] == size) {
+        let mut bytes = whole.clone();
+        bytes[at..at + 8].copy_from_slice(&(1_u64 << 40).to_le_bytes());
+        if let Err(error) = Table::parse(&bytes, "bomb.h5") {
+            let error = error.to_string();
+            assert!(error.contains("bomb.h5") && error.contains("-v7"), "{error}");
+            refused += usize::from(error.contains("more numbers than the file can hold"));
+        }
+    }
+    assert!(refused > 0, "no size was altered");
+}
+
+#[test]
+fn an_hdf5_file_that_cannot_be_read_is_refused_with_the_way_out() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.mat");
     std::fs::write(&path, b"\x89HDF\r\n\x1a\n and so on").unwrap();
@@ -153,7 +193,7 @@ fn an_hdf5_file_is_refused_with_the_way_out() {
 fn damaged_files_are_errors_that_name_them() {
     let folder = tempfile::tempdir().unwrap();
     std::panic::set_hook(Box::new(|_| {}));
-    for name in ["zstd.parquet", "types.parquet", "plain.mat", "compressed.mat", "struct.mat"] {
+    for name in ["zstd.parquet", "types.parquet", "plain.mat", "compressed.mat", "struct.mat", "matlab73.mat"] {
         let whole = std::fs::read(data(name)).unwrap();
         let path = folder.path().join(name);
         let check = |bytes: &[u8], what: &str| {

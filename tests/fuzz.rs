@@ -193,6 +193,18 @@ fn matlab_files_are_read_or_refused() {
 }
 
 #[test]
+#[cfg(feature = "hdf5")]
+fn hdf5_files_are_read_or_refused() {
+    let fixtures = ["tests/data/formats/matlab73.mat", "tests/data/formats/python.h5"];
+    let words: [&[u8]; 6] =
+        [b"OHDR", b"TREE", b"SNOD", b"HEAP", b"\xff\xff\xff\xff\xff\xff\xff\xff", b"\0\0\0\x01\0\0\0\0"];
+    fuzz("hdf5", &fixtures, &words, |bytes| match Table::parse(bytes, "fuzz") {
+        Ok(table) => use_table(&table),
+        Err(error) => assert!(error.to_string().starts_with("fuzz: "), "{error}"),
+    });
+}
+
+#[test]
 #[cfg(feature = "parquet")]
 fn parquet_files_are_read_or_refused() {
     let fixtures = ["types", "version2", "zstd"].map(|n| format!("tests/data/formats/{n}.parquet"));

@@ -6,11 +6,18 @@
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
 //! record: see [`Trace::hold`].
 
+#[cfg(any(feature = "hdf5", feature = "parquet"))]
+mod caught;
 mod clock;
 mod csv;
 mod error;
 mod forms;
 pub mod guess;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+#[cfg(not(feature = "hdf5"))]
+#[path = "no_hdf5.rs"]
+mod hdf5;
 mod load;
 mod lost;
 pub mod machine;

@@ -16,7 +16,7 @@ use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table};
 
 /// Deepest nesting of structures that is followed.
-const DEEPEST: usize = 16;
+pub(super) const DEEPEST: usize = 16;
 /// Most elements of a file.
 const MAX_ELEMENTS: usize = 1 << 20;
 /// Most columns a matrix is split into.
@@ -37,11 +37,49 @@ const STRUCTURE: u32 = 2;
 const NUMERIC: std::ops::RangeInclusive<u32> = 6..=15;
 
 /// A vector on the way to a column.
-struct Vector {
+pub(super) struct Vector {
     /// The variable, and the fields below it.
     path: Vec<String>,
     values: Vec<f64>,
     complex: bool,
+}
+
+/// How the columns of a matrix are written where it comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    /// MATLAB: the first index runs fastest.
+    Columns,
+    /// C: the last index runs fastest; the sizes are given turned round.
+    #[cfg_attr(not(feature = "hdf5"), expect(dead_code, reason = "HDF5 alone has it"))]
+    Rows,
+}
+
+impl Vector {
+    /// The numbers of an m x n array, whose first index runs fastest, as one vector, or split along the shorter side.
+    pub fn split(path: &[String], values: Vec<f64>, (m, n): (usize, usize), complex: bool, order: Order) -> Vec<Self> {
+        let (rows, columns) = if m >= n { (m, n) } else { (n, m) };
+        if columns == 1 {
+            return vec![Self { path: path.to_vec(), values, complex }];
+        }
+        if !(1..=MAX_SPLIT).contains(&columns) {
+            return Vec::new();
+        }
+        (0..columns)
+            .map(|k| {
+                let values: Vec<f64> = if m >= n {
+                    values[k * rows..(k + 1) * rows].to_vec()
+                } else {
+                    values.iter().skip(k).step_by(m).copied().collect()
+                };
+                let mut path = path.to_vec();
+                if let Some(own) = path.last_mut() {
+                    let second = (m >= n) == (order == Order::Columns);
+                    *own = if second { format!("{own}(:,{})", k + 1) } else { format!("{own}({},:)", k + 1) };
+                }
+                Self { path, values, complex }
+            })
+            .collect()
+    }
 }
 
 /// The vectors of a file. `file` names it in messages.
@@ -63,7 +101,8 @@ pub(super) fn parse(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     table(reader.vectors, file)
 }
 
-fn table(vectors: Vec<Vector>, file: &str) -> Result<Table, TraceError> {
+/// The table of all vectors that are as long as most of them.
+pub(super) fn table(vectors: Vec<Vector>, file: &str) -> Result<Table, TraceError> {
     // The most frequent length; of two, the longer.
     let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
     for vector in vectors.iter().filter(|v| v.values.len() > 1) {
@@ -268,24 +307,7 @@ impl Reader {
         if self.cells > MAX_CELLS {
             return Err(format!("it holds more than {MAX_CELLS} numbers"));
         }
-        // Split along the shorter side; stored column by column.
-        let (rows, columns) = if m >= n { (m, n) } else { (n, m) };
-        if columns == 1 {
-            self.vectors.push(Vector { path: path.to_vec(), values, complex });
-        } else if (1..=MAX_SPLIT).contains(&columns) {
-            for k in 0..columns {
-                let one: Vec<f64> = if m >= n {
-                    values[k * rows..(k + 1) * rows].to_vec()
-                } else {
-                    values.iter().skip(k).step_by(m).copied().collect()
-                };
-                let mut path = path.to_vec();
-                if let Some(own) = path.last_mut() {
-                    *own = if m >= n { format!("{own}(:,{})", k + 1) } else { format!("{own}({},:)", k + 1) };
-                }
-                self.vectors.push(Vector { path, values: one, complex });
-            }
-        }
+        self.vectors.extend(Vector::split(path, values, (m, n), complex, Order::Columns));
         Ok(())
     }
 

@@ -16,6 +16,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnDescriptor, Type as SchemaType};
 
+use super::caught::caught;
 use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table, header};
 
@@ -214,11 +215,10 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
 
 /// Runs the library on a file that may be damaged in any way: an error or a panic of it is an error of the file.
 fn guarded<T>(file: &str, run: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, TraceError> {
-    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run));
-    let reason = match outcome {
-        Ok(Ok(value)) => return Ok(value),
-        Ok(Err(e)) => e.to_string(),
-        Err(_) => "the reader gave up on it".to_owned(),
+    let reason = match caught(run) {
+        Some(Ok(value)) => return Ok(value),
+        Some(Err(e)) => e.to_string(),
+        None => "the reader gave up on it".to_owned(),
     };
     Err(TraceError::Format {
         file: file.to_owned(),

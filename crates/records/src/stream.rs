@@ -58,7 +58,7 @@ impl Rows {
                 open.rewind().and_then(|()| open.take(BLOCK as u64).read_to_end(&mut bytes)).map_err(failed)?;
                 csv::Head::find(csv::unmarked(&bytes), &file)?.headers
             }
-            Kind::Mat | Kind::Packed => {
+            Kind::Mat | Kind::Hdf5 | Kind::Packed => {
                 return Err(TraceError::Format {
                     file,
                     what: "a file of this form is not streamed; leave --stream out (it is at most 2 GiB), or write it as Parquet \

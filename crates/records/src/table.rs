@@ -8,7 +8,7 @@ use super::error::TraceError;
 use super::forms::Form;
 use super::signal::Signal;
 use super::units::Unit;
-use super::{csv, forms, guess, mat, packed, parquet};
+use super::{csv, forms, guess, hdf5, mat, packed, parquet};
 
 /// Most columns a file may have.
 pub(super) const MAX_COLUMNS: usize = 4096;
@@ -30,6 +30,8 @@ pub(super) enum Kind {
     Parquet,
     /// MATLAB 5 to 7.2.
     Mat,
+    /// HDF5, MATLAB 7.3 among them.
+    Hdf5,
     /// An archive of NumPy arrays, or an Excel workbook.
     Packed,
 }
@@ -50,10 +52,7 @@ impl Kind {
             });
         }
         if first.starts_with(b"\x89HDF\r\n\x1a\n") || first.starts_with(b"MATLAB 7.3") {
-            return Err(TraceError::Format {
-                file: file.to_owned(),
-                what: "an HDF5 (MATLAB 7.3) file; save it in MATLAB with -v7, or as CSV or Parquet".to_owned(),
-            });
+            return Ok(Self::Hdf5);
         }
         // The version and the mark of the byte order: MAT-File Format (MathWorks), table 1-1.
         if first.len() == 128 && matches!(&first[124..], [0, 1, b'I', b'M'] | [1, 0, b'M', b'I']) {
@@ -155,6 +154,7 @@ impl Table {
                 Form::Table(table) => Ok(table),
             },
             Kind::Mat => mat::parse(bytes, file),
+            Kind::Hdf5 => hdf5::read(bytes, file),
             Kind::Packed => packed::read(bytes, file),
             Kind::Parquet => Err(TraceError::Format {
                 file: file.to_owned(),

@@ -1,0 +1,28 @@
+//! Readers that others wrote, on files that may be damaged in any way: a panic of theirs is an error of the file, and nothing
+//! is printed of it.
+
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::sync::Once;
+
+thread_local! {
+    /// Whether this thread is within [`caught`].
+    static WITHIN: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What a reader gives; None where it panics. Panics elsewhere are printed as ever.
+pub(super) fn caught<T>(run: impl FnOnce() -> T) -> Option<T> {
+    static QUIET: Once = Once::new();
+    QUIET.call_once(|| {
+        let usual = take_hook();
+        set_hook(Box::new(move |info| {
+            if !WITHIN.get() {
+                usual(info);
+            }
+        }));
+    });
+    let outer = WITHIN.replace(true);
+    let outcome = catch_unwind(AssertUnwindSafe(run));
+    WITHIN.set(outer);
+    outcome.ok()
+}
