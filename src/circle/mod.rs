@@ -90,6 +90,9 @@ pub enum CircleError {
         /// The value.
         value: f64,
     },
+    /// A circle that no table draws.
+    #[error("radius is {0:e} m: a circle is drawn from {least:e} to {most:e} m", least = RADII.start(), most = RADII.end())]
+    Radius(f64),
     /// Too few or too many samples on the circle.
     #[error(
         "one turn takes {samples} samples at dt = {dt} s; choose radius, feed and dt so that it takes {least} to {most}"
@@ -118,6 +121,8 @@ pub enum CircleError {
 
 /// Turns before the one that is recorded: half a turn to reach the feed, the rest to settle.
 const RUN_IN: f64 = 1.5;
+/// Radii that are drawn, m: beyond them a deviation is lost in the rounding of the path, or a plot has no scale.
+const RADII: std::ops::RangeInclusive<f64> = 1e-9..=1e6;
 const LEAST: usize = 360;
 const MOST: usize = 20_000_000;
 
@@ -128,12 +133,24 @@ fn schedule(rate: f64, t: f64) -> f64 {
     if t < ramp { 0.5 * rate * t * t / ramp } else { rate * (t - 0.5 * ramp) }
 }
 
+/// Whether a circle of this radius can be drawn.
+///
+/// # Errors
+/// When it is none, or far from all that a table can do.
+pub fn check_radius(radius: f64) -> Result<(), CircleError> {
+    if !(radius.is_finite() && radius > 0.0) {
+        return Err(CircleError::NotPositive { name: "radius", value: radius });
+    }
+    if RADII.contains(&radius) { Ok(()) } else { Err(CircleError::Radius(radius)) }
+}
+
 /// Runs the test: the table's path over the last turn, starting on the +X side.
 ///
 /// # Errors
 /// When a number makes no sense or a loop is unstable.
 pub fn run(x: &ServoAxis, y: &ServoAxis, test: &CircleTest) -> Result<Path, CircleError> {
-    for (name, value) in [("radius", test.radius), ("feed", test.feed), ("dt", test.dt)] {
+    check_radius(test.radius)?;
+    for (name, value) in [("feed", test.feed), ("dt", test.dt)] {
         if !(value.is_finite() && value > 0.0) {
             return Err(CircleError::NotPositive { name, value });
         }

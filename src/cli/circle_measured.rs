@@ -3,7 +3,10 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
+use anyhow::Context;
+
 use super::circle::{Findings as Simulated, Test};
+use crate::circle::check_radius;
 use crate::circle::measured::{Given, Measured, read};
 use crate::circle::roundness::{Roundness, bidirectional};
 use crate::circle::trace::{Analysis, Axis, Kind, analyse, hysteresis};
@@ -23,6 +26,7 @@ pub(super) fn findings(
 ) -> anyhow::Result<Findings> {
     let given = Given { radius: test.radius, feed: test.feed.map(|f| f / 60.0), clockwise: directions.to_vec() };
     let measured = read(files, &given)?;
+    check_radius(measured.radius).context("the measured circle")?;
     let too_few = || anyhow::anyhow!("the turns have too few points to tell the deviations apart; sample faster");
     let analysis = analyse(&measured.turns, measured.radius, measured.feed).ok_or_else(too_few)?;
     let norm = norm(&measured).ok_or_else(|| anyhow::anyhow!("the points are no circle"))?;

@@ -12,7 +12,7 @@
 use rustfft::num_complex::Complex;
 
 use super::encoders::{counted, encoders, motor_side, slowly};
-use super::finding::{Finding, Severity};
+use super::finding::{Finding, Severity, told};
 use super::least::bounded;
 use super::nominal::explains;
 use super::rigid::{self, WORSE, Weight, other_unit};
@@ -249,8 +249,9 @@ fn times(input: &Input<'_>, findings: &mut Vec<Finding>) {
     if natural * input.dt > std::f64::consts::PI {
         let hertz = natural / std::f64::consts::TAU;
         findings.push(say(format!(
-            "The nominal axis swings at {hertz:.4} Hz, the record is sampled every {:.4} s: it could not show it.",
-            input.dt
+            "The nominal axis swings at {} Hz, the record is sampled every {} s: it could not show it.",
+            told(hertz),
+            told(input.dt)
         )));
     } else if natural * duration < 1.0 {
         findings.push(say(format!(
@@ -522,12 +523,12 @@ fn excitation(nominal: Option<Nominal>, band: [f64; 2], findings: &mut Vec<Findi
             Severity::Warn,
             "T",
             format!(
-                "The motion follows the torque up to {:.4} Hz; the nominal coupling shows from some {:.4} Hz on.",
-                band[1],
-                0.3 * anti
+                "The motion follows the torque up to {} Hz; the nominal coupling shows from some {} Hz on.",
+                told(band[1]),
+                told(0.3 * anti)
             ),
             "Stiffness and damping of the coupling are not determined by this record, nor how the inertia is shared.",
-            format!("Excite up to {:.4} Hz (`eixo excite`), or describe the axis as rigid.", 1.5 * anti),
+            format!("Excite up to {} Hz (`eixo excite`), or describe the axis as rigid.", told(1.5 * anti)),
         ));
     }
 }

@@ -13,7 +13,7 @@
 
 use std::ops::Range;
 
-use super::finding::{Finding, Severity};
+use super::finding::{Finding, Severity, told};
 use super::least::bounded;
 use super::pairs::factor;
 use super::robust::quantile;
@@ -95,7 +95,7 @@ fn against(turned: f64, own: f64) -> Finding {
 /// An inertia that is not the nominal one: by a unit's factor or, where it is `sure` what moves, by more than any nominal value is off.
 pub(super) fn other_unit(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -> Finding {
     let unit = Motion::unit(input.motion, "kg.m2");
-    let seen = format!("The inertia that moves is {mass:.4e} {unit}, {ratio:.4} times the nominal one");
+    let seen = format!("The inertia that moves is {mass:.4e} {unit}, {} times the nominal one", told(ratio));
     let words = factor(ratio);
     let of_a_nominal = !sure || (1.0 / BEYOND..BEYOND).contains(&ratio);
     if words.is_none() && of_a_nominal {
