@@ -65,6 +65,9 @@ fn no_command_writes_over_an_input() {
         "circle axis.toml -o axis.toml",
         "circle axis.toml --y soft.toml --report axis.toml",
         "validate axis.fmu -o axis.fmu",
+        "validate axis.fmu --report axis.fmu",
+        "validate axis.fmu --reference log.csv --report log.csv",
+        "validate axis.fmu --reference log.csv --input u.csv -o u.csv",
     ] {
         let arguments: Vec<&str> = line.split(' ').collect();
         let kept = |name: &str| std::fs::read(at(name)).unwrap();
@@ -139,13 +142,14 @@ fn a_full_disk_and_a_limit_of_the_file_size_leave_nothing() {
     if Path::new("/dev/full").exists() {
         let done = eixo_in(folder.path(), &["identify", "log.csv", "--method", "ls", "--json", "/dev/full"]);
         assert_eq!(done.status.code(), Some(2));
-        assert!(String::from_utf8_lossy(&done.stderr).contains("/dev/full"));
+        assert!(String::from_utf8_lossy(&done.stderr).contains("Make room"), "{done:?}");
     }
     // 8 blocks of 512 or 1024 bytes: less than the record.
     let script = format!("ulimit -f 8; exec {} excite -o big.csv --samples 4096", env!("CARGO_BIN_EXE_eixo"));
     let done = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
     assert_eq!(done.status.code(), Some(2), "{done:?}");
     assert!(String::from_utf8_lossy(&done.stderr).contains("big.csv: cannot write"), "{done:?}");
+    assert!(String::from_utf8_lossy(&done.stderr).contains("ulimit -f"), "{done:?}");
     assert_eq!(names(folder.path()), before);
 }
 
@@ -158,6 +162,13 @@ fn names_of_outputs_mean_what_they_say_and_numbers_without_bound_are_not_written
         assert!(packed.status.success() && std::fs::read(at("u.parquet")).unwrap().starts_with(b"PAR1"), "{packed:?}");
     } else {
         assert!(String::from_utf8_lossy(&packed.stderr).contains("--features parquet"), "{packed:?}");
+    }
+    // A text under the name of another form is taken for a damaged file.
+    for name in ["u.xlsx", "u.MAT", "u.npz"] {
+        let done = eixo_in(folder.path(), &["excite", "-o", name]);
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(done.status.code() == Some(2) && said.contains(".csv or .parquet"), "{said}");
+        assert!(!at(name).exists(), "{name}");
     }
     let done = eixo_in(folder.path(), &["excite", "-o", "nan.csv", "--rms", "1e308", "--offset", "1e308"]);
     assert_eq!(done.status.code(), Some(2), "{done:?}");

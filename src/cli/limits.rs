@@ -22,8 +22,9 @@ pub fn bearable(rows: f64, columns: usize) -> anyhow::Result<()> {
     if let Some(free) = free() {
         anyhow::ensure!(
             needed < 0.9 * free,
-            "{rows:.0} rows of {columns} columns need about {:.3e} GB of memory, {:.1} GB are free: take a shorter time or a longer \
+            "{} rows of {columns} columns need about {:.3e} GB of memory, {:.1} GB are free: take a shorter time or a longer \
              step",
+            if rows < 1e12 { format!("{rows:.0}") } else { format!("{rows:.3e}") },
             giga(needed),
             giga(free)
         );
@@ -41,5 +42,7 @@ mod tests {
         assert!(bearable(1e4, 10).is_ok());
         let error = bearable(1e15, 10).unwrap_err().to_string();
         assert!(error.contains("longer step"), "{error}");
+        let error = bearable(1e300, 10).unwrap_err().to_string();
+        assert!(error.len() < 200, "{error}");
     }
 }

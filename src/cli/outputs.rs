@@ -35,10 +35,14 @@ fn identity(path: &Path) -> Option<Identity> {
     }
 }
 
+/// Endings of forms that are not written: a text under such a name is taken for a damaged file.
+const FOREIGN: [&str; 12] =
+    ["xlsx", "xlsm", "xls", "ods", "mat", "h5", "hdf5", "npz", "npy", "feather", "arrow", "pdf"];
+
 /// Checks the outputs of a command against its inputs.
 ///
 /// # Errors
-/// When an output is an input or another output, or cannot be written.
+/// When an output is an input or another output, cannot be written, or has the ending of a form that is not.
 pub fn check<'a>(
     inputs: impl IntoIterator<Item = &'a Path>,
     outputs: impl IntoIterator<Item = Option<&'a PathBuf>>,
@@ -48,6 +52,12 @@ pub fn check<'a>(
     for path in outputs.into_iter().flatten() {
         if path == Path::new("-") {
             super::stdout::to_stderr();
+        }
+        if path.extension().is_some_and(|end| FOREIGN.iter().any(|f| end.eq_ignore_ascii_case(f))) {
+            bail!(
+                "{}: this form is not written; tables end in .csv or .parquet, pages in .html, results in .json",
+                path.display()
+            );
         }
         if let Some(own) = identity(path) {
             if let Some((input, _)) = inputs.iter().find(|(_, i)| i.as_ref() == Some(&own)) {
@@ -103,6 +113,8 @@ mod tests {
         assert!(check([input.as_path()], [Some(&a)]).is_ok());
         assert!(check([input.as_path()], [Some(&a), Some(&b)]).unwrap_err().to_string().contains("two outputs"));
         assert!(check([input.as_path()], [Some(&at("no/new.csv"))]).is_err());
+        let error = check([], [Some(&at("new.XLSX"))]).unwrap_err().to_string();
+        assert!(error.contains("new.XLSX") && error.contains(".csv or .parquet"), "{error}");
         let null = PathBuf::from("/dev/null");
         assert!(!null.exists() || check([input.as_path()], [Some(&null), Some(&null)]).is_ok());
     }

@@ -133,7 +133,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let fmu = args.fmu.as_ref().context("no FMU given")?;
-    outputs::check([fmu.as_path()], [args.output.as_ref()])?;
+    let inputs = [Some(fmu), args.reference.as_ref(), args.input.as_ref()].into_iter().flatten().map(PathBuf::as_path);
+    outputs::check(inputs, [args.output.as_ref(), args.report.as_ref()])?;
     anyhow::ensure!(args.timeout > 0.0 && args.timeout < 1e6, "--timeout {}: must be above 0", args.timeout);
     anyhow::ensure!(args.budget > 0.0 && args.budget < 1e6, "--budget {}: must be above 0", args.budget);
     for path in &args.allow {
@@ -187,7 +188,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let text = match args.format {
         Format::Text => {
             let compared = comparison.as_ref().map(output::compared).unwrap_or_default();
-            compared + &output::text(&report, args.strict, color, args.all)
+            // The rules' own sentence stands last, and speaks of the rules alone.
+            let against = match &comparison {
+                Some(c) if !c.passes() => {
+                    format!("{}: the run is outside the reference results of {}\n", fmu.display(), c.file)
+                }
+                _ => String::new(),
+            };
+            compared + &output::text(&report, args.strict, color, args.all) + &against
         }
         Format::Json => {
             let mut json = output::json(&report, args.strict);

@@ -18,7 +18,7 @@ pub enum TraceError {
         reason: std::io::Error,
     },
     /// The file could not be written.
-    #[error("{path}: cannot write: {reason}. Choose a folder that exists and that you may write to")]
+    #[error("{path}: cannot write: {reason}. {}", way_out(reason))]
     Write {
         /// The file.
         path: PathBuf,
@@ -269,4 +269,15 @@ pub fn nearest<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> St
         .min_by_key(|(distance, _)| *distance)
         .filter(|(distance, name)| *distance <= 1 + name.len().max(wanted.len()) / 3)
         .map_or_else(String::new, |(_, name)| format!("; did you mean {name:?}?"))
+}
+
+/// What can be done about a file that cannot be written.
+fn way_out(reason: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind::{BrokenPipe, FileTooLarge, QuotaExceeded, StorageFull};
+    match reason.kind() {
+        StorageFull | QuotaExceeded => "Make room, or write to another disk",
+        FileTooLarge => "Raise the limit of a file's size (`ulimit -f`), or write less",
+        BrokenPipe => "What reads the output has ended before it had all of it",
+        _ => "Choose a folder that exists and that you may write to",
+    }
 }
