@@ -289,8 +289,11 @@ fn what_was_found_once_stays_mended() {
     std::fs::write(at("log.csv"), format!("time,T,theta1,theta2\n{log}")).unwrap();
     // A natural frequency without bound.
     std::fs::write(at("stiff.toml"), AXIS.replace("1.76e-2", "1e308").replace("2.37e-4", "5e-324")).unwrap();
+    // An inertia that no number stands beside.
+    std::fs::write(at("heavy.toml"), AXIS.replace("2.37e-4", "1e308")).unwrap();
     std::fs::write(at("axis.toml"), AXIS).unwrap();
     let mut cases = vec![
+        "inspect log.csv --axis heavy.toml --report out.html --json out.json",
         "inspect log.csv --axis stiff.toml --report out.html --json out.json",
         "identify log.csv --axis stiff.toml --method oe --trust --report out.html",
         // A circle that no plot has a scale for.

@@ -121,7 +121,7 @@ pub(super) fn runs(n: usize, holds: impl Fn(usize) -> bool) -> Vec<Range<usize>>
 /// without bound, which extreme parameters lead to.
 pub(super) fn told(value: f64) -> String {
     match value.abs() {
-        size if size.is_nan() || size > 1e300 => "more than 1e300".to_owned(),
+        size if size > 1e300 => "more than 1e300".to_owned(),
         size if size == 0.0 || (1e-2..1e5).contains(&size) => format!("{value:.4}"),
         _ => format!("{value:.3e}"),
     }

@@ -61,6 +61,10 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
     let turned = balance.unexplained(-1.0, near).0;
     let (any, mass) = balance.unexplained(1.0, [0.0, f64::INFINITY]);
     let without = balance.unexplained(1.0, [0.0, 0.0]).0;
+    // Numbers at the end of their range weigh nothing.
+    if ![own, turned, any, mass, without].iter().all(|v| v.is_finite()) {
+        return None;
+    }
     let worse = WORSE * (1.0 + (ENOUGH / balance.freedom).powi(2));
     if own <= worse * any.min(turned) {
         return Some(Weight::Nominal);
@@ -70,7 +74,7 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
     }
     let ratio = mass / inertia;
     // Noise of the encoder, differentiated twice, hides an inertia: what it does not explain it does not tell.
-    if own.min(without) <= worse * any || ratio <= 0.0 {
+    if own.min(without) <= worse * any || ratio <= 0.0 || !ratio.is_finite() {
         return None;
     }
     Some(Weight::Wrong(other_unit(input, mass, ratio, true)))
