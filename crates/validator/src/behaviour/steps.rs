@@ -57,6 +57,7 @@ fn two_sizes(p: &Probe, count: usize) -> Result<Courses<'_>, super::Stop> {
     let whole = try_course(p, &references, &[1.0], count)?;
     match course(p, &references, &[0.5], 2 * count) {
         Ok(half) => Ok((variables, whole, half)),
+        Err(HostError::OnlyOnce) => Err(HostError::OnlyOnce.into()),
         Err(error) => not_tested(format!("the FMU refuses half the step size: {error}")),
     }
 }
