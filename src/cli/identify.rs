@@ -342,8 +342,10 @@ fn blocks(result: &Identification) -> Vec<Block> {
         t.signals.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")
     ))];
     blocks.extend(crate::report::identify::short(result));
+    // Where none has an estimate, the head says why of each.
+    let told = result.methods.iter().all(|m| m.failure.is_some());
     for m in &result.methods {
-        if let Some(why) = &m.failure {
+        if let Some(why) = m.failure.as_ref().filter(|_| !told) {
             blocks.push(Block::Warning(format!("{}: {why}", m.title)));
         }
         blocks.extend(m.notes.iter().map(|n| Block::Paragraph(format!("{}: {n}", m.title))));

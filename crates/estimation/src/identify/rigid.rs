@@ -266,7 +266,7 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
         return Err("the inertia comes out negative or without bound: the torque of this record does not accelerate this axis, or \
                     another torque that the model lacks (gravity, a spring, a second inertia) rules it. One that is known goes \
                     into [effects] of the axis file (a weight on a hinge is [effects.gravity]) and is taken off; otherwise look \
-                    at the record (`eixo inspect`), or diagnose it"
+                    at the record (`eixo inspect`, `eixo diagnose`)"
             .to_owned());
     }
     for (i, name) in [(1, "viscous friction"), (2, "dry friction")] {
@@ -274,7 +274,7 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
         if v[i] + 3.0 * s[i] < 0.0 && material {
             return Err(format!(
                 "the {name} comes out negative: something else moves the axis with its motion (gravity, a spring, another drive), \
-                 or torque and position are not of the same instant. Look at the record (`eixo inspect`), or diagnose it"
+                 or torque and position are not of the same instant. Look at the record (`eixo inspect`, `eixo diagnose`)"
             ));
         }
     }
