@@ -5,7 +5,9 @@
 
 use std::path::Path;
 use std::process::Command;
-use std::time::{Duration, Instant};
+
+#[path = "common/program.rs"]
+mod program;
 
 fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -31,21 +33,6 @@ fn main() {
 }
 
 fn row(name: &str, runs: usize, fmu: &Path, args: &[&str]) {
-    let mut times: Vec<Duration> = (0..runs)
-        .map(|_| {
-            let begin = Instant::now();
-            let mut command = Command::new(env!("CARGO_BIN_EXE_eixo"));
-            let output = command.args(["validate", "--strict"]).arg(fmu).args(args).output().expect("eixo validate");
-            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
-            begin.elapsed()
-        })
-        .collect();
-    times.sort();
-    let ms = |at: usize| times[at].as_secs_f64() * 1e3;
-    println!(
-        "{name:<14} min {:8.1} ms   median {:8.1} ms   max {:8.1} ms   ({runs} runs)",
-        ms(0),
-        ms(runs / 2),
-        ms(runs - 1)
-    );
+    let fmu = fmu.display().to_string();
+    program::row(name, runs, &[&["validate", "--strict", &fmu], args].concat());
 }
