@@ -21,8 +21,8 @@ fn main() {
     let (csv, parquet, axis) = (at("log.csv"), at("log.parquet"), at("axis.toml"));
     let columns = record();
     let mut text = String::from("time [s],T [N.m],theta1 [rad],theta2 [rad]\n");
-    for k in 0..ROWS {
-        let [time, torque, theta1, theta2] = [0, 1, 2, 3].map(|c: usize| columns[c][k]);
+    let [time, torque, theta1, theta2] = &columns;
+    for (((time, torque), theta1), theta2) in time.iter().zip(torque).zip(theta1).zip(theta2) {
         writeln!(text, "{time},{torque},{theta1},{theta2}").expect("a row");
     }
     std::fs::write(&csv, text).expect("the log");
