@@ -343,6 +343,25 @@ impl MomentumBalance<'_> {
         right
     }
 
+    /// [`Self::right`] for a motion that is late by `-most` to `most` samples of `dt`, each: from one to the next the phase of a
+    /// line turns by the same angle, so that a line's sines and cross spectra are asked for once.
+    fn rights(&self, dt: f64, most: i32) -> Vec<[f64; 6]> {
+        let mut rights = vec![[0.0; 6]; 2 * most.unsigned_abs() as usize + 1];
+        for &f in self.lines {
+            let terms = self.regressors(f).map(|(column, factor)| factor.conj() * self.s.of(column, T, f));
+            let angle = self.s.omega(f) * dt;
+            let turn = Complex::from_polar(1.0, -angle);
+            let mut phase = Complex::from_polar(1.0, angle * f64::from(most));
+            for right in &mut rights {
+                for (r, term) in right.iter_mut().zip(&terms) {
+                    *r += term.re * phase.re - term.im * phase.im;
+                }
+                phase *= turn;
+            }
+        }
+        rights
+    }
+
     fn solve(&self, gram: &[Vec<f64>], right: &[f64]) -> Found {
         self.within(gram, right, [[0.0, f64::INFINITY]; 2])
     }
@@ -414,8 +433,7 @@ fn balance(
     let gram = balance.gram();
     let at = |late: i32| balance.right(f64::from(late) * input.dt);
     let mut shares: Vec<(i32, f64, f64)> = Vec::new();
-    for late in -DELAYS..=DELAYS {
-        let right = at(late);
+    for (late, right) in (-DELAYS..=DELAYS).zip(balance.rights(input.dt, DELAYS)) {
         shares.push((late, balance.solve(&gram, &right).share, balance.solve(&gram, &negative(&right)).share));
     }
     let best = |of: &dyn Fn(&(i32, f64, f64)) -> f64, within: i32| {
