@@ -15,6 +15,7 @@ use std::f64::consts::TAU;
 use crate::axis::{Axis, Parameters, Scheme, State, Structure, substeps};
 use crate::drive::{Drive, Gains};
 use crate::effects::{Ramp, SensorHistory, Settings, TorqueHistory};
+use crate::trace::number;
 
 /// Which encoder closes the position loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -83,7 +84,7 @@ pub struct Path {
 #[non_exhaustive]
 pub enum CircleError {
     /// A number that must be positive.
-    #[error("{name} is {value}: it must be finite and greater than zero")]
+    #[error("{name} is {}: it must be finite and greater than zero", number(*value))]
     NotPositive {
         /// What.
         name: &'static str,
@@ -95,7 +96,9 @@ pub enum CircleError {
     Radius(f64),
     /// Too few or too many samples on the circle.
     #[error(
-        "one turn takes {samples} samples at dt = {dt} s; choose radius, feed and dt so that it takes {least} to {most}"
+        "one turn takes {} samples at dt = {} s; choose radius, feed and dt so that it takes {least} to {most}",
+        number(*samples),
+        number(*dt)
     )]
     Samples {
         /// Samples of a turn.

@@ -270,8 +270,8 @@ fn finish(mut record: Record, output: &Path, noise: &[Noise], seed: u64) -> anyh
         "{}: {} rows, {} s to {} s, {} columns",
         output.display(),
         record.time.len(),
-        record.time.first().copied().unwrap_or(0.0),
-        record.time.last().copied().unwrap_or(0.0),
+        crate::trace::number(record.time.first().copied().unwrap_or(0.0)),
+        crate::trace::number(record.time.last().copied().unwrap_or(0.0)),
         columns.len()
     )?;
     Ok(ExitCode::SUCCESS)

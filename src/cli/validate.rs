@@ -17,7 +17,7 @@ use crate::fmu::reference::{Wanted, compare};
 use crate::fmu::rules::Outcome;
 use crate::fmu::validation::{Options, validate};
 use crate::report::{html, validation as page};
-use crate::trace::{Hold, write_text};
+use crate::trace::{Hold, number, write_text};
 
 use super::FINDINGS;
 
@@ -135,8 +135,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let fmu = args.fmu.as_ref().context("no FMU given")?;
     let inputs = [Some(fmu), args.reference.as_ref(), args.input.as_ref()].into_iter().flatten().map(PathBuf::as_path);
     outputs::check(inputs, [args.output.as_ref(), args.report.as_ref()])?;
-    anyhow::ensure!(args.timeout > 0.0 && args.timeout < 1e6, "--timeout {}: must be above 0", args.timeout);
-    anyhow::ensure!(args.budget > 0.0 && args.budget < 1e6, "--budget {}: must be above 0", args.budget);
+    for (name, value) in [("--timeout", args.timeout), ("--budget", args.budget)] {
+        anyhow::ensure!(value > 0.0 && value < 1e6, "{name} {}: must be above 0 and below 1e6 (s)", number(value));
+    }
     for path in &args.allow {
         path.symlink_metadata().with_context(|| format!("--allow {}", path.display()))?;
     }

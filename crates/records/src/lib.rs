@@ -57,7 +57,7 @@ pub use sampling::{Grid, Sampling, grid};
 pub use signal::{Motion, Quantity, Signal};
 pub use table::{Header, Table};
 pub use units::Unit;
-pub use write::{append_number, writable, write_columns, write_csv, write_text};
+pub use write::{append_number, number, writable, write_columns, write_csv, write_text};
 
 /// What is said of a Parquet file by a build without the feature `parquet`.
 pub const WITHOUT_PARQUET: &str = "this eixo was built without Parquet; build it with `--features parquet`, or use CSV";

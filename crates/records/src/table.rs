@@ -54,7 +54,11 @@ impl Kind {
         if first.starts_with(b"\x89HDF\r\n\x1a\n") || first.starts_with(b"MATLAB 7.3") {
             return Ok(Self::Hdf5);
         }
-        // The version and the mark of the byte order: MAT-File Format (MathWorks), table 1-1.
+        // The version and the mark of the byte order: MAT-File Format (MathWorks), table 1-1. Version 2 is HDF5 behind a head of
+        // 512 bytes, whatever the text says: MATLAB 7.0 to 7.2 wrote it, too.
+        if first.len() == 128 && matches!(&first[124..], [0, 2, b'I', b'M'] | [2, 0, b'M', b'I']) {
+            return Ok(Self::Hdf5);
+        }
         if first.len() == 128 && matches!(&first[124..], [0, 1, b'I', b'M'] | [1, 0, b'M', b'I']) {
             return Ok(Self::Mat);
         }

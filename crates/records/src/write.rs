@@ -65,6 +65,14 @@ pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), Trac
     write_text(path, text.as_bytes())
 }
 
+/// The shortest text that reads back as the same number, with its power of ten where it is far from one.
+#[must_use]
+pub fn number(value: f64) -> String {
+    let mut text = String::new();
+    append_number(&mut text, value);
+    text
+}
+
 /// Appends the shortest text that reads back as the same number.
 pub fn append_number(text: &mut String, value: f64) {
     use std::fmt::Write as _;

@@ -8,7 +8,7 @@ mod values;
 
 use super::description::{BaseType, Causality, Description, Fmi};
 use super::host::{Fmu, HostError, Instance, InstanceOptions, Layout, Status, needs_event_mode};
-use crate::trace::{Hold, Motion, Signal, Trace, TraceError};
+use crate::trace::{Hold, Motion, Signal, Trace, TraceError, number};
 
 pub use inputs::Inputs;
 use values::{Ports, Which, apply};
@@ -111,7 +111,7 @@ pub enum SimulateError {
     #[error("neither the input nor the FMU's default experiment gives an end: give --stop")]
     NoStop,
     /// An experiment that cannot be run.
-    #[error("from {start} s to {stop} s in steps of {step} s: {why}")]
+    #[error("from {} s to {} s in steps of {} s: {why}", number(*start), number(*stop), number(*step))]
     Experiment {
         /// Start, s.
         start: f64,
