@@ -7,9 +7,12 @@
 //! none, what its guides carry: the sum of the weights and springs on it (gravity, external spring, unbalance, loads). It
 //! is that of the same instant, solved with the step; at rest the level is that of the mean load over the step.
 
+use std::marker::PhantomData;
+
 use super::family::Family;
-use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
+use super::info::{EffectInfo, ParameterInfo, Scale, Start, Variant};
 use super::shapes::{DryFriction, Level, Slip};
+use super::side::Side;
 use crate::scalar::Scalar;
 
 const PARAMETERS: &[ParameterInfo] = &[
@@ -38,85 +41,56 @@ const VARIANTS: &[Variant] = &[
 ];
 /// The parameter `load`.
 const LOAD: usize = 4;
-const EQUATION: &str = "f = sgn(v)*(level + load*|t|)*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2)), t = \
-                        K*(theta1 - theta2) + B*(w1 - w2), rigid: weights and springs; |f| <= level*... at v = 0";
-const REFERENCE: &str = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994";
 
-#[inline]
-fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
-    let factor = p[3] * slip.direction + 1.0;
-    let loaded = p[LOAD].re() != 0.0;
-    let level = if loaded || S::HAS_DERIVATIVES { p[0] + p[LOAD] * slip.load } else { p[0] } * factor;
-    let per_load = if loaded { p[LOAD].re() * factor.re() } else { 0.0 };
-    if p[1].re() == 0.0 && (level.re() == 0.0 || !S::HAS_DERIVATIVES) {
-        return Level { per_load, constant: !loaded, ..Level::constant(level) };
-    }
-    let ratio = slip.speed / p[2];
-    let peak = p[1] * (-ratio.squared()).exp();
-    let per_speed = -2.0 * ratio.re() / p[2].re() * peak.re() * level.re();
-    Level {
-        level: level * (peak + 1.0),
-        per_speed,
-        per_position: 0.0,
-        per_load: per_load * (peak.re() + 1.0),
-        constant: !loaded && p[1].re() == 0.0,
-    }
-}
+/// Coulomb friction of one side.
+pub struct Coulomb<I>(PhantomData<I>);
 
-/// Coulomb friction on the motor side.
-pub struct CoulombMotor;
-
-impl DryFriction for CoulombMotor {
+impl<I: Side> DryFriction for Coulomb<I> {
     const INFO: EffectInfo = EffectInfo {
-        id: "coulomb_motor",
-        place: Place::Motor,
+        id: ["coulomb_motor", "coulomb_table"][I::INDEX],
+        place: I::PLACE,
         family: Family::DryFriction,
-        title: "Coulomb friction of motor and screw, with exact stick and slip",
-        equation: EQUATION,
-        signature: "r1 is a square of the sign of omega1; odd lines; its share falls as the amplitude grows",
-        reference: REFERENCE,
+        title: [
+            "Coulomb friction of motor and screw, with exact stick and slip",
+            "Coulomb friction of table and guideways, with exact stick and slip",
+        ][I::INDEX],
+        equation: "f = sgn(v)*(level + load*|t|)*(1 + asymmetry*sgn(v))*(1 + peak*exp(-(v/speed)^2)), t = \
+                   K*(theta1 - theta2) + B*(w1 - w2), rigid: weights and springs; |f| <= level*... at v = 0",
+        signature: [
+            "r1 is a square of the sign of omega1; odd lines; its share falls as the amplitude grows",
+            "r2 is a square of the sign of omega2; odd lines; its share falls as the amplitude grows",
+        ][I::INDEX],
+        reference: "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
         parameters: PARAMETERS,
         memory: 0,
         named: true,
-        textbook: true,
+        textbook: [true, false][I::INDEX],
         odds: 1.0,
         bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
-        example: &[0.006, 0.4, 2.0, 0.1, 0.2],
+        example: [&[0.006, 0.4, 2.0, 0.1, 0.2], &[0.001, 0.4, 2.0, 0.1, 0.2]][I::INDEX],
         variants: VARIANTS,
     };
 
     const LOAD: Option<usize> = Some(LOAD);
 
+    #[inline]
     fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
-        level(p, slip)
-    }
-}
-
-/// Coulomb friction on the table side.
-pub struct CoulombTable;
-
-impl DryFriction for CoulombTable {
-    const INFO: EffectInfo = EffectInfo {
-        id: "coulomb_table",
-        place: Place::Table,
-        family: Family::DryFriction,
-        title: "Coulomb friction of table and guideways, with exact stick and slip",
-        equation: EQUATION,
-        signature: "r2 is a square of the sign of omega2; odd lines; its share falls as the amplitude grows",
-        reference: REFERENCE,
-        parameters: PARAMETERS,
-        memory: 0,
-        named: true,
-        textbook: false,
-        odds: 1.0,
-        bounds: |p, x| p[0] <= x.torque && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest),
-        example: &[0.001, 0.4, 2.0, 0.1, 0.2],
-        variants: VARIANTS,
-    };
-
-    const LOAD: Option<usize> = Some(LOAD);
-
-    fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
-        level(p, slip)
+        let factor = p[3] * slip.direction + 1.0;
+        let loaded = p[LOAD].re() != 0.0;
+        let level = if loaded || S::HAS_DERIVATIVES { p[0] + p[LOAD] * slip.load } else { p[0] } * factor;
+        let per_load = if loaded { p[LOAD].re() * factor.re() } else { 0.0 };
+        if p[1].re() == 0.0 && (level.re() == 0.0 || !S::HAS_DERIVATIVES) {
+            return Level { per_load, constant: !loaded, ..Level::constant(level) };
+        }
+        let ratio = slip.speed / p[2];
+        let peak = p[1] * (-ratio.squared()).exp();
+        let per_speed = -2.0 * ratio.re() / p[2].re() * peak.re() * level.re();
+        Level {
+            level: level * (peak + 1.0),
+            per_speed,
+            per_position: 0.0,
+            per_load: per_load * (peak.re() + 1.0),
+            constant: !loaded && p[1].re() == 0.0,
+        }
     }
 }

@@ -1,66 +1,39 @@
 //! A constant torque: gravity on a tilted axis, the offset of an amplifier. `f = torque`.
 
+use std::marker::PhantomData;
+
 use super::family::Family;
-use super::info::{EffectInfo, ParameterInfo, Place, Variant};
+use super::info::{EffectInfo, ParameterInfo, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use super::side::Side;
 use crate::scalar::Scalar;
 
-const PARAMETERS: &[ParameterInfo] =
-    &[ParameterInfo::size("torque", "N.m", -1e6, 1e6, "Torque that resists positive motion").nominal(1e-2)];
-const VARIANTS: &[Variant] = &[Variant { name: "", free: &[0] }];
-const EQUATION: &str = "f = torque";
-const REFERENCE: &str = "Paper, section 2: T = Tm - Tc";
+/// Constant load of one side.
+pub struct Load<I>(PhantomData<I>);
 
-/// Constant load on the motor side.
-pub struct LoadMotor;
-
-impl Force for LoadMotor {
+impl<I: Side> Force for Load<I> {
     const INFO: EffectInfo = EffectInfo {
-        id: "load_motor",
-        place: Place::Motor,
+        id: ["load_motor", "load_table"][I::INDEX],
+        place: I::PLACE,
         family: Family::LoadTorque,
-        title: "Constant torque on the motor: amplifier offset, weight",
-        equation: EQUATION,
-        signature: "r1 has a mean; only the line at zero frequency",
-        reference: REFERENCE,
-        parameters: PARAMETERS,
+        title: [
+            "Constant torque on the motor: amplifier offset, weight",
+            "Constant torque on the table: gravity on a tilted axis",
+        ][I::INDEX],
+        equation: "f = torque",
+        signature: ["r1 has a mean; only the line at zero frequency", "r2 has a mean; only the line at zero frequency"]
+            [I::INDEX],
+        reference: "Paper, section 2: T = Tm - Tc",
+        parameters: &[
+            ParameterInfo::size("torque", "N.m", -1e6, 1e6, "Torque that resists positive motion").nominal(1e-2)
+        ],
         memory: 0,
         named: true,
-        textbook: true,
+        textbook: [true, false][I::INDEX],
         odds: 1.0,
         bounds: |_, _| true,
         example: &[3e-3],
-        variants: VARIANTS,
-    };
-
-    const CARRIED: bool = true;
-
-    #[inline]
-    fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
-        Reaction::given(p[0])
-    }
-}
-
-/// Constant load on the table side.
-pub struct LoadTable;
-
-impl Force for LoadTable {
-    const INFO: EffectInfo = EffectInfo {
-        id: "load_table",
-        place: Place::Table,
-        family: Family::LoadTorque,
-        title: "Constant torque on the table: gravity on a tilted axis",
-        equation: EQUATION,
-        signature: "r2 has a mean; only the line at zero frequency",
-        reference: REFERENCE,
-        parameters: PARAMETERS,
-        memory: 0,
-        named: true,
-        textbook: false,
-        odds: 1.0,
-        bounds: |_, _| true,
-        example: &[3e-3],
-        variants: VARIANTS,
+        variants: &[Variant { name: "", free: &[0] }],
     };
 
     const CARRIED: bool = true;

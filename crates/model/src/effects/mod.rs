@@ -16,6 +16,7 @@ mod law;
 mod sensor;
 mod settings;
 mod shapes;
+mod side;
 mod transmitted;
 
 pub use extent::Extent;
@@ -31,6 +32,8 @@ pub(crate) use shapes::Modes;
 pub use shapes::{
     Base, Coordinate, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip,
 };
+
+use side::{Motor, Table};
 
 use crate::scalar::Scalar;
 
@@ -245,21 +248,21 @@ macro_rules! effects {
 }
 
 effects! {
-    dry CoulombMotor = coulomb::CoulombMotor, mod coulomb;
-    dry CoulombTable = coulomb::CoulombTable;
-    force PreslidingMotor = presliding::PreslidingMotor, mod presliding;
-    force PreslidingTable = presliding::PreslidingTable;
-    force ViscousMotor = viscous::ViscousMotor, mod viscous;
-    force ViscousTable = viscous::ViscousTable;
-    force LoadMotor = load::LoadMotor, mod load;
-    force LoadTable = load::LoadTable;
+    dry CoulombMotor = coulomb::Coulomb<Motor>, mod coulomb;
+    dry CoulombTable = coulomb::Coulomb<Table>;
+    force PreslidingMotor = presliding::Presliding<Motor>, mod presliding;
+    force PreslidingTable = presliding::Presliding<Table>;
+    force ViscousMotor = viscous::Viscous<Motor>, mod viscous;
+    force ViscousTable = viscous::Viscous<Table>;
+    force LoadMotor = load::Load<Motor>, mod load;
+    force LoadTable = load::Load<Table>;
     force TorqueRipple = ripple::TorqueRipple, mod ripple;
     force Backlash = backlash::Backlash, mod backlash;
     force CubicStiffness = cubic_stiffness::CubicStiffness, mod cubic_stiffness;
     force CouplingHysteresis = coupling_hysteresis::CouplingHysteresis, mod coupling_hysteresis;
     force StiffnessDrift = drift::StiffnessDrift, mod drift;
     dry FrictionDrift = drift::FrictionDrift;
-    force FlexibleMode = flexible_mode::FlexibleMode, mod flexible_mode;
+    force FlexibleMode = flexible_mode::Mode<Table>, mod flexible_mode;
     force Disturbance = disturbance::Disturbance, mod disturbance;
     force Unbalance = ripple::Unbalance;
     force QuadraticDrag = quadratic_drag::QuadraticDrag, mod quadratic_drag;
@@ -275,6 +278,6 @@ effects! {
     force ExternalSpring = external_spring::ExternalSpring, mod external_spring;
     input DeadZone = dead_zone::DeadZone, mod dead_zone;
     dry PositionFriction = position_friction::PositionFriction, mod position_friction;
-    force MotorMode = flexible_mode::MotorMode;
+    force MotorMode = flexible_mode::Mode<Motor>;
     sensor Latch = latch::Latch, mod latch;
 }
