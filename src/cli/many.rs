@@ -150,7 +150,7 @@ fn progress(traces: u64) -> ProgressBar {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new(traces);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed}, {eta} to go  {wide_msg}") {
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos} of {len}, {elapsed}, {eta} left  {wide_msg}") {
         bar.set_style(style);
     }
     bar.enable_steady_tick(Duration::from_millis(250));

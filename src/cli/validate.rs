@@ -158,7 +158,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None,
         if super::stdout::is_quiet() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() },
     );
-    bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")?);
+    bar.set_style(ProgressStyle::with_template("{bar:30} {pos} of {len} rules, {eta} left  {msg}")?);
     isolation::adopt_orphans();
     let report = validate(fmu, &options, &|rule, total| {
         bar.set_length(total as u64);

@@ -116,6 +116,26 @@ pub(super) fn torque_unit(motion: Motion) -> &'static str {
     Signal::T.unit(motion)
 }
 
+/// The steps of a work whose number is known: each is told as "n of N".
+pub(super) struct Steps<'a> {
+    done: usize,
+    all: usize,
+    progress: &'a mut dyn FnMut(&str),
+}
+
+impl<'a> Steps<'a> {
+    /// `all` steps to come, told to `progress`.
+    pub(super) fn new(all: usize, progress: &'a mut dyn FnMut(&str)) -> Self {
+        Self { done: 0, all, progress }
+    }
+
+    /// The next one begins.
+    pub(super) fn next(&mut self, what: &str) {
+        self.done += 1;
+        (self.progress)(&format!("{} of {}: {what}", self.done, self.all));
+    }
+}
+
 /// Identifies the machine from a trace. `file` names the trace in the result; `progress` hears what is being done.
 ///
 /// # Errors
@@ -229,20 +249,22 @@ pub fn identify_joined(
         oe: None,
     };
     let mut methods = Vec::new();
-    for method in Method::ALL {
-        if !request.methods.contains(&method) || (method == Method::Frequency && measured.is_none()) {
-            continue;
-        }
-        progress(method.title());
+    let wanted = Method::ALL
+        .into_iter()
+        .filter(|m| request.methods.contains(m) && (*m != Method::Frequency || measured.is_some()))
+        .collect::<Vec<_>>();
+    let mut steps = Steps::new(wanted.len() + 2, progress);
+    for method in wanted {
+        steps.next(method.title());
         methods.push(run.method(method));
     }
-    progress("fits of the estimates");
+    steps.next("fits of the estimates");
     let scheme = run.scheme();
     for result in &mut methods {
         run.assess(result, scheme);
     }
     let recommended = recommend(&methods, record.omega.is_some());
-    progress("held-out part");
+    steps.next("held-out part");
     let held_out =
         recommended.as_ref().filter(|r| methods[r.method].method != Method::Frequency.name()).and_then(|r| {
             let name = methods[r.method].method;

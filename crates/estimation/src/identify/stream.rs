@@ -16,7 +16,7 @@ use super::parameters::Estimated;
 use super::record::{DIFFERENT_ZEROS, Record};
 use super::regression::{LeastSquares, Moments, Recursion, RegressionError, Scales, Sums};
 use super::result::{History, Identification, MethodResult, Recommendation, SCHEMA, Series, Thinned, TraceSummary};
-use super::run::{DIFFERENT_SPEED, Method, Request, different_speed, hold_name};
+use super::run::{DIFFERENT_SPEED, Method, Request, Steps, different_speed, hold_name};
 use crate::trace::stream::Stream;
 use crate::trace::{Machine, Signal, Trace, TraceError};
 
@@ -151,12 +151,14 @@ pub fn identify(
 ) -> Result<Identification, TraceError> {
     let motion = machine.signals.motion;
     let mut warnings = stream.warnings.clone();
-    progress("zeros and speeds");
+    let wanted = METHODS.into_iter().filter(|m| request.methods.contains(m)).collect::<Vec<_>>();
+    let mut steps = Steps::new(2 + wanted.iter().filter(|m| **m != Method::Ls).count(), progress);
+    steps.next("zeros and speeds");
     let (frame, notes) = survey(stream, machine)?;
     warnings.extend(notes);
     let n = frame.rows();
 
-    progress(Method::Ls.title());
+    steps.next(Method::Ls.title());
     let mut squares = LeastSquares::new(n);
     let mut sums = Sums::default();
     let mut torque = Thinned::new(stream.len());
@@ -170,11 +172,11 @@ pub fn identify(
     })?;
 
     let mut methods = Vec::new();
-    for method in METHODS.into_iter().filter(|m| request.methods.contains(m)) {
-        progress(method.title());
+    for method in wanted {
         let found = if method == Method::Ls {
             squares.rows().map(|rows| (rows.reconcile(), None))
         } else {
+            steps.next(method.title());
             recursive(&frame, &sums, squares.moments(), request)?.map(|(e, h)| (e, Some(h)))
         };
         methods.push(assessed(method, found, machine, request, &frame));
