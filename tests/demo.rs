@@ -12,16 +12,23 @@ fn text(folder: &Path, file: &str) -> String {
 }
 
 #[test]
-fn the_demonstration_ends_in_reports_with_the_papers_figures_and_the_hidden_cause() {
+fn the_demonstration_ends_in_reports_with_the_papers_figures_and_the_hidden_causes() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = eixo_in(folder.path(), &["demo", "-o", "out"]);
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
+    let plain = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("Every method finds the parameters of the FMU again from its trace."), "{said}");
     assert!(
-        said.contains("The model leaves out one thing: Coulomb friction of motor and screw (at the motor)."),
+        plain.contains(
+            "The model leaves out 2 things: play in coupling or nut (at the coupling); Coulomb friction of motor and screw (at the motor)."
+        ),
         "{said}"
     );
+    // What was hidden, and the torque that nothing accounts for.
+    assert!(plain.contains("Beside that no cause explains"), "{said}");
+    let diagnosed = said.find("The model leaves out").expect("the diagnosis");
+    assert!(diagnosed < said.find("Every method finds").expect("the paper's experiment"), "{said}");
     let out = folder.path().join("out");
     let report = text(&out, "report.html");
     // Figures 4 to 13 of the paper.
@@ -59,7 +66,9 @@ fn the_demonstration_ends_in_reports_with_the_papers_figures_and_the_hidden_caus
         assert!(others.iter().all(|o| page.contains(&format!("href=\"{o}\""))), "{others:?}");
     }
     assert!(text(&out, "diagnosis.html").contains("the gap is here"));
-    assert!(text(&out, "circle.html").contains("coulomb_motor on X"));
+    assert!(
+        text(&out, "circle.html").contains("coulomb_motor on X") && text(&out, "circle.html").contains("backlash on X")
+    );
     assert!(std::fs::read(out.join("axis.fmu")).expect("an FMU").starts_with(b"PK"));
 }
 

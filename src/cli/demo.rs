@@ -1,9 +1,9 @@
 //! `eixo demo`: the main job from start to finish on the paper's own experiment.
 //!
-//! The axis is exported as an FMU, excited with a Schroeder signal, simulated through the FMU as any importer would, and
-//! identified from the trace; the report holds the plots of the paper's Figures 4 to 13 and its tables. Then friction is
-//! hidden in the FMU, its noisy positions are diagnosed with a model that knows of no friction, and the circular test
-//! shows what that friction does to a part.
+//! The axis is exported as an FMU. The FMU plays a machine with a worn nut, with friction and with something that no model knows; its
+//! noisy positions are diagnosed with a model of none of them, and the circular test shows what the two causes do to a part.
+//! Then the paper's own experiment: excited with a Schroeder signal, simulated through the FMU as any importer would, and
+//! identified from the trace; the report holds the plots of the paper's Figures 4 to 13 and its tables.
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ use crate::fmu::simulate::{Inputs, Options, Rows, parse_setting};
 use crate::identify::excitation::{Kind, Multisine};
 use crate::identify::run::{Method, Request, identify};
 use crate::identify::tables::reproduce;
-use crate::report::demo::{Findings, linked, report, short};
+use crate::report::demo::{Findings, PLAYED, linked, report, short};
 use crate::report::{Block, Report, diagnose as diagnosis, html, terminal};
 use crate::trace::{Hold, Machine, Motion, Signal, Trace, write_csv, write_text};
 
@@ -94,8 +94,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         lines: LINES,
     };
 
-    let Hidden { said: diagnosis, diagnosis: found, circle } =
-        hidden_friction(&fmu_file, &host, &args.output, dt, &steps)?;
+    let Disagreement { said: disagreement, diagnosis: found, circle } =
+        disagreement(&fmu_file, &host, &args.output, dt, &steps)?;
 
     steps.next("writing the report");
     write_text(&file("identification.json"), &serde_json::to_vec_pretty(&findings.consistent)?)?;
@@ -103,67 +103,74 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.finish();
 
     let layout = super::stdout::layout(super::stdout::WIDTH);
+    out_line!("A machine that disagrees with its model: {PLAYED}\n")?;
+    out!("{}", terminal::blocks(&disagreement, layout))?;
+    out_line!("\nThe paper's experiment, from FMU to parameters:\n")?;
     out!("{}", terminal::blocks(&short(&findings), layout))?;
-    out_line!(
-        "\nFriction hidden in the FMU, its positions measured with noise, diagnosed with a model without friction:\n"
-    )?;
-    out!("{}", terminal::blocks(&diagnosis, layout))?;
     out_line!()?;
     for (name, what) in [
+        ("report.html", "the report: open it in a browser"),
+        ("diagnosis.html", "where the gap lies, what causes it, how far it shrinks"),
+        ("circle.html", "what the two causes do to a circle"),
+        ("machine.csv", "the log of the machine that disagrees"),
+        ("nominal.toml", "the model that knows of no play and no friction"),
         ("axis.fmu", "the axis, for any tool that imports FMI 2.0"),
-        ("excitation.csv", "the torque"),
+        ("excitation.csv", "the torque of the paper's experiment"),
         ("trace.csv", "what the FMU answered"),
         ("identification.json", "the estimates"),
-        ("report.html", "the report: open it in a browser"),
-        ("machine.csv", "what a machine with hidden friction answered"),
-        ("nominal.toml", "the model that knows of no friction"),
-        ("diagnosis.html", "where the gap lies, what causes it, how far it shrinks"),
-        ("circle.html", "what the hidden friction does to a circle"),
     ] {
         out_line!("  {:<40} {what}", file(name).display())?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Friction that is hidden in the FMU, N.m: a tenth of the torque's rms.
-const HIDDEN: f64 = 4e-3;
+/// What is hidden in the FMU: a play of 6.4 um on the table, and a friction of about a tenth of the torque's rms.
+const HIDDEN: [&str; 2] = ["backlash.half_gap=0.01", "coulomb_motor.level=0.004"];
+/// The torque that acts on the motor and is in no log and in no model, such as that of chips or a neighbour: its rms, N.m, and its
+/// correlation time, s.
+const UNKNOWN: (f64, f64) = (6e-4, 0.05);
 /// Noise of the encoders, rad, and the seed that draws it.
 const NOISE: f64 = 1e-4;
 const SEED: u64 = 20_060_718;
 /// Periods of the excitation: the last third of the record is held out.
-const PERIODS: usize = 4;
+const PERIODS: usize = 2;
 
-/// What the hidden friction showed: for the terminal, and the reports of the diagnosis and of the circle.
-struct Hidden {
+/// What the machine that disagrees showed: for the terminal, and the reports of the diagnosis and of the circle.
+struct Disagreement {
     said: Vec<Block>,
     diagnosis: Report,
     circle: Report,
 }
 
-/// Lets the FMU play a machine with friction that the model does not know, and diagnoses it.
-fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) -> anyhow::Result<Hidden> {
+/// Lets the FMU play a machine with causes that the model does not know, and diagnoses it.
+fn disagreement(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) -> anyhow::Result<Disagreement> {
     let file = |name: &str| folder.join(name);
-    steps.next("simulating a machine with hidden friction");
+    let mut draws = ChaCha8Rng::seed_from_u64(SEED);
+    let mut draw = || -> f64 { StandardNormal.sample(&mut draws) };
+    steps.next("simulating a machine with hidden trouble");
     let period = Multisine::new(Kind::Schroeder, SAMPLES, 1, LINES, RMS, 0.0, 0)?.period();
     let torque: Vec<f64> = period.iter().copied().cycle().take(PERIODS * SAMPLES).collect();
     let torque = Trace::new(0.0, dt, Hold::Zoh).with(Signal::T, torque)?;
-    let setting = parse_setting(&format!("coulomb_motor.level={HIDDEN}")).map_err(anyhow::Error::msg)?;
-    let options = Options { hold: Hold::Zoh, rows: Rows::InputsSet, settings: vec![setting], ..Options::default() };
-    let run = simulate(fmu, &Inputs::of(&torque)?, &options, host)?.trace(Hold::Zoh)?;
+    let settings = HIDDEN.iter().map(|s| parse_setting(s)).collect::<Result<_, _>>().map_err(anyhow::Error::msg)?;
+    let options = Options { hold: Hold::Zoh, rows: Rows::InputsSet, settings, ..Options::default() };
+    // White noise behind a lag of first order.
+    let (rms, time) = UNKNOWN;
+    let (kept, mut unknown) = ((-dt / time).exp(), 0.0);
+    let acting = torque.require(Signal::T)?.iter().map(|t| {
+        unknown = kept * unknown + rms * (1.0 - kept * kept).sqrt() * draw();
+        t + unknown
+    });
+    let acting = Trace::new(0.0, dt, Hold::Zoh).with(Signal::T, acting.collect())?;
+    let run = simulate(fmu, &Inputs::of(&acting)?, &options, host)?.trace(Hold::Zoh)?;
     let mut log = torque;
-    let mut draws = ChaCha8Rng::seed_from_u64(SEED);
     for signal in [Signal::Theta1, Signal::Theta2] {
-        let noisy = run.require(signal)?.iter().map(|v| {
-            let draw: f64 = StandardNormal.sample(&mut draws);
-            v + NOISE * draw
-        });
-        log.set(signal, noisy.collect())?;
+        log.set(signal, run.require(signal)?.iter().map(|v| v + NOISE * draw()).collect())?;
     }
     write_csv(&file("machine.csv"), &log, Motion::Rotary)?;
     // The data sheet is off by a few per cent, as data sheets are.
     let paper = Parameters::PAPER;
     let parameters = Parameters { i1: 0.97 * paper.i1, i2: 1.04 * paper.i2, ..paper };
-    let mut machine = Machine { name: "a machine with hidden friction".to_owned(), parameters, ..Machine::default() };
+    let mut machine = Machine { name: "a machine with hidden trouble".to_owned(), parameters, ..Machine::default() };
     write_text(&file("nominal.toml"), machine.to_toml().as_bytes())?;
 
     let super::diagnose::Recorded { record, noise, .. } =
@@ -198,7 +205,7 @@ fn hidden_friction(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Step
     write_text(&file("circle.html"), html::page(&linked(drawn.clone(), "circle.html")).as_bytes())?;
     let mut blocks = diagnosis::short(&findings);
     blocks.extend(crate::report::circle::short(&circle).into_iter().take(1));
-    Ok(Hidden { said: blocks, diagnosis: report, circle: drawn })
+    Ok(Disagreement { said: blocks, diagnosis: report, circle: drawn })
 }
 
 /// Progress on the terminal: a line that says what is being done.

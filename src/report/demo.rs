@@ -46,6 +46,16 @@ pub fn linked(mut page: Report, own: &str) -> Report {
     page
 }
 
+/// What the demonstration's machine is, and what it is diagnosed with.
+pub const PLAYED: &str = "an FMU plays one with play in its nut, with friction, and with a torque that nothing accounts for; its log, \
+                          with noise, is diagnosed with a model that knows of none of them.";
+
+/// With a capital letter.
+fn sentence(text: &str) -> String {
+    let (first, rest) = text.split_at(1);
+    first.to_uppercase() + rest
+}
+
 /// Sections of the diagnosis that say where the gap lies, what causes it and how far it shrinks.
 const DIAGNOSIS: usize = 3;
 
@@ -54,9 +64,7 @@ const DIAGNOSIS: usize = 3;
 pub fn report(f: &Findings, diagnosis: &Report, circle: &Report) -> Report {
     let mut sections: Vec<Section> = diagnosis.sections.iter().take(DIAGNOSIS).cloned().collect();
     if let Some(first) = sections.first_mut() {
-        let what = "An FMU with hidden friction plays a machine; its noisy positions are diagnosed with a model that knows of no \
-                    friction.";
-        first.blocks.insert(0, Block::Paragraph(what.to_owned()));
+        first.blocks.insert(0, Block::Paragraph(sentence(PLAYED)));
     }
     if let Some(first) = circle.sections.first() {
         sections.push(Section::new("What it does to a circle", first.blocks.clone()));
@@ -143,8 +151,8 @@ fn worst(m: &MethodResult) -> Option<f64> {
 
 fn verdict(f: &Findings) -> Verdict {
     let of = |found: &Identification| -> Vec<(String, Cell)> {
-        let judged = found.methods.iter().filter_map(|m| Some((m.method.to_uppercase(), Cell::Percent(worst(m)?))));
-        judged.collect()
+        let errors = found.methods.iter().filter_map(|m| Some((m.method.to_uppercase(), Cell::Percent(worst(m)?))));
+        errors.collect()
     };
     let largest = f.consistent.methods.iter().filter_map(worst).reduce(f64::max);
     let sentence = match largest {
