@@ -170,6 +170,7 @@ fn trace(
         if let Some(word) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
             warnings.push(word);
         }
+        warnings.extend(no_torque_constant(table, column, *signal, mapping.motion));
         let held = matches!(signal, Signal::T | Signal::Command) && mapping.hold == Hold::Zoh;
         if let Some(time) = stamps {
             values = match *resampling {
@@ -186,6 +187,23 @@ fn trace(
         return Err(no_signal(table));
     }
     Ok(trace)
+}
+
+/// That a current, a voltage or a percentage stands for the torque one to one: then no unit of the results is what it is called.
+fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: Motion) -> Option<String> {
+    let header = &table.headers[table.position(&column.column)?];
+    let written = header.unit.as_deref().or(column.unit.as_deref())?;
+    let unit = Unit::parse(written)?;
+    #[allow(clippy::float_cmp, reason = "the scale that nobody gave")]
+    let plain = column.scale == 1.0;
+    (signal == Signal::T && unit.quantity == Quantity::Drive && plain).then(|| {
+        let (torque, inertia) = (motion.unit("N.m"), motion.unit("kg.m2"));
+        format!(
+            "{}: column {} is in {written}, and no torque constant is given: one A, V or % counts as one {torque}, and every {torque} and \
+             {inertia} that is said of this record is off by the torque constant; give it as scale of T in [signals]",
+            table.file, column.column,
+        )
+    })
 }
 
 /// The signals that the file has, and where.
@@ -373,6 +391,19 @@ mod tests {
         assert!((trace.get(Signal::T).unwrap()[3] - 0.25).abs() < 1e-15);
         assert!((trace.get(Signal::Theta1).unwrap()[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
         assert!((trace.get(Signal::X2).unwrap()[7] - 7e-6).abs() < 1e-18);
+    }
+
+    #[test]
+    fn a_current_that_stands_for_the_torque_is_told() {
+        let table = csv("time [s],current [A]", |k| format!("{k},1"));
+        let warnings = |scale: f64| {
+            let column = Column { scale, ..Column::named("current") };
+            let mapping = Mapping { signals: vec![(Signal::T, column)], ..Mapping::default() };
+            from_table(&table, &mapping).unwrap().warnings
+        };
+        let said = warnings(1.0).join("\n");
+        assert!(said.contains("column current is in A, and no torque constant is given"), "{said}");
+        assert_eq!(warnings(0.5), Vec::<String>::new());
     }
 
     #[test]
