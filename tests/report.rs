@@ -127,7 +127,7 @@ fn figures() -> Vec<Figure> {
                             dash: Dash::Solid,
                         },
                     ],
-                    reach: None,
+                    full_scale: None,
                     radius: Some(0.05),
                     ring: Some(Ring { centre: (1e-6, 0.0), low: -1e-6, high: 5e-6, colour: Colour::Vermillion }),
                 }

@@ -99,7 +99,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let axes = [x, y];
         let known = (args.axis.is_some() || args.y.is_some()).then_some(&axes);
         let found = super::circle_measured::findings(&args.measured, &args.directions, &args.test, known)?;
-        return tell(
+        return write_out(
             &args,
             || ballbar::report(&found),
             || super::circle_json::measured(&found),
@@ -117,11 +117,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let (Some(file), Some(Run { paths: [path, _], .. })) = (&args.output, findings.runs.last()) {
         write_columns(file, &[("x [m]", &path.x), ("y [m]", &path.y)])?;
     }
-    tell(&args, || report(&findings), || super::circle_json::simulated(&findings), &short(&findings))
+    write_out(&args, || report(&findings), || super::circle_json::simulated(&findings), &short(&findings))
 }
 
 /// Writes what was asked for and prints the short form.
-fn tell(
+fn write_out(
     args: &Args,
     page: impl Fn() -> Report,
     json: impl Fn() -> serde_json::Value,

@@ -176,7 +176,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let trace = args.traces.first().context("no trace given")?;
     let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
     let steps = args.progress.steps();
-    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| steps.say(what))?;
+    let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| steps.step(what))?;
     steps.end();
     diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
     let findings = diagnosed.findings();

@@ -51,7 +51,7 @@ impl Progress {
 
 impl Steps {
     /// The next step.
-    pub fn say(&self, what: &str) {
+    pub fn step(&self, what: &str) {
         if self.lines {
             eprintln!("{PROGRESS}{what}");
         }

@@ -62,14 +62,14 @@ fn counted(n: usize, what: &str) -> String {
 }
 
 /// The first fact of a row: its verdict.
-fn answer<'a>(p: &'a Placed) -> &'a str {
+fn verdict_of<'a>(p: &'a Placed) -> &'a str {
     p.row.facts.first().and_then(Value::as_str).unwrap_or(if p.row.done { "" } else { "failed" })
 }
 
 fn verdict(rows: &[Placed], trends: &[Trend]) -> Verdict {
-    let mut answers: BTreeMap<&str, u64> = BTreeMap::new();
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for p in rows {
-        *answers.entry(answer(p)).or_default() += 1;
+        *counts.entry(verdict_of(p)).or_default() += 1;
     }
     let failed = rows.iter().filter(|p| !p.row.done).count();
     let out: Vec<String> =
@@ -86,7 +86,7 @@ fn verdict(rows: &[Placed], trends: &[Trend]) -> Verdict {
         let more = if out.len() > 6 { format!(" and {} more", out.len() - 6) } else { String::new() };
         format!("Beyond four standard errors of their scatter: {}{more}.", out[..out.len().min(6)].join(", "))
     };
-    let figures = answers.into_iter().map(|(name, n)| (words(name).to_owned(), Cell::Count(n))).collect();
+    let figures = counts.into_iter().map(|(name, n)| (wording(name).to_owned(), Cell::Count(n))).collect();
     Verdict { tone, sentence, detail, figures }
 }
 
@@ -95,8 +95,8 @@ fn drifting(n: usize) -> String {
 }
 
 /// A verdict as people say it.
-fn words(answer: &str) -> &str {
-    match answer {
+fn wording(verdict: &str) -> &str {
+    match verdict {
         "no_gap" => "no gap",
         "effect" => "an effect",
         "explained" => "explained down to the noise",
@@ -114,7 +114,7 @@ fn cell(name: &str, value: Option<&Value>) -> Cell {
             || matches!(name, "probability" | "noise_floor" | "fit")
     };
     match value {
-        Some(Value::String(text)) => Cell::text(words(text)),
+        Some(Value::String(text)) => Cell::text(wording(text)),
         Some(v) => v.as_f64().map_or(Cell::Empty, |v| if share(name) { Cell::Percent(v) } else { Cell::number(v) }),
         None => Cell::Empty,
     }

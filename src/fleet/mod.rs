@@ -179,7 +179,7 @@ pub fn run(
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = plan.items.get(at) else { return };
             let row = one(&store, item, work);
-            tell(item, &words(&row));
+            tell(item, &outcome_text(&row));
             if let Ok(mut rows) = rows.lock() {
                 rows.insert(at, row);
             }
@@ -215,7 +215,7 @@ pub fn run(
     Ok(outcome)
 }
 
-fn words(row: &Result<(Row, bool), FleetError>) -> String {
+fn outcome_text(row: &Result<(Row, bool), FleetError>) -> String {
     match row {
         Ok((row, true)) if row.done => "done by an earlier run".to_owned(),
         Ok((row, _)) if row.done => row.facts.first().and_then(Value::as_str).unwrap_or("done").to_owned(),

@@ -279,7 +279,7 @@ fn polar(f: &Findings) -> PolarPlot {
         title: "Radial deviation, magnified".to_owned(),
         unit: "m".to_owned(),
         traces: traces.collect(),
-        reach: None,
+        full_scale: None,
         radius: Some(f.measured.radius),
         ring: None,
     }

@@ -56,7 +56,7 @@ impl Findings {
     }
 
     /// Largest deviation of any run, m: all plots have one scale.
-    fn reach(&self) -> f64 {
+    fn full_scale(&self) -> f64 {
         let all = self.runs.iter().chain(&self.without).flat_map(|r| &r.roundness);
         all.fold(0.0, |m: f64, r| m.max(r.largest.abs()).max(r.smallest.abs()))
     }
@@ -74,7 +74,7 @@ impl Findings {
             title: title.to_owned(),
             unit: "m".into(),
             traces: traces.collect(),
-            reach: Some(self.reach()),
+            full_scale: Some(self.full_scale()),
             radius: Some(radius),
             ring: Some(Ring { centre: r.centre, low: r.low - radius, high: r.high - radius, colour: colours[0] }),
         }

@@ -48,19 +48,19 @@ pub(super) fn line(points: &[Point], width: f64, most: usize) -> Vec<Point> {
         out.extend(keep.into_iter().map(|i| group[i]));
         start = end;
     }
-    let mut reach = 0.5;
+    let mut spacing = 0.5;
     while out.len() > most {
-        reach *= 2.0;
-        out = walk(&out, reach);
+        spacing *= 2.0;
+        out = thinned(&out, spacing);
     }
     out
 }
 
-/// Points no nearer than `reach` to the one kept before; the last one stays.
-fn walk(points: &[Point], reach: f64) -> Vec<Point> {
+/// Points no nearer than `spacing` to the one kept before; the last one stays.
+fn thinned(points: &[Point], spacing: f64) -> Vec<Point> {
     let mut out: Vec<Point> = Vec::new();
     for (i, p) in points.iter().enumerate() {
-        let far = out.last().is_none_or(|q| (p.0 - q.0).hypot(p.1 - q.1) >= reach);
+        let far = out.last().is_none_or(|q| (p.0 - q.0).hypot(p.1 - q.1) >= spacing);
         if far || i + 1 == points.len() {
             out.push(*p);
         }

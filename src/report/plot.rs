@@ -98,7 +98,7 @@ pub(super) fn svg(chart: &Chart, size: Size) -> Markup {
     let sx = |v: f64| w * x.share(v);
     let sy = |v: f64| h * (1.0 - y.share(v));
     // Far outside the plot a coordinate only needs to be far outside.
-    let clamp = |v: f64, reach: f64| if v.is_finite() { v.clamp(-2.0 * reach, 3.0 * reach) } else { v };
+    let clamp = |v: f64, extent: f64| if v.is_finite() { v.clamp(-2.0 * extent, 3.0 * extent) } else { v };
     let place = |s: &Series, ys: &[f64]| -> Vec<Point> {
         s.x.iter().zip(ys).map(|(a, b)| (clamp(sx(*a), w), clamp(sy(*b), h))).collect()
     };

@@ -21,7 +21,7 @@ pub struct PolarPlot {
     /// Traces drawn over one another.
     pub traces: Vec<PolarTrace>,
     /// Deviation at the outer circle; none takes the largest one and a margin.
-    pub reach: Option<f64>,
+    pub full_scale: Option<f64>,
     /// Radius of the commanded circle, in the unit of the deviations: where it is known, the magnification is told.
     pub radius: Option<f64>,
     /// The ring that holds the path.
@@ -73,7 +73,7 @@ pub(super) fn svg(plot: &PolarPlot, size: Size) -> Markup {
         .flat_map(|t| t.deviation.iter())
         .filter(|d| d.is_finite())
         .fold(0.0_f64, |m, d| m.max(d.abs()));
-    let wanted = plot.reach.unwrap_or(largest);
+    let wanted = plot.full_scale.unwrap_or(largest);
     let step = division(if wanted > 0.0 { wanted } else { 1.0 } / 2.0);
     let scale = full * (1.0 - BASE) / (2.0 * step);
     let radius = |d: f64| (full * BASE + scale * d).max(0.0);

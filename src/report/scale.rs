@@ -224,9 +224,9 @@ fn robust(mut values: Vec<f64>) -> (f64, f64) {
     values.sort_by(f64::total_cmp);
     let at = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
     let (q1, q3) = (at(0.25), at(0.75));
-    let reach = 2.0 * (q3 - q1);
-    let low = values[0].max((q1 - reach).min(at(0.02)));
-    let high = values[values.len() - 1].min((q3 + reach).max(at(0.98)));
+    let fence = 2.0 * (q3 - q1);
+    let low = values[0].max((q1 - fence).min(at(0.02)));
+    let high = values[values.len() - 1].min((q3 + fence).max(at(0.98)));
     (low, high)
 }
 

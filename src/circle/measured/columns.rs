@@ -181,8 +181,8 @@ pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, Me
             }
             // A circular test has a radius between a millimetre and some metres.
             None => {
-                let reach = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-                let size = (reach.1 - reach.0).max(reach.1.abs());
+                let range = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+                let size = (range.1 - range.0).max(range.1.abs());
                 if size > 3.0 { 1e-3 } else { 1.0 }
             }
         };

@@ -322,9 +322,9 @@ fn stretches(angle: &[f64], direction: Option<&[f64]>) -> Vec<(usize, usize, boo
     let unwrapped = angles_unwrapped(angle);
     let n = unwrapped.len();
     // The sense over a few points: noise of an angle may step back.
-    let reach = (n / 720).max(1);
+    let half_width = (n / 720).max(1);
     let sense = |k: usize| {
-        let (a, b) = (k.saturating_sub(reach), (k + reach).min(n - 1));
+        let (a, b) = (k.saturating_sub(half_width), (k + half_width).min(n - 1));
         unwrapped[b] - unwrapped[a]
     };
     let mut out = Vec::new();

@@ -265,22 +265,22 @@ pub fn analyse(turns: &[Turn], radius: f64, feed: Option<f64>) -> Option<Analysi
         }
         fit = with;
         tones.push(tone);
-        settle(&all, &keep, &mut fit, &mut tones, &start, turns.len());
+        refine_tones(&all, &keep, &mut fit, &mut tones, &start, turns.len());
     }
     let trace = Trace { all, turns, radius, feed, fit, stretches, keep, whole };
     Some(trace.apart(&tones))
 }
 
-/// Rounds in which the frequencies settle beside the known shapes, which had taken a part of each tone.
+/// Rounds in which the frequencies are refined with the known shapes in the fit, which had taken a part of each tone.
 const ROUNDS: usize = 3;
 
 /// Moves each tone to where it fits best beside all else.
-fn settle(all: &[Point], keep: &[bool], fit: &mut Fit, tones: &mut [Tone], start: &[Shape], turns: usize) {
+fn refine_tones(all: &[Point], keep: &[bool], fit: &mut Fit, tones: &mut [Tone], start: &[Shape], turns: usize) {
     for _ in 0..ROUNDS {
         for k in 0..tones.len() {
             let own = tones[k].shapes(turns);
             let rest: Vec<f64> = all.iter().map(|p| p.deviation - fit.at(p, |s| !own.contains(&s))).collect();
-            tones[k] = Scan::new(all, keep, &rest).settled(tones[k]);
+            tones[k] = Scan::new(all, keep, &rest).at_maximum(tones[k]);
             let shapes = start.iter().copied().chain(tones.iter().flat_map(|t| t.shapes(turns))).collect();
             if let Some(moved) = Fit::of(all, keep, shapes) {
                 *fit = moved;
@@ -378,7 +378,7 @@ impl Trace {
         // Everything that is told of a point, added up.
         let mut model = vec![0.0; n];
         let mut pairs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-        let mut tell = |effects: &mut Vec<Effect>, effect: Effect, made: &[f64]| {
+        let mut add = |effects: &mut Vec<Effect>, effect: Effect, made: &[f64]| {
             model.iter_mut().zip(made).for_each(|(m, v)| *m += v);
             if let Some(both) = effect.kind.of_both() {
                 let sum = pairs.entry(both).or_insert_with(|| vec![0.0; n]);
@@ -402,10 +402,10 @@ impl Trace {
             let [plus, minus] = [true, false].map(|end| of(Shape::Backlash(axis, end)));
             let mean = (0.5 * (plus.0 + minus.0), 0.5 * plus.1.hypot(minus.1));
             let effect = Effect { ends: Some([plus.0, minus.0]), ..self.effect(Kind::Backlash(axis), mean, &made) };
-            tell(&mut effects, effect, &made);
+            add(&mut effects, effect, &made);
             let largest = heights.iter().flatten().fold(0.0_f64, |h, v| if v.abs() > h.abs() { *v } else { h });
             let effect = Effect { heights, error: None, ..self.effect(Kind::Spikes(axis), (largest, 0.0), &spikes) };
-            tell(&mut effects, effect, &spikes);
+            add(&mut effects, effect, &spikes);
         }
 
         let made = self.made(|s| s == Shape::Squareness);
@@ -415,25 +415,25 @@ impl Trace {
         } else {
             self.effect(Kind::Diagonal, of(Shape::Squareness), &made)
         };
-        tell(&mut effects, effect, &made);
+        add(&mut effects, effect, &made);
         let made = self.made(|s| s == Shape::Scaling);
         let effect = self.effect(Kind::Scaling, scaled(of(Shape::Scaling), 2.0 / self.radius), &made);
-        tell(&mut effects, effect, &made);
+        add(&mut effects, effect, &made);
         if both {
             let made = self.made(|s| s == Shape::Servo);
             let late = self.feed.map(|v| 2.0 * of(Shape::Servo).0 / v);
             let effect = Effect { late, ..self.effect(Kind::Servo, of(Shape::Servo), &made) };
-            tell(&mut effects, effect, &made);
+            add(&mut effects, effect, &made);
         }
         for axis in Axis::ALL {
             if both {
                 let made = self.made(|s| s == Shape::Lateral(axis));
                 let effect = self.effect(Kind::Lateral(axis), of(Shape::Lateral(axis)), &made);
-                tell(&mut effects, effect, &made);
+                add(&mut effects, effect, &made);
             }
             let made = self.made(|s| s == Shape::Straightness(axis));
             let effect = self.effect(Kind::Straightness(axis), of(Shape::Straightness(axis)), &made);
-            tell(&mut effects, effect, &made);
+            add(&mut effects, effect, &made);
         }
         for tone in tones {
             let shapes = tone.shapes(self.turns.len());
@@ -449,7 +449,7 @@ impl Trace {
                     ..self.effect(Kind::Vibration, size, &made)
                 },
             };
-            tell(&mut effects, effect, &made);
+            add(&mut effects, effect, &made);
         }
 
         let frame = self.made(|s| matches!(s, Shape::Mean | Shape::Centre(_)));

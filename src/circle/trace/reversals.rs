@@ -26,8 +26,8 @@ pub(super) struct Reversal {
     pub turn: usize,
     /// 0 at +X, 1 at +Y, 2 at -X, 3 at -Y.
     pub quarter: usize,
-    /// How far behind it the stretch reaches, rad.
-    pub reach: f64,
+    /// Width of the stretch behind it, rad.
+    pub width: f64,
     /// (point, angle behind the reversal in the sense of the turn), in that order.
     pub members: Vec<(usize, f64)>,
 }
@@ -44,7 +44,7 @@ impl Reversal {
     fn gather(&mut self, points: &[Point]) {
         let behind = |p: &Point| p.sense * wrapped(p.angle - FRAC_PI_2 * self.quarter as f64);
         let mine = points.iter().enumerate().filter(|(_, p)| p.turn == self.turn);
-        self.members = mine.map(|(i, p)| (i, behind(p))).filter(|(_, u)| (-BEFORE..self.reach).contains(u)).collect();
+        self.members = mine.map(|(i, p)| (i, behind(p))).filter(|(_, u)| (-BEFORE..self.width).contains(u)).collect();
         self.members.sort_by(|a, b| a.1.total_cmp(&b.1));
     }
 }
@@ -52,7 +52,7 @@ impl Reversal {
 /// The reversals of all turns, each with the shortest stretch.
 pub(super) fn find(points: &[Point], turns: usize) -> Vec<Reversal> {
     let mut all: Vec<Reversal> = (0..turns)
-        .flat_map(|turn| (0..4).map(move |quarter| Reversal { turn, quarter, reach: LEAST, members: Vec::new() }))
+        .flat_map(|turn| (0..4).map(move |quarter| Reversal { turn, quarter, width: LEAST, members: Vec::new() }))
         .collect();
     all.iter_mut().for_each(|r| r.gather(points));
     all
@@ -76,16 +76,16 @@ pub(super) fn extend(points: &[Point], residual: &[f64], reversals: &mut [Revers
     let sigma = quiet.get(quiet.len() / 2).map_or(0.0, |m| m / 0.6745);
     let mut grown = false;
     for r in reversals.iter_mut() {
-        let before = r.reach;
-        let mut wide = Reversal { reach: MOST, ..r.clone() };
+        let before = r.width;
+        let mut wide = Reversal { width: MOST, ..r.clone() };
         wide.gather(points);
         // Means over two degrees, from the end of the stretch on, as long as they stand out on one side.
         let mut sign = 0.0;
-        while r.reach < MOST {
+        while r.width < MOST {
             let part: Vec<f64> = wide
                 .members
                 .iter()
-                .filter(|(_, u)| (r.reach - 2.0 * DEG..r.reach).contains(u))
+                .filter(|(_, u)| (r.width - 2.0 * DEG..r.width).contains(u))
                 .map(|(i, _)| residual[*i])
                 .collect();
             let mean = part.iter().sum::<f64>() / part.len().max(1) as f64;
@@ -93,9 +93,9 @@ pub(super) fn extend(points: &[Point], residual: &[f64], reversals: &mut [Revers
                 break;
             }
             sign = mean.signum();
-            r.reach += 2.0 * DEG;
+            r.width += 2.0 * DEG;
         }
-        grown |= r.reach > before;
+        grown |= r.width > before;
         r.gather(points);
     }
     grown

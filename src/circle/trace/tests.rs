@@ -158,7 +158,7 @@ fn the_standard_errors_cover_what_is_off() {
 
 #[test]
 fn one_deviation_alone_takes_the_whole_circularity_and_the_others_are_nothing() {
-    let lone: [(Machine, Kind); 7] = [
+    let single: [(Machine, Kind); 7] = [
         (Machine { backlash: [6e-6, 0.0], ..Machine::default() }, Kind::Backlash(Axis::X)),
         (Machine { lean: 40e-6, ..Machine::default() }, Kind::Squareness),
         (Machine { scale: 25e-6, ..Machine::default() }, Kind::Scaling),
@@ -167,7 +167,7 @@ fn one_deviation_alone_takes_the_whole_circularity_and_the_others_are_nothing() 
         (Machine { bow: [6e-6, 0.0], ..Machine::default() }, Kind::Straightness(Axis::X)),
         (Machine { cyclic: [(0.0, 0.0, 0.0), (2e-6, 0.008, 0.0)], ..Machine::default() }, Kind::Cyclic(Axis::Y)),
     ];
-    for (machine, kind) in lone {
+    for (machine, kind) in single {
         let a = machine.analysis();
         assert_eq!(a.effects[0].kind, kind, "{:?}", a.effects);
         assert!(a.effects[0].without < 0.02 * a.circularity, "{:?} of {}", a.effects[0], a.circularity);

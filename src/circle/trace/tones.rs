@@ -81,7 +81,7 @@ impl<'a> Scan<'a> {
     }
 
     /// The tone moved to the top of R nearby.
-    pub fn settled(&self, tone: Tone) -> Tone {
+    pub fn at_maximum(&self, tone: Tone) -> Tone {
         match tone {
             Tone::Cyclic(axis, f) => Tone::Cyclic(axis, self.refined(f, 0.5 * STEP, &|f| Tone::Cyclic(axis, f))),
             Tone::Line(f) => Tone::Line(self.refined(f, STEP, &Tone::Line)),

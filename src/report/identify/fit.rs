@@ -94,7 +94,7 @@ pub fn fit(found: &Identification) -> Vec<Block> {
 const DRAWN: usize = 2;
 
 /// Measured against simulated, of the method to trust.
-pub fn follows(found: &Identification, record: Option<&Joined>) -> Option<Block> {
+pub fn measured_and_simulated(found: &Identification, record: Option<&Joined>) -> Option<Block> {
     let best = recommended(found)?;
     let record = compared(found, record?, best);
     let figure = |o: &OutputFit| {

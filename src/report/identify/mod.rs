@@ -16,7 +16,7 @@ pub(super) use estimates::{compare, errors};
 use estimates::{estimates, side_by_side};
 use excitation::excitation;
 pub(super) use excitation::excitation_errors;
-use fit::{fit, fits, follows};
+use fit::{fit, fits, measured_and_simulated};
 use frequency::{frequency_response, resonances};
 pub(super) use history::histories;
 use verdict::verdict;
@@ -29,13 +29,13 @@ const DASHES: [Dash; 3] = [Dash::Solid, Dash::Dashed, Dash::Dotted];
 pub fn report(found: &Identification, record: Option<&Joined>) -> Report {
     let mut top = vec![Block::Verdict(verdict(found))];
     top.extend(found.warnings.iter().cloned().map(Block::Warning));
-    top.extend(follows(found, record));
+    top.extend(measured_and_simulated(found, record));
     if let Some(best) = recommended(found) {
         top.push(Block::Table(estimates(best)));
     }
     let mut sections = vec![Section::new("", top)];
     if is_compared(found) {
-        sections.push(Section::new("How well the model follows the machine", fit(found)));
+        sections.push(Section::new("How well the model measured_and_simulated the machine", fit(found)));
     }
     if let Some(frf) = &found.frequency_response {
         sections.push(Section::new("Frequency response", frequency_response(frf)));

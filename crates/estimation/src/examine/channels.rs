@@ -201,7 +201,7 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
     let n = x.len();
     let d = |k: usize| x[k + 1] - x[k];
     let usual = quantile((0..n - 1).map(d), 0.98).max(3.0 * step(x));
-    let mut lone: Vec<(usize, f64)> = Vec::new();
+    let mut isolated: Vec<(usize, f64)> = Vec::new();
     let mut spikes = Vec::new();
     for k in 2..n.saturating_sub(4) {
         let size = d(k);
@@ -211,7 +211,7 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
         // Beside it nothing of the kind: neither a fast motion nor the way back.
         let near = [k - 2, k - 1, k + 1, k + 2].map(|i| d(i).abs()).into_iter().fold(0.0, f64::max);
         if near < 0.4 * size.abs() {
-            lone.push((k + 1, size));
+            isolated.push((k + 1, size));
         } else if (d(k + 1) + size).abs() < 0.4 * size.abs() {
             spikes.push(k + 1..k + 2);
         }
@@ -230,20 +230,20 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
             .at(input, spikes),
         );
     }
-    if lone.is_empty() {
+    if isolated.is_empty() {
         return Vec::new();
     }
-    let sizes: Vec<f64> = lone.iter().map(|(_, s)| s.abs()).collect();
+    let sizes: Vec<f64> = isolated.iter().map(|(_, s)| s.abs()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let alike = lone.len() >= 2 && sizes.iter().all(|s| *s > 0.9 * largest);
-    let at: Vec<Range<usize>> = lone.iter().map(|(k, _)| *k..*k + 1).collect();
-    let first = lone[0];
+    let alike = isolated.len() >= 2 && sizes.iter().all(|s| *s > 0.9 * largest);
+    let at: Vec<Range<usize>> = isolated.iter().map(|(k, _)| *k..*k + 1).collect();
+    let first = isolated[0];
     let finding = if alike {
         Finding::new(
             "wrapped",
             Severity::Refuse,
             channel.name,
-            format!("{} jumps {} times by {largest:.6} {unit}.", channel.name, lone.len()),
+            format!("{} jumps {} times by {largest:.6} {unit}.", channel.name, isolated.len()),
             "A counter of limited width, or an angle within one turn, that starts anew.",
             "Unwrap the column, or log the position that counts turns.",
         )
@@ -257,7 +257,7 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
                 channel.name,
                 first.1,
                 input.time(first.0),
-                if lone.len() > 1 { format!(", and {} times more", lone.len() - 1) } else { String::new() }
+                if isolated.len() > 1 { format!(", and {} times more", isolated.len() - 1) } else { String::new() }
             ),
             "Counts were lost or the zero was set anew: no torque moved the axis there.",
             "Use the part before or after (--from, --to).",
