@@ -103,8 +103,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.finish();
 
     let layout = super::stdout::layout(super::stdout::WIDTH);
-    out_line!("A machine that disagrees with its model: {PLAYED}\n")?;
-    out!("{}", terminal::blocks(&disagreement, layout))?;
+    let mut story = vec![Block::Paragraph(format!("A machine that disagrees with its model: {PLAYED}"))];
+    story.extend(disagreement);
+    out!("{}", terminal::blocks(&story, layout))?;
     out_line!("\nThe paper's experiment, from FMU to parameters:\n")?;
     out!("{}", terminal::blocks(&short(&findings), layout))?;
     out_line!()?;

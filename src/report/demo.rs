@@ -47,7 +47,7 @@ pub fn linked(mut page: Report, own: &str) -> Report {
 }
 
 /// What the demonstration's machine is, and what it is diagnosed with.
-pub const PLAYED: &str = "an FMU plays one with play in its nut, with friction, and with a torque that nothing accounts for; its log, \
+pub const PLAYED: &str = "an FMU plays a machine with play in its nut, with friction, and with a torque that nothing accounts for; its log, \
                           with noise, is diagnosed with a model that knows of none of them.";
 
 /// With a capital letter.
