@@ -97,6 +97,8 @@ class Tab:
     async def picture(self, folder, name, width, dark):
         if folder is None:
             return
+        # A tab behind another is drawn by nobody, and its picture never comes.
+        await self.call("Page.bringToFront")
         await self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
         await self.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 600)
         wide = await self.value("document.documentElement.scrollWidth")
