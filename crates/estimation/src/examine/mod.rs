@@ -215,6 +215,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let part = Input { theta1: one.as_deref().or(part.theta1), theta2: two.as_deref().or(part.theta2), ..part };
         pairs::speeds(&part, &mut findings);
         band = momentum::examine(&part, &mut inertia, &mut findings);
+        inertia = inertia.or_else(|| rigid::inertia(&part));
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }

@@ -18,7 +18,7 @@ use super::least::bounded;
 use super::pairs::factor;
 use super::robust::quantile;
 use super::spectra::Spectra;
-use super::{Input, Motion, NOMINAL_OFF, Nominal, Structure};
+use super::{Input, Motion, NOMINAL_OFF, Nominal, Parameters, Structure};
 
 /// Share of the antiresonance (table against a held motor) up to which the axis moves as one body: its motion is there 4/3 of a rigid one's.
 const RIGID: f64 = 0.5;
@@ -33,6 +33,8 @@ const BEYOND: f64 = 10.0;
 pub(super) const WORSE: f64 = 2.0;
 /// Equations left over from which chance adds nothing to that: of fewer the ratio of two remainders spreads as their square.
 const ENOUGH: f64 = 8.0;
+/// Share of the torque's power that may be left beside an inertia that is read from a record.
+const MOST_LEFT: f64 = 0.25;
 /// Samples below which there is nothing to transform.
 const SHORTEST: usize = 64;
 /// Most samples of one segment.
@@ -78,6 +80,15 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
         return None;
     }
     Some(Weight::Wrong(other_unit(input, mass, ratio, true)))
+}
+
+/// The inertia with which friction and a spring or a weight explain most of the torque: of slow moves little more than its order of
+/// magnitude, which an inertia looked for on its own is lost in.
+pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
+    let one = Parameters { i1: 1.0, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 };
+    let balance = Balance::new(input, Nominal { structure: Structure::Rigid, parameters: one })?;
+    let (left, mass) = balance.unexplained(1.0, [0.0, f64::INFINITY]);
+    (left < MOST_LEFT && mass > 0.0 && mass.is_finite()).then_some(mass)
 }
 
 fn against(turned: f64, own: f64) -> Finding {

@@ -203,6 +203,29 @@ fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_
 }
 
 #[test]
+fn the_inertia_of_a_pendulum_under_friction_is_read_from_a_few_slow_swings() {
+    let (dt, n) = (5e-3, 1200);
+    let (inertia, weight, friction) = (7.0, 470.0, 60.0);
+    let mut e = noise(3, 2e-4);
+    let motion =
+        |t: f64| (1.1 * (2.1 * t).sin() + 0.5 * (5.3 * t).sin(), 2.31 * (2.1 * t).cos() + 2.65 * (5.3 * t).cos());
+    let acceleration = |t: f64| -4.851 * (2.1 * t).sin() - 14.045 * (5.3 * t).sin();
+    let at = |k: usize| k as f64 * dt;
+    let x: Vec<f64> = (0..n).map(|k| motion(at(k)).0 + e()).collect();
+    let torque: Vec<f64> = (0..n)
+        .map(|k| {
+            let (x, v) = motion(at(k));
+            inertia * acceleration(at(k)) + weight * x.sin() + friction * v.signum()
+        })
+        .collect();
+    let input = Input { dt, torque: Some(&torque), theta1: Some(&x), ..Input::default() };
+    let found = examine(&input);
+    // Roughly: a weight that swings 90 degrees is no spring.
+    let told = found.inertia.expect("an inertia") / inertia;
+    assert!((0.7..1.5).contains(&told), "{told}");
+}
+
+#[test]
 fn real_records_are_sound() {
     let Some(data) = crate::skip::traces("") else { return };
     let machine = |name: &str| {
