@@ -102,7 +102,7 @@ fn location(w: &Where) -> Value {
         "by_time": list(&w.shown.by_time, slot),
         "by_frequency": list(&w.shown.by_frequency, part),
         "by_state": list(&w.shown.by_state, curve),
-        "summary": words::gap_shows(&w.shown),
+        "summary": words::gap_shows(&w.shown, None),
     })
 }
 

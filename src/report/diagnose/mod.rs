@@ -41,7 +41,7 @@ pub fn report(f: &Findings) -> Report {
     let d = f.diagnosis;
     let mut top = vec![Block::Verdict(verdict(d))];
     top.extend(words::warnings(d).into_iter().map(Block::Warning));
-    top.push(Block::Figure(Figure::new(chain(d), words::gap_shows(&d.location.shown))));
+    top.push(Block::Figure(Figure::new(chain(d), words::gap_shows(&d.location.shown, Some(f.motion)))));
     let mut sections = vec![Section::new("", top)];
     if !d.causes.is_empty() {
         sections.push(Section::new("What it is", what(d)));
@@ -68,7 +68,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
     let d = f.diagnosis;
     let mut blocks = vec![Block::Verdict(verdict(d))];
     blocks.extend(words::warnings(d).into_iter().map(Block::Warning));
-    blocks.push(Block::Paragraph(words::gap_shows(&d.location.shown)));
+    blocks.push(Block::Paragraph(words::gap_shows(&d.location.shown, Some(f.motion))));
     if !d.causes.is_empty() {
         blocks.push(Block::Table(tables::causes(d)));
     }

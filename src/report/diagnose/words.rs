@@ -127,10 +127,11 @@ fn run_off(d: &Diagnosis) -> Option<String> {
     })
 }
 
-/// Where the gap shows.
-pub fn gap_shows(l: &Location) -> String {
+/// Where the gap shows, of a motion that is known.
+pub fn gap_shows(l: &Location, motion: Option<Motion>) -> String {
+    let unit = motion.map_or_else(String::new, |m| format!(" {}", m.unit("N.m")));
     format!(
-        "With its parameters fitted alone, the model lacks {} rms in torque, {}.",
+        "With its parameters fitted alone, the model lacks {}{unit} rms in torque, {}.",
         significant(l.rms),
         looks(&l.looks)
     )
