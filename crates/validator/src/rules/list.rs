@@ -378,7 +378,7 @@ rules! { static {
         "Signal handlers stay", "Leave signals to the host.";
     "side-environment" Warning Robustness "2.1" "2.2" Raw(effects::environment);
         "Environment variables stay", "Pass settings inside the FMU.";
-    "side-locale" Error Robustness "2.1" "2.2" Raw(effects::locale);
+    "side-locale" Warning Robustness "2.1" "2.2" Raw(effects::locale);
         "The locale of numbers stays", "Use uselocale or explicit formats instead of setlocale.";
     "locale-numbers" Warning Robustness "2.1.5" "2.3.1" Raw(surroundings::locale);
         "Numbers are read alike whatever the host's locale", "Use strtod_l with the C locale, std::from_chars or the like: a host with a user interface may have a decimal comma.";
