@@ -40,6 +40,13 @@ impl Extent<'_> {
         1.0 - inside as f64 / x.len().max(1) as f64
     }
 
+    /// Whether a time turns the phase at the band's end by a fiftieth of a radian: less of it, a fiftieth of the torque at most, is
+    /// within the error of time stamps and of a measured torque.
+    #[must_use]
+    pub fn turns_phase(&self, time: f64) -> bool {
+        time.abs() * self.band >= 0.02
+    }
+
     /// Whether an angular frequency lies in the band, with at least two periods in the record.
     #[must_use]
     pub fn holds(&self, omega: f64) -> bool {
@@ -50,5 +57,31 @@ impl Extent<'_> {
     #[must_use]
     pub fn turns(&self, order: f64) -> bool {
         order * self.travel() >= 0.75 * std::f64::consts::TAU && order * self.speed <= self.band
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Effect;
+
+    #[test]
+    fn a_delay_that_the_band_does_not_turn_by_a_fiftieth_of_a_radian_is_none() {
+        let extent = Extent {
+            torque: 1.0,
+            positions: &[0.0, 1.0],
+            speed: 1.0,
+            fastest: 1.0,
+            twist: 0.0,
+            dt: 4e-4,
+            length: 1.0,
+            band: 1000.0,
+            inertia: [1.0; 2],
+            stiffness: 0.0,
+        };
+        let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);
+        assert!(!admits(Effect::Latch, &[-9e-6, 0.0]) && admits(Effect::Latch, &[-9e-5, 0.0]));
+        assert!(!admits(Effect::Latch, &[0.0, 9e-6]) && admits(Effect::Latch, &[0.0, 9e-4]));
+        assert!(!admits(Effect::Delay, &[9e-6]) && admits(Effect::Delay, &[2e-4]));
     }
 }

@@ -280,7 +280,7 @@ impl Input for Delay {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0] <= 12.0 * x.dt,
+        bounds: |p, x| p[0] <= 12.0 * x.dt && x.turns_phase(p[0]),
         example: &[2.3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };

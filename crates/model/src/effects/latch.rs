@@ -35,7 +35,10 @@ impl Sensor for Latch {
         named: true,
         textbook: false,
         odds: 0.1,
-        bounds: |p, x| p[0] <= 0.0 && p[0] >= -12.0 * x.dt && p[1] * x.band <= 5.0,
+        bounds: |p, x| {
+            let early = p[0] <= 0.0 && p[0] >= -12.0 * x.dt && p[1] * x.band <= 5.0;
+            early && (x.turns_phase(p[0]) || x.turns_phase(p[1]))
+        },
         example: &[2.3e-3, 1.5e-3],
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "filtered", free: &[1] }],
     };
