@@ -46,12 +46,15 @@ fn each_verdict_has_its_sentence() {
         let first = d.causes[0].clone();
         d.causes.push(Cause { effect: Effect::ViscousTable, site: Site::Axis, ..first });
     });
+    let mut beyond_noise = without_cause(Verdict::NoGap);
+    beyond_noise.remainder.noise_multiple = 20.0;
     for (d, holds, lacks) in [
         (friction(""), &["Coulomb", "(coulomb_motor, at the motor)", "99.1 % of the gap"][..], "contradicts"),
         (two, &["at the motor), and ", "(viscous_table, at the axis)", "closes with it"], "contradicts"),
         (with(|d| d.gap.closure = -0.3), &["by the fitted record", "contradicts it"], "%"),
         (with(|d| d.gap.closure = 7.0), &["100.0 %"], "700"),
         (without_cause(Verdict::NoGap), &["No gap", "down to the noise"], "%"),
+        (beyond_noise, &["No gap", "no cause stands out in the 0.1 % of the torque"], "down to the noise"),
         (without_cause(Verdict::Parameters), &["Parameters:", "99.1 % of the gap"], "torque constant"),
         (with(|d| d.verdict = Verdict::Parameters), &["Parameters:", "same factor", "torque constant"], "%"),
         (

@@ -17,6 +17,10 @@ pub fn sentence(d: &Diagnosis) -> String {
     let percent = |v: f64| format!("{:.1} %", 100.0 * v.clamp(-9.99, 1.0));
     let gap = if d.gap.closure_of == ClosureOf::Torque { "the gap in torque" } else { "the gap" };
     match d.verdict {
+        Verdict::NoGap if d.remainder.noise_multiple > REMAINS => format!(
+            "No gap: no cause stands out in the {} of the torque that the model as given leaves.",
+            percent(d.remainder.share)
+        ),
         Verdict::NoGap => "No gap: the model as given explains the record down to the noise.".to_owned(),
         Verdict::Parameters if !d.causes.is_empty() => {
             "Parameters: every nominal parameter is off by the same factor, as from a wrong torque constant.".to_owned()

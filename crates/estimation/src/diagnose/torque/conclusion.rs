@@ -26,9 +26,8 @@ const DOUBT: f64 = 0.5;
 pub const LIKELY: f64 = 0.35;
 /// The same of a cause on its own, with which the verdict stands and falls: more likely than not.
 const ALONE: f64 = 0.5;
-/// Share of the torque that may be left where no cause is named, white or not: more than the error of a measured current (one to five
-/// per cent).
-const UNCAUSED: f64 = 0.08;
+/// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
+const UNCAUSED: f64 = 0.05;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 
