@@ -35,7 +35,7 @@ pub fn report(found: &Identification, record: Option<&Joined>) -> Report {
     }
     let mut sections = vec![Section::new("", top)];
     if is_compared(found) {
-        sections.push(Section::new("How well the model measured_and_simulated the machine", fit(found)));
+        sections.push(Section::new("How well the model follows the machine", fit(found)));
     }
     if let Some(frf) = &found.frequency_response {
         sections.push(Section::new("Frequency response", frequency_response(frf)));
