@@ -18,7 +18,7 @@ const DT: f64 = 1e-3;
 fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = |name: &str| folder.path().join(name).display().to_string();
-    let (csv, parquet, axis) = (at("log.csv"), at("log.parquet"), at("axis.toml"));
+    let (csv, axis) = (at("log.csv"), at("axis.toml"));
     let columns = record();
     let mut text = String::from("time [s],T [N.m],theta1 [rad],theta2 [rad]\n");
     let [time, torque, theta1, theta2] = &columns;
@@ -36,12 +36,12 @@ fn main() {
     row("CSV, units checked", 7, &["inspect", &csv, "--axis", &axis]);
     #[cfg(feature = "parquet")]
     {
+        let parquet = at("log.parquet");
         let names = ["time [s]", "T [N.m]", "theta1 [rad]", "theta2 [rad]"];
         let named: Vec<(&str, &[f64])> = names.into_iter().zip(columns.iter().map(Vec::as_slice)).collect();
         eixo::trace::write_columns(std::path::Path::new(&parquet), &named).expect("the log");
         row("Parquet", 7, &["inspect", &parquet]);
     }
-    let _ = parquet;
 }
 
 /// Time, torque, and the angles of motor and table.

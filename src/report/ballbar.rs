@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::chart::{Axis, Chart, Colour, Dash, Series};
-use super::format::{self, Medium};
+use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::circle::measured::Measured;
@@ -205,11 +205,6 @@ pub fn steps(a: &Analysis) -> Vec<String> {
         first
     };
     a.effects.iter().filter(worth).filter(new).take(MOST).map(one).collect()
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn figures(f: &Findings) -> Table {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::ballbar;
 use super::chart::{Axis, Chart, Colour, Dash, Series, When};
-use super::format::{self, Medium};
+use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace, Ring};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::circle::roundness::{Roundness, deviations};
@@ -138,11 +138,6 @@ pub fn report(f: &Findings) -> Report {
         sections,
         footer: format!("eixo {}", env!("CARGO_PKG_VERSION")),
     }
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn caption(run: &Run) -> String {

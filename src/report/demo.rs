@@ -1,6 +1,7 @@
 //! The report of the demonstration: a machine that disagrees with its model, what that does to a circle, and, folded, the
 //! paper's experiment through the FMU with its figures and tables.
 
+use super::format::capital;
 use super::identify;
 use super::{Block, Cell, Report, Section, Table, Tone, Verdict};
 use crate::identify::joined::Joined;
@@ -50,12 +51,6 @@ pub fn linked(mut page: Report, own: &str) -> Report {
 pub const PLAYED: &str = "an FMU plays a machine with play in its nut, with friction, and with a torque that nothing accounts for; its log, \
                           with noise, is diagnosed with a model that knows of none of them.";
 
-/// With a capital letter.
-fn sentence(text: &str) -> String {
-    let (first, rest) = text.split_at(1);
-    first.to_uppercase() + rest
-}
-
 /// Sections of the diagnosis that say where the gap lies, what causes it and how far it shrinks.
 const DIAGNOSIS: usize = 3;
 
@@ -64,7 +59,7 @@ const DIAGNOSIS: usize = 3;
 pub fn report(f: &Findings, diagnosis: &Report, circle: &Report) -> Report {
     let mut sections: Vec<Section> = diagnosis.sections.iter().take(DIAGNOSIS).cloned().collect();
     if let Some(first) = sections.first_mut() {
-        first.blocks.insert(0, Block::Paragraph(sentence(PLAYED)));
+        first.blocks.insert(0, Block::Paragraph(capital(PLAYED)));
     }
     if let Some(first) = circle.sections.first() {
         sections.push(Section::new("What it does to a circle", first.blocks.clone()));

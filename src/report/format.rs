@@ -198,6 +198,12 @@ fn minus(text: &str, medium: Medium) -> String {
     }
 }
 
+/// The text with a capital letter at its head.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,8 +10,8 @@ thread_local! {
     static WITHIN: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What a reader gives; None where it panics. Panics elsewhere are printed as ever.
-pub(super) fn caught<T>(run: impl FnOnce() -> T) -> Option<T> {
+/// What a reader gives; its error or its panic as a text. Panics elsewhere are printed as ever.
+pub(super) fn caught<T, E: std::fmt::Display>(run: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let usual = take_hook();
@@ -24,5 +24,5 @@ pub(super) fn caught<T>(run: impl FnOnce() -> T) -> Option<T> {
     let outer = WITHIN.replace(true);
     let outcome = catch_unwind(AssertUnwindSafe(run));
     WITHIN.set(outer);
-    outcome.ok()
+    outcome.map_or_else(|_| Err("the reader gave up on it".to_owned()), |read| read.map_err(|e| e.to_string()))
 }

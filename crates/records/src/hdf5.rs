@@ -4,9 +4,8 @@
 //! structure (the members of a group) by their own names where these are unique. MATLAB stores an array with its sizes
 //! turned round and marks it with the attribute `MATLAB_class`; text, cells, sparse matrices and objects are passed over.
 //!
-//! How much a file may ask for is bounded here: before data are
-//! read, what they unfold to is held against the size of the file and [`MAX_CELLS`], and the objects that are looked at are
-//! counted, since links can form a ring.
+//! How much a file may ask for is bounded here: before data are read, what they unfold to is held against the size of the file
+//! and [`MAX_CELLS`], and the objects that are looked at are counted, since links can form a ring.
 
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
@@ -17,6 +16,9 @@ use super::table::{MAX_CELLS, Table};
 
 /// Most objects that are looked at.
 const MAX_OBJECTS: usize = 1 << 14;
+/// MATLAB's classes of numbers.
+const NUMERIC: [&str; 11] =
+    ["double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"];
 /// What a byte can unfold to at most: deflate's limit, and a third of it again for what stands around.
 const DENSEST: u64 = 1400;
 
@@ -31,9 +33,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
             "the HDF5 (MATLAB 7.3) file cannot be read: {what}. Save it in MATLAB with -v7, or as CSV or Parquet"
         ),
     };
-    let vectors =
-        caught(|| vectors(bytes)).unwrap_or_else(|| Err("the reader gave up on it".to_owned())).map_err(failed)?;
-    mat::table(vectors, file)
+    mat::table(caught(|| vectors(bytes)).map_err(failed)?, file)
 }
 
 fn vectors(bytes: &[u8]) -> Result<Vec<Vector>, String> {
@@ -98,11 +98,7 @@ impl Reader {
         }
         let attributes = set.attrs().map_err(|e| plain(&e))?;
         let class = attributes.get("MATLAB_class").and_then(text);
-        let numeric = ["double", "single", "logical", "int8", "int16", "int32", "int64"];
-        let unsigned = ["uint8", "uint16", "uint32", "uint64"];
-        if class.is_some_and(|c| !numeric.contains(&c) && !unsigned.contains(&c))
-            || attributes.contains_key("MATLAB_empty")
-        {
+        if class.is_some_and(|c| !NUMERIC.contains(&c)) || attributes.contains_key("MATLAB_empty") {
             return Ok(());
         }
         let shape = set.shape().map_err(|e| plain(&e))?;

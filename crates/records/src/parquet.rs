@@ -215,12 +215,7 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
 
 /// Runs the library on a file that may be damaged in any way: an error or a panic of it is an error of the file.
 fn guarded<T>(file: &str, run: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, TraceError> {
-    let reason = match caught(run) {
-        Some(Ok(value)) => return Ok(value),
-        Some(Err(e)) => e.to_string(),
-        None => "the reader gave up on it".to_owned(),
-    };
-    Err(TraceError::Format {
+    caught(run).map_err(|reason| TraceError::Format {
         file: file.to_owned(),
         what: format!("the Parquet file cannot be read: {reason}. Write it again, or as CSV"),
     })

@@ -76,10 +76,8 @@ pub fn verdict(found: &Identification) -> Verdict {
 
 /// A remark as a sentence: capital letter, full stop.
 fn sentence_of(text: &str) -> String {
-    let mut chars = text.chars();
-    let head: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
     let stop = if text.ends_with(['.', '!', '?']) { "" } else { "." };
-    format!("{head}{}{stop}", chars.as_str())
+    format::capital(text) + stop
 }
 
 fn fit_percent(fit: f64) -> String {

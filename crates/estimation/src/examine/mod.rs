@@ -215,7 +215,8 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let part = Input { theta1: one.as_deref().or(part.theta1), theta2: two.as_deref().or(part.theta2), ..part };
         pairs::speeds(&part, &mut findings);
         band = momentum::examine(&part, &mut inertia, &mut findings);
-        inertia = inertia.or_else(|| rigid::inertia(&part));
+        // A guess is asked for where no nominal value is known.
+        inertia = inertia.or_else(|| if part.nominal.is_none() { rigid::inertia(&part) } else { None });
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }

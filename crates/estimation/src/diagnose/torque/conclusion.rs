@@ -123,7 +123,7 @@ impl Search<'_> {
         let explained = self.explained(&parameters, &chosen);
         let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let settled = self.at_floor(&chosen) || white;
-        let left = self.band().torque_share(chosen.discrepancy, self.problem.record);
+        let left = self.left(&chosen);
         // What the chosen hypothesis lacks no material part of is no rival of it, only itself and something small.
         // Of accounts that leave next to nothing of the gap the shorter is told.
         let little = self.leaves_little(&chosen);
@@ -150,7 +150,7 @@ impl Search<'_> {
         // One that is not likely explains nothing that needs a cause.
         if let [only] = probabilities[..]
             && !likely(&only)
-            && self.band().torque_share(plain.discrepancy, self.problem.record) <= UNCAUSED
+            && self.left(plain) <= UNCAUSED
         {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             let none = plain.clone();

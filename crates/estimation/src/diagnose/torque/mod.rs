@@ -95,11 +95,12 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         let decision = decided(&own, likely(&decision));
         (own, decision)
     };
-    let rules = case.nominal.structure == Structure::Rigid;
-    let reach = if rules { Reach::Ruled } else { Reach::Shown };
+    // A rigid axis is taken to be under control.
+    let rigid = case.nominal.structure == Structure::Rigid;
+    let reach = if rigid { Reach::Ruled } else { Reach::Shown };
     let (mut searched, mut decision) = settled(prepared(&train, &case.nominal, reach));
     let left = searched.left(&decision.chosen);
-    if rules && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
+    if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
         progress("beyond the band that the motion rules");
         let (wide, other) = settled(prepared(&train, &case.nominal, Reach::Whole));
         // More to explain and less left of it: what was missing is there.

@@ -128,7 +128,7 @@ impl Search<'_> {
     /// What causes are measured by: what the axis lacks with its parameters alone, but no more than the torque itself, and without a
     /// constant torque: beside a weight of many times the moving part everything else would be small.
     fn dynamic_gap(&self, parameters: &Fit) -> Discrepancy {
-        let over = self.band().torque_share(parameters.discrepancy, self.problem.record).max(1.0);
+        let over = self.left(parameters).max(1.0);
         let mut gap = parameters.discrepancy.map(|s| s / (over * over));
         for bias in self.suspects.iter().filter(|e| e.is_bias()) {
             let fit = self.problem.fit(&parameters.model, &[(*bias, 0)], parameters.discrepancy, STEPS);
@@ -308,7 +308,7 @@ impl Search<'_> {
     }
 
     /// Share of the torque that a fit leaves.
-    fn left(&self, fit: &Fit) -> f64 {
+    pub fn left(&self, fit: &Fit) -> f64 {
         self.band().torque_share(fit.discrepancy, self.problem.record)
     }
 
