@@ -23,7 +23,17 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
     let noise = estimate_noise(&torque, &[0, 1, 2, 3].map(|c: usize| channels[c].as_deref()), None);
     let std = noise.std.map(|s| s.max(1e-12));
     Some((
-        Record { start: time[0], dt, hold: Hold::Zoh, torque, between: None, channels, noise: std, idle: Vec::new() },
+        Record {
+            start: time[0],
+            dt,
+            hold: Hold::Zoh,
+            torque,
+            between: None,
+            channels,
+            noise: std,
+            common_noise: noise.common,
+            idle: Vec::new(),
+        },
         noise,
     ))
 }

@@ -333,6 +333,7 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
         between: None,
         channels,
         noise: std,
+        common_noise: noise.common,
         idle,
     };
     let [reference, command] = [Signal::Reference, Signal::Command].map(|s| trace.get(s).map(<[f64]>::to_vec));

@@ -3,6 +3,7 @@
 mod assess;
 mod closed_loop;
 mod diagnosis;
+mod jitter;
 mod lattice;
 pub mod location;
 mod model;

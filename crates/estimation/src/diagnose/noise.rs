@@ -7,9 +7,12 @@
 //! alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
 //! start, and serves as one more candidate. What stays of the signal can only raise a level.
 //!
-//! Assumed: the noise is white at the sampling rate. Where the levels never settle it is not, and the answer says so.
+//! Assumed: the noise is white at the sampling rate. Where the levels never settle it is not, and the answer says so. What grows with
+//! the speed ([`super::jitter`]) counts with its mean over the record.
 
 use rustfft::{FftPlanner, num_complex::Complex};
+
+use super::jitter::growth;
 
 /// Highest order of difference.
 const ORDERS: usize = 12;
@@ -48,6 +51,8 @@ pub enum NoiseMethod {
 pub struct NoiseEstimate {
     /// Standard deviation of each channel's noise, its resolution included; zero where the channel is absent.
     pub std: [f64; 4],
+    /// Covariance of the noises of theta1 and theta2, which are read at one time: what a jitter of the samples makes in both, rad^2.
+    pub common: f64,
     /// How each was found.
     pub method: [NoiseMethod; 4],
     /// Step of the values of a channel, where it is coarse enough to matter against the noise.
@@ -67,6 +72,7 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
     let period = period.filter(|p| *p > 0 && *p < torque.len()).or_else(|| find_period(torque));
     let mut estimate = NoiseEstimate {
         std: [0.0; 4],
+        common: 0.0,
         method: [NoiseMethod::Absent; 4],
         quantum: [None; 4],
         scatter: [None; 4],
@@ -86,15 +92,38 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
             }
         }
     }
+    if let (
+        [Some(a), _, Some(b), _],
+        [NoiseMethod::Differences { order: m }, _, NoiseMethod::Differences { order: n }, _],
+    ) = (channels, estimate.method)
+        && let Some((common, own)) = together(a, b, m.max(n))
+    {
+        estimate.common = common;
+        (estimate.std[0], estimate.std[2]) = ((common + own[0]).sqrt(), (common + own[1]).sqrt());
+    }
     estimate
+}
+
+/// The variance that the noises of two positions have in common, by their differences of an order, and that of each alone: of samples
+/// taken late both show the same, and the twist none of it.
+fn together(a: &[f64], b: &[f64], order: usize) -> Option<(f64, [f64; 2])> {
+    let power = |d: &[f64]| block_median(d, order) / binomial(2 * order);
+    let [first, second] = [at_rest(a, a, order)?, at_rest(b, b, order)?];
+    let rest = [power(&first.0), power(&second.0)];
+    let twist: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let apart = power(&differences(&twist, order));
+    let all = (rest[0] * first.1 * rest[1] * second.1).sqrt();
+    let common = all - 0.5 * apart;
+    (common > 0.0).then(|| (common, rest.map(|r| apart * r / (rest[0] + rest[1]).max(f64::MIN_POSITIVE))))
 }
 
 /// The level at which differences settle, of the channel or of its periods, whichever is lower.
 fn level_of(y: &[f64], period: Option<usize>) -> (f64, NoiseMethod) {
-    let plain = settled(y);
+    let plain = settled(y).map(|(level, order)| (with_speed(y, y, order).unwrap_or(level), order));
     let periodic = period.filter(|p| y.len() >= p + 2 * BLOCK).map(|p| {
         let difference: Vec<f64> = (p..y.len()).map(|k| (y[k] - y[k - p]) / 2.0_f64.sqrt()).collect();
         settled(&difference)
+            .map(|(level, order)| (with_speed(&difference, &y[..y.len() - p], order).unwrap_or(level), order))
     });
     match (plain, periodic) {
         (Ok((a, order)), Some(Ok((b, lower)))) if b * AGREE < a || (b < a * AGREE && lower < order) => {
@@ -105,6 +134,31 @@ fn level_of(y: &[f64], period: Option<usize>) -> (f64, NoiseMethod) {
         (Err(a), Some(Err(b))) => (a.min(b), NoiseMethod::Unsettled),
         (Err(level), None) => (level, NoiseMethod::Unsettled),
     }
+}
+
+/// The level of the noise in a series, over the record, where it grows with the speed of a position.
+fn with_speed(series: &[f64], position: &[f64], order: usize) -> Option<f64> {
+    let (differences, grown) = at_rest(series, position, order)?;
+    Some((block_median(&differences, order) / binomial(2 * order) * grown).sqrt())
+}
+
+/// Differences of a series with the noise that they have where the axis stands, and how much the variance grows over the record.
+fn at_rest(series: &[f64], position: &[f64], order: usize) -> Option<(Vec<f64>, f64)> {
+    let d = differences(series, order);
+    let grown = growth(position, &d)?;
+    Some((d.iter().zip(&grown.factor).map(|(d, f)| d / f.sqrt()).collect(), grown.mean))
+}
+
+/// Differences of an order.
+fn differences(y: &[f64], order: usize) -> Vec<f64> {
+    let mut d = y.to_vec();
+    for _ in 0..order {
+        for k in 0..d.len() - 1 {
+            d[k] = d[k + 1] - d[k];
+        }
+        d.pop();
+    }
+    d
 }
 
 /// The level at which three orders in a row agree, and the lowest of them; else the lowest level.
@@ -320,6 +374,25 @@ mod tests {
         }
         let estimate = estimate_noise(&white(8192, 1.0, 6), &[Some(&y), None, None, None], None);
         assert!((estimate.std[0] / 1e-6 - 1.0).abs() < 0.06, "{estimate:?}");
+    }
+
+    #[test]
+    fn samples_taken_late_count_with_their_mean_and_in_both_encoders_alike() {
+        let (own, jitter) = ([2e-5, 5e-5], 0.03);
+        let m = motion(8192, 4096);
+        let late = white(8192, jitter, 21);
+        let read = |own: f64, seed: u64| -> Vec<f64> {
+            let e = white(8192, own, seed);
+            (0..8192).map(|k| m[k] + late[k] * (m[k] - m[k.max(1) - 1]) + e[k]).collect()
+        };
+        let [a, b] = [read(own[0], 22), read(own[1], 23)];
+        let estimate = estimate_noise(&white(8192, 1.0, 24), &[Some(&a), None, Some(&b), None], None);
+        let together = m.windows(2).map(|w| (jitter * (w[1] - w[0])).powi(2)).sum::<f64>() / 8191.0;
+        for (c, own) in [(0, own[0]), (2, own[1])] {
+            let all = (together + own * own).sqrt();
+            assert!((estimate.std[c] / all - 1.0).abs() < 0.1, "{estimate:?} {all}");
+        }
+        assert!((estimate.common / together - 1.0).abs() < 0.2, "{estimate:?} {together}");
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub struct Record {
     pub channels: [Option<Vec<f64>>; 4],
     /// Standard deviation of the noise of each channel, in its unit; means nothing where the channel is `None`.
     pub noise: [f64; 4],
+    /// Covariance of the noises of both positions, rad^2.
+    pub common_noise: f64,
     /// Stretches that tell nothing (the drive is off, the axis stands): they are followed, and not weighed.
     pub idle: Vec<std::ops::Range<usize>>,
 }
@@ -48,6 +50,7 @@ impl Record {
             between: (self.between.as_ref()).map(|(m, t)| (*m, t[m * range.start..m * range.end].to_vec())),
             channels: std::array::from_fn(|c| self.channels[c].as_ref().map(|v| v[range.clone()].to_vec())),
             noise: self.noise,
+            common_noise: self.common_noise,
             idle: (self.idle.iter())
                 .map(|r| r.start.max(range.start)..r.end.min(range.end))
                 .filter(|r| !r.is_empty())

@@ -226,9 +226,20 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         record.channels[c].as_ref().map(|y| filter(y, c.is_multiple_of(2), every, &|f| Complex::new(low(f), 0.0)))
     });
     let noise = record.noise.map(|s| s / (every as f64).sqrt());
+    let common_noise = record.common_noise / every as f64;
     let idle = record.idle.iter().map(|r| r.start / every..r.end / every).collect();
     let between = Some((instants, between));
-    let out = Record { start: record.start, dt: slow, hold: Hold::Linear, torque, between, channels, noise, idle };
+    let out = Record {
+        start: record.start,
+        dt: slow,
+        hold: Hold::Linear,
+        torque,
+        between,
+        channels,
+        noise,
+        common_noise,
+        idle,
+    };
     let m = smooth(out.len());
     out.part(0..m)
 }
@@ -267,6 +278,7 @@ mod tests {
             between: None,
             channels: [Some((0..n).map(position).collect()), None, None, None],
             noise: [1e-6; 4],
+            common_noise: 0.0,
             idle: Vec::new(),
         };
         // 10 rad/s are 1.6 Hz.

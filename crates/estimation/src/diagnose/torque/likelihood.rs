@@ -3,13 +3,14 @@
 //! The lacking torques `r` of [`super::tracking`] are tapered and transformed. At a frequency their covariance is
 //!
 //! ```text
-//! C = D diag(n1, n2) D^H + diag(s1^2, s2^2)
+//! C = D N D^H + diag(s1^2, s2^2),   N = diag(n1, n2) + n12 [1 1; 1 1]
 //! ```
 //!
-//! `n` the noise of the encoders seen as positions, `D` each model's own dynamic stiffness (with the density of readings over torques,
-//! `ln |det D|^2`, in the likelihood), `s^2` the discrepancy of each equation, white in the band, of the size that makes the likelihood largest (Kennedy,
-//! O'Hagan, JRSS B 63(3), 2001; Whittle, JRSS B 15, 1953). Without discrepancy this is the likelihood of output error, with a
-//! large one that of inverse dynamics. A side that is not measured is eliminated.
+//! `n` the noise of the encoders seen as positions, beside it what both have in common of samples taken late, `D` each model's own
+//! dynamic stiffness (with the density of readings over torques, `ln |det D|^2`, in the likelihood), `s^2` the discrepancy of each
+//! equation, white in the band, of the size that makes the likelihood largest (Kennedy, O'Hagan, JRSS B 63(3), 2001; Whittle, JRSS B 15,
+//! 1953). Without discrepancy this is the likelihood of output error, with a large one that of inverse dynamics. A side that is not
+//! measured is eliminated.
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
@@ -51,8 +52,9 @@ pub struct Band {
     pub omega: Vec<f64>,
     /// Degrees of freedom of each bin over two.
     pub weight: Vec<f64>,
-    /// Noise of each encoder, as a position, at each bin.
+    /// Noise of each encoder alone, as a position, at each bin, and of both together.
     noise: Vec<[f64; 2]>,
+    common: f64,
     /// Weights of the eliminated form q = u0 r1 + u1 r2.
     combine: Vec<[C; 2]>,
     /// Angular frequency at which the axis answers the noise of each bin.
@@ -134,9 +136,10 @@ impl Band {
         let count = ((limit * std::f64::consts::TAU / step) as usize).clamp(4.min(n / 2), n / 2 - 1) + 1;
         let omega: Vec<f64> = (0..count).map(|m| m as f64 * step).collect();
         let weight = (0..count).map(|m| if m == 0 { 0.5 } else { 1.0 }).collect();
+        let common = if sight == Sight::Both { record.common_noise } else { 0.0 };
         let noise_of = |i: usize, w: f64| -> f64 {
             match record.channels[2 * i] {
-                Some(_) => record.noise[2 * i].powi(2),
+                Some(_) => record.noise[2 * i].powi(2) - common,
                 None => (record.noise[2 * i + 1] / w.max(0.5 * step)).powi(2),
             }
         };
@@ -159,7 +162,7 @@ impl Band {
             })
             .collect();
         let mut band =
-            Self { n, dt, sight, taper, omega, weight, noise, combine, spread, reference: Vec::new(), weighed };
+            Self { n, dt, sight, taper, omega, weight, noise, common, combine, spread, reference: Vec::new(), weighed };
         band.reference = band.weights(reference);
         band
     }
@@ -192,10 +195,14 @@ impl Band {
                 let v = self.visible(&model.parameters, m);
                 let [n1, n2] = self.seen(m);
                 let (noise, det) = if self.sight == Sight::Both {
-                    let n11 = v[0][0].norm_sqr() * n1 + v[0][1].norm_sqr() * n2;
-                    let n22 = v[1][0].norm_sqr() * n1 + v[1][1].norm_sqr() * n2;
-                    let n12 = v[0][0] * v[1][0].conj() * n1 + v[0][1] * v[1][1].conj() * n2;
-                    ((n11, n22, n12), v[0][0] * v[1][1] - v[0][1] * v[1][0])
+                    // Moved together the sides do not strain the spring.
+                    let together = v.map(|row| row[0] + row[1]);
+                    let of = |i: usize, j: usize| {
+                        v[i][0] * v[j][0].conj() * n1
+                            + v[i][1] * v[j][1].conj() * n2
+                            + together[i] * together[j].conj() * self.common
+                    };
+                    ((of(0, 0).re, of(1, 1).re, of(0, 1)), v[0][0] * v[1][1] - v[0][1] * v[1][0])
                 } else {
                     ((v[0][0].norm_sqr() * n1, 0.0, C::default()), v[0][0])
                 };
@@ -229,17 +236,16 @@ impl Band {
         for (m, weight) in self.weight.iter().enumerate() {
             let (a, b, c, _) = self.factor(lacking.weights[m], s);
             let v = self.visible(&model.parameters, m);
-            // C^-1 r = L^-H L^-1 r, and the readings' share of it: E = V^-1 N C^-1 r = n V^H C^-1 r.
+            // C^-1 r = L^-H L^-1 r, and the readings' share of it: with N the readings' noise
+            // E = V^-1 (V N V^H) C^-1 r = N V^H C^-1 r.
             let r0 = lacking.rows[0][m];
             let z0 = r0 * a;
             let z1 = if both { b * r0 + lacking.rows[1][m] * c } else { C::default() };
             let y = [z0 * a + b.conj() * z1, z1 * c];
             let n = self.seen(m);
             let e = if both {
-                [
-                    (v[0][0].conj() * y[0] + v[1][0].conj() * y[1]) * n[0],
-                    (v[0][1].conj() * y[0] + v[1][1].conj() * y[1]) * n[1],
-                ]
+                let seen = [0, 1].map(|i: usize| v[0][i].conj() * y[0] + v[1][i].conj() * y[1]);
+                [0, 1].map(|i: usize| seen[i] * n[i] + (seen[0] + seen[1]) * self.common)
             } else {
                 [v[0][0].conj() * y[0] * n[0], C::default()]
             };

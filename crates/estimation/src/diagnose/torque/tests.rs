@@ -49,6 +49,7 @@ fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn
         between: None,
         channels: [Some(theta), None, None, None],
         noise: [1e-6; 4],
+        common_noise: 0.0,
         idle: Vec::new(),
     }
 }
@@ -188,7 +189,17 @@ fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, la
         *theta += noise(&mut rng, 1e-5);
     }
     let channels = [Some(motor), None, Some(table), None];
-    Record { start: 0.0, dt, hold: Hold::Zoh, torque, between: None, channels, noise: [1e-5; 4], idle: Vec::new() }
+    Record {
+        start: 0.0,
+        dt,
+        hold: Hold::Zoh,
+        torque,
+        between: None,
+        channels,
+        noise: [1e-5; 4],
+        common_noise: 0.0,
+        idle: Vec::new(),
+    }
 }
 
 #[test]
@@ -200,6 +211,31 @@ fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
     assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", told(&o));
     let delay = o.improved.effects.of(Effect::SensorDelay)[0];
     assert!((delay / 3e-3 - 1.0).abs() < 0.05, "{delay}");
+}
+
+#[test]
+fn samples_taken_late_hide_neither_the_coupling_nor_the_friction_on_its_sides() {
+    let stiff = Parameters { i1: 0.03, i2: 1.5e-3, b: 0.11, k: 1100.0, rho: 1.0 };
+    let friction = with(&[(Effect::CoulombMotor, 0, 4.0), (Effect::CoulombTable, 0, 4.0)]);
+    let mut record = of_two_inertias(stiff, friction, 20.0, 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let [Some(motor), _, Some(table), _] = &mut record.channels else { unreachable!() };
+    for k in (1..motor.len()).rev() {
+        let late = noise(&mut rng, 0.05);
+        motor[k] -= late * (motor[k] - motor[k - 1]);
+        table[k] -= late * (table[k] - table[k - 1]);
+    }
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let read = estimate_noise(&record.torque, &channels, None);
+    // A thousand times what the encoders have of their own.
+    assert!(read.std[0] > 1e-2, "{read:?}");
+    (record.noise, record.common_noise) = (read.std, read.common);
+    let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 1500.0, ..stiff });
+    let mut effects: Vec<Effect> = o.decision.chosen.terms.iter().map(|t| t.0).collect();
+    effects.sort_unstable();
+    assert_eq!(effects, [Effect::CoulombMotor, Effect::CoulombTable], "{:#?}", told(&o));
+    let k = o.improved.parameters.k;
+    assert!((k / stiff.k - 1.0).abs() < 0.01, "{k}");
 }
 
 #[test]
