@@ -331,7 +331,7 @@ impl Input for ActuatorLag {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0] * x.band <= 20.0,
+        bounds: |p, x| x.turns_phase(p[0]) && p[0] * x.band <= 20.0,
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
