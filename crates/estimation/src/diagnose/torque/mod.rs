@@ -82,17 +82,17 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
-    let decided = |p: &Prepared, suspects: Vec<Effect>| {
+    let decided = |p: &Prepared, suspects: Vec<Effect>, known: Option<&Fit>| {
         let problem = Problem::new(&p.record, &p.band, case.nominal);
-        decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress })
+        decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress }, known)
     };
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
     let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
     let settled = |(searched, own): (Prepared, Option<Prepared>)| {
-        let decision = decided(&searched, suspects.clone());
+        let decision = decided(&searched, suspects.clone(), None);
         let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
-        let decision = decided(&own, likely(&decision));
+        let decision = decided(&own, likely(&decision), Some(&decision.chosen));
         (own, decision)
     };
     // A rigid axis is taken to be under control.

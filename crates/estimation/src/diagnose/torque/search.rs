@@ -68,9 +68,9 @@ pub struct Search<'a> {
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
 
-/// Finds the hypothesis of largest evidence.
+/// Finds the hypothesis of largest evidence; from the one that is `known` from another look at the record, where there is one.
 #[must_use]
-pub fn decide(mut search: Search<'_>) -> Decision {
+pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
     (search.progress)("the model as given");
     let nominal = search.problem.nominal;
     let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
@@ -79,7 +79,9 @@ pub fn decide(mut search: Search<'_>) -> Decision {
     let mut pool = Pool::default();
     pool.extend([given.clone(), parameters.clone()]);
     search.gap = search.dynamic_gap(&parameters);
-    let mut chosen = search.climb(parameters.clone(), &mut pool);
+    let known = known.and_then(|k| search.problem.fit(&k.model, &k.terms, k.discrepancy, STEPS));
+    let known = known.and_then(|k| search.problem.deepen(&k)).map(|k| search.pruned(k, &mut pool));
+    let mut chosen = search.climb(known.unwrap_or_else(|| parameters.clone()), &mut pool);
     // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
     let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
     if !decided && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
