@@ -109,7 +109,11 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
         }
         let Some(better) = search.overlooked(&chosen, &pool) else { break };
         let better = search.pruned(better, &mut pool);
-        chosen = search.climb(better, &mut pool);
+        let other = search.climb(better, &mut pool);
+        if other.terms == chosen.terms {
+            break;
+        }
+        chosen = other;
     }
     search.conclude(given, parameters, chosen, pool.into_fits())
 }
@@ -203,7 +207,13 @@ impl Search<'_> {
     /// Adds, drops and exchanges effects as long as the evidence grows.
     fn climb(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
+        let mut passed: Vec<Vec<Term>> = Vec::new();
         for _ in 0..2 * MOST {
+            // What is likelier and explains no material part more is gone back from: once.
+            if passed.contains(&best.terms) {
+                break;
+            }
+            passed.push(best.terms.clone());
             // What is left of a large gap may still be a machine's remainder, which tells no two accounts apart; less of the torque than any
             // drive is true to does.
             let enough = self.is_enough(&best);
