@@ -41,8 +41,8 @@ const FITTED: usize = 12;
 const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
-/// Simulated steps after which what was found is only added to: twenty to thirty seconds on two cores.
-const WORK: u64 = 50_000_000;
+/// Simulated steps after which what was found is only added to: half a minute to a minute on two cores, on one record in fifty.
+const WORK: u64 = 150_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
