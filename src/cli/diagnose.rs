@@ -21,7 +21,7 @@ use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Setting};
 use crate::report::diagnose::{Findings, json as contract, report, short, warnings};
-use crate::report::format::{Medium, number, printable};
+use crate::report::format::{Medium, number, percent, printable};
 use crate::report::{html, terminal};
 use crate::trace::{Machine, Signal, Trace, nearest, write_text};
 
@@ -107,6 +107,15 @@ fn examine(
 ) -> anyhow::Result<Diagnosed> {
     let machine = Machine::read(axis)?;
     let Recorded { record: train, noise, mut warnings, reference, command } = record(trace, &machine, believed)?;
+    warnings.extend(noise.jitter.map(|samples| {
+        format!(
+            "{}: the noise of the position grows with its speed, as if the encoder were read {} s ({} of a sample) early or late. No \
+             stamp tells by how much, so it counts as noise. Have the encoder read by the controller's clock, or log when it is read.",
+            trace.display(),
+            number(samples * train.dt, 2, Medium::Terminal),
+            percent(samples, Medium::Terminal)
+        )
+    }));
     // The part is that of the first record; the second one is used from its start to its end.
     let whole = Believed { trust: believed.trust, ..Believed::default() };
     let holdout = holdout.map(|p| record(p, &machine, whole).map(|r| (r, p))).transpose()?;

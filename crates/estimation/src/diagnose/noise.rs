@@ -53,6 +53,8 @@ pub struct NoiseEstimate {
     pub std: [f64; 4],
     /// Covariance of the noises of theta1 and theta2, which are read at one time: what a jitter of the samples makes in both, rad^2.
     pub common: f64,
+    /// Standard deviation of the time by which samples of a position are taken early or late, in samples, where that rules its noise.
+    pub jitter: Option<f64>,
     /// How each was found.
     pub method: [NoiseMethod; 4],
     /// Step of the values of a channel, where it is coarse enough to matter against the noise.
@@ -73,6 +75,7 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
     let mut estimate = NoiseEstimate {
         std: [0.0; 4],
         common: 0.0,
+        jitter: None,
         method: [NoiseMethod::Absent; 4],
         quantum: [None; 4],
         scatter: [None; 4],
@@ -89,6 +92,9 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
                 if resolution > level { (resolution, NoiseMethod::Resolution) } else { (level, method) };
             if method == NoiseMethod::Unsettled && estimate.method[c] == method {
                 estimate.std[c] = estimate.scatter[c].map_or(level, |s| s.max(level));
+            }
+            if let (0 | 2, NoiseMethod::Differences { order }) = (c, estimate.method[c]) {
+                estimate.jitter = [estimate.jitter, jitter(y, order)].into_iter().flatten().reduce(f64::max);
             }
         }
     }
@@ -140,6 +146,15 @@ fn level_of(y: &[f64], period: Option<usize>) -> (f64, NoiseMethod) {
 fn with_speed(series: &[f64], position: &[f64], order: usize) -> Option<f64> {
     let (differences, grown) = at_rest(series, position, order)?;
     Some((block_median(&differences, order) / binomial(2 * order) * grown).sqrt())
+}
+
+/// Standard deviation of the time by which the samples of a position are early or late, in samples, by its differences of an order; `None`
+/// where that is not the larger part of its noise.
+fn jitter(y: &[f64], order: usize) -> Option<f64> {
+    let (differences, grown) = at_rest(y, y, order)?;
+    let by_speed = block_median(&differences, order) / binomial(2 * order) * (grown - 1.0);
+    let speed = y.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (y.len() - 1) as f64;
+    (grown > 2.0).then(|| (by_speed / speed).sqrt())
 }
 
 /// Differences of a series with the noise that they have where the axis stands, and how much the variance grows over the record.
@@ -393,6 +408,8 @@ mod tests {
             assert!((estimate.std[c] / all - 1.0).abs() < 0.1, "{estimate:?} {all}");
         }
         assert!((estimate.common / together - 1.0).abs() < 0.2, "{estimate:?} {together}");
+        let told = estimate.jitter.expect("it rules the noise");
+        assert!((told / jitter - 1.0).abs() < 0.1, "{told}");
     }
 
     #[test]
