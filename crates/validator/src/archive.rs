@@ -230,6 +230,20 @@ impl Archive {
         Ok(bytes)
     }
 
+    /// The first bytes of one entry, `length` or fewer. Its checksum is not compared: [`Archive::test`] does that.
+    ///
+    /// # Errors
+    /// When there is no such entry, or it cannot be inflated.
+    pub fn start(&mut self, name: &str, length: u64) -> Result<Vec<u8>, ArchiveError> {
+        let index = self.entries.iter().position(|entry| entry.name == name);
+        let index = index.ok_or_else(|| ArchiveError::Missing(name.to_owned()))?;
+        let fail = |message: String| ArchiveError::Entry { name: name.to_owned(), message };
+        let file = self.zip.by_index(index).map_err(|error| fail(error.to_string()))?;
+        let mut bytes = Vec::new();
+        file.take(length).read_to_end(&mut bytes).map_err(|error| fail(error.to_string()))?;
+        Ok(bytes)
+    }
+
     /// Inflates every entry to nowhere, so that damage shows: wrong checksums, cut data, sizes that lie.
     ///
     /// # Errors
@@ -344,6 +358,15 @@ mod tests {
         assert_eq!(fs::read(path.join("resources/a/b.txt")).unwrap(), b"hello");
         drop(folder);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn the_start_of_an_entry_is_that_of_the_whole() {
+        let text = vec![b'x'; 100_000];
+        let mut archive = Archive::from_bytes(archive(&[("a", &text), ("b", b"hello")]), Limits::default()).unwrap();
+        assert_eq!(archive.start("a", 4096).unwrap(), &text[..4096]);
+        assert_eq!(archive.start("b", 4096).unwrap(), b"hello");
+        assert!(matches!(archive.start("c", 4096), Err(ArchiveError::Missing(_))));
     }
 
     #[test]
