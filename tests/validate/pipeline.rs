@@ -28,8 +28,12 @@ fn every_fmu_of_a_build_gets_a_report_and_the_gravest_result_is_the_exit_code() 
     let read = |name: &str| std::fs::read_to_string(folder.path().join("reports").join(name)).unwrap();
     let sarif: serde_json::Value = serde_json::from_str(&read("broken.sarif")).unwrap();
     assert_eq!(sarif["runs"][0]["results"][0]["ruleId"], "schema-value");
-    let sarif: serde_json::Value = serde_json::from_str(&read("a b--sound.sarif")).unwrap();
-    assert!(sarif["runs"][0]["results"].as_array().unwrap().is_empty());
+    let sound: serde_json::Value = serde_json::from_str(&read("a b--sound.sarif")).unwrap();
+    assert!(sound["runs"][0]["results"].as_array().unwrap().is_empty());
+    // Uploaded together, two runs of one category would be refused; a category ends in a slash.
+    let category = |of: &serde_json::Value| of["runs"][0]["automationDetails"]["id"].as_str().unwrap().to_owned();
+    assert_ne!(category(&sarif), category(&sound));
+    assert!(category(&sound).ends_with("build/a b/sound.fmu/"), "{}", category(&sound));
     assert!(read("broken.html").contains("The FMU fails.") && read("a b--sound.html").contains("passes the rules"));
     // One that cannot be read is graver than findings.
     std::fs::write(build.join("old.fmu"), pack(&files(&description(&[("fmiVersion=\"2.0\"", "fmiVersion=\"1.0\"")]))))
@@ -47,6 +51,7 @@ fn the_action_calls_the_script_and_names_its_exit_codes() {
     for part in ["scripts/validate_fmus.sh", "sarif_file: ${{ inputs.reports }}", "using: composite", "3 not tested"] {
         assert!(action.contains(part), "{part}");
     }
+    assert!(!action.contains("category:"), "one category for all SARIF files makes the upload fail");
 }
 
 /// The lines of a step's `run: |` in the action.
