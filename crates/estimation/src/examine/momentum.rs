@@ -109,7 +109,7 @@ fn whole_record(
     inertia: &mut Option<f64>,
     findings: &mut Vec<Finding>,
 ) {
-    let spectra = Spectra::new(columns, columns[0].len() / 2 * 2, input.dt);
+    let spectra = Spectra::new(columns, transformable(columns[0].len()), input.dt);
     // Acceleration is noise above the motion's band: the lines that hold nearly all of the speed.
     let total: f64 = (0..spectra.lines).map(|f| spectra.power(MAIN, f)).sum();
     let mut sum = 0.0;
@@ -130,6 +130,16 @@ fn whole_record(
         findings.extend(counted(input, &spectra, &lines).1);
     }
     *inertia = believed(nominal, weigh(input, &spectra, &lines, collocated), findings);
+}
+
+/// Even number of samples, all of `n` or, of a long record, a little fewer: a length with a large prime factor is transformed several
+/// times as slowly.
+fn transformable(n: usize) -> usize {
+    if n < 1 << 16 {
+        return n / 2 * 2;
+    }
+    let odd = (0..6).flat_map(|threes| (0..6).map(move |fives| 3_usize.pow(threes) * 5_usize.pow(fives)));
+    odd.filter(|odd| 2 * odd <= n).map(|odd| odd << (n / odd).ilog2()).max().unwrap_or(n / 2 * 2)
 }
 
 /// What a balance of free coefficients found, but of sign and unit what the nominal axis says of them, where it says anything.
@@ -344,17 +354,25 @@ impl MomentumBalance<'_> {
     }
 
     /// [`Self::right`] for a motion that is late by `-most` to `most` samples of `dt`, each: from one to the next the phase of a
-    /// line turns by the same angle, so that a line's sines and cross spectra are asked for once.
-    fn rights(&self, dt: f64, most: i32) -> Vec<[f64; 6]> {
-        let mut rights = vec![[0.0; 6]; 2 * most.unsigned_abs() as usize + 1];
+    /// line turns by the same angle, so that a line's sines and cross spectra are asked for once; as far before as behind, the
+    /// sine alone changes its sign.
+    fn rights(&self, dt: f64, most: usize) -> Vec<[f64; 6]> {
+        let mut rights = vec![[0.0; 6]; 2 * most + 1];
+        // From the middle outwards, before and behind.
+        let (before, rest) = rights.split_at_mut(most);
+        let Some((middle, behind)) = rest.split_first_mut() else { return rights };
         for &f in self.lines {
             let terms = self.regressors(f).map(|(column, factor)| factor.conj() * self.s.of(column, T, f));
-            let angle = self.s.omega(f) * dt;
-            let turn = Complex::from_polar(1.0, -angle);
-            let mut phase = Complex::from_polar(1.0, angle * f64::from(most));
-            for right in &mut rights {
-                for (r, term) in right.iter_mut().zip(&terms) {
-                    *r += term.re * phase.re - term.im * phase.im;
+            let turn = Complex::from_polar(1.0, self.s.omega(f) * dt);
+            let mut phase = turn;
+            for (r, term) in middle.iter_mut().zip(&terms) {
+                *r += term.re;
+            }
+            for (early, late) in before.iter_mut().rev().zip(behind.iter_mut()) {
+                for ((e, l), term) in early.iter_mut().zip(late.iter_mut()).zip(&terms) {
+                    let (even, odd) = (term.re * phase.re, term.im * phase.im);
+                    *e += even - odd;
+                    *l += even + odd;
                 }
                 phase *= turn;
             }
@@ -435,7 +453,7 @@ fn balance(
     let mut shares: Vec<(i32, f64, f64)> = Vec::new();
     // Beyond a quarter of a window what it holds of the two is no more the same.
     let tried = DELAYS.min(s.lines as i32 / 2);
-    for (late, right) in (-tried..=tried).zip(balance.rights(input.dt, tried)) {
+    for (late, right) in (-tried..=tried).zip(balance.rights(input.dt, tried.unsigned_abs() as usize)) {
         shares.push((late, balance.solve(&gram, &right).share, balance.solve(&gram, &negative(&right)).share));
     }
     let best = |of: &dyn Fn(&(i32, f64, f64)) -> f64, within: i32| {
@@ -551,5 +569,46 @@ fn excitation(nominal: Option<Nominal>, band: [f64; 2], findings: &mut Vec<Findi
             "Stiffness and damping of the coupling are not determined by this record, nor how the inertia is shared.",
             format!("Excite up to {} Hz (`eixo excite`), or describe the axis as rigid.", told(1.5 * anti)),
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_delay_of_many_is_that_of_one() {
+        let n = 512;
+        let torque: Vec<f64> = (0..n).map(|k| (0.3 * k as f64).sin() + (0.05 * (k * k % 97) as f64)).collect();
+        let speed: Vec<f64> =
+            (0..n).map(|k| torque[usize::saturating_sub(k, 3)] + 0.2 * (0.7 * k as f64).cos()).collect();
+        let sign: Vec<f64> = speed.iter().copied().map(f64::signum).collect();
+        let dt = 1e-3;
+        let spectra = Spectra::new(&[&torque, &speed, &sign], 128, dt);
+        let lines: Vec<usize> = (2..50).collect();
+        let balance = MomentumBalance { s: &spectra, lines: &lines, collocated: true, table: Some(700.0), total: 1.0 };
+        for (right, late) in balance.rights(dt, 5).into_iter().zip(-5..=5) {
+            let one = balance.right(f64::from(late) * dt);
+            let size = one.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+            for (a, b) in right.iter().zip(&one) {
+                assert!((a - b).abs() < 1e-12 * size, "{late}: {right:?} against {one:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_record_is_cut_to_a_length_of_small_factors() {
+        for n in [100_003, 999_999, 3_000_017] {
+            let length = transformable(n);
+            assert!(length <= n && length > n - n / 50 && length.is_multiple_of(2), "{n}: {length}");
+            let mut rest = length;
+            for factor in [2, 3, 5] {
+                while rest.is_multiple_of(factor) {
+                    rest /= factor;
+                }
+            }
+            assert_eq!(rest, 1, "{n}: {length}");
+        }
+        assert_eq!(transformable(4001), 4000);
     }
 }
