@@ -77,11 +77,9 @@ fn compile(target: &str, folder: &str, library: &Path) {
     let mut imports = Vec::new();
     for one in below {
         let import = library.with_file_name(format!("lib{}_{folder}.rlib", one.1));
-        // As cargo has it under link-time optimisation: no machine code yet.
-        run(
-            rustc(target, one, &imports).args(["--crate-type", "rlib", "-C", "linker-plugin-lto", "-o"]).arg(&import),
-            folder,
-        );
+        // With machine code beside what link-time optimisation reads: a linker of another LLVM, as zig's, looks at it and stops at
+        // code that only this compiler's LLVM knows.
+        run(rustc(target, one, &imports).args(["--crate-type", "rlib", "-o"]).arg(&import), folder);
         imports.push((one.1, import));
     }
     let mut shared = rustc(target, last, &imports);
