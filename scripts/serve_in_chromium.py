@@ -164,6 +164,13 @@ async def drive(port, address, log, work, pictures):
     print("\n".join(said.splitlines()[:3]))
     for width, dark in ((1280, False), (390, False), (390, True)):
         await one.picture(pictures, "done", width, dark)
+    # What the diagnosis of a phone says is not cut.
+    await two.call("Emulation.setDeviceMetricsOverride", width=390, height=900, deviceScaleFactor=1, mobile=True)
+    await two.value("document.getElementById('run').click()")
+    await two.until(shown("results"), 600)
+    box = await two.value("(b => [b.scrollWidth, b.clientWidth])(document.getElementById('said'))")
+    assert box[0] <= box[1], f"the box of {box[1]} pixels holds lines of {box[0]}"
+    await two.picture(pictures, "phone", 390, False)
     reports = await one.value("[...document.querySelectorAll('#files a')].map(a => [a.textContent, a.href])")
     assert {"Open report.html", "Open circle.html", "Save axis.toml", "Save improved.fmu"} <= {t for t, _ in reports}, reports
     for name in ("Open report.html", "Open circle.html"):

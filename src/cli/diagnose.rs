@@ -10,7 +10,7 @@ use super::examined::{Believed, Examined, examined};
 use super::many::Many;
 use super::outputs;
 use super::progress::Progress;
-use super::stdout::{WIDTH, layout, out, out_line};
+use super::stdout::{WIDTH, layout, out};
 use crate::axis::Structure;
 use crate::diagnose::{
     CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise,
@@ -22,7 +22,7 @@ use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Setting};
 use crate::report::diagnose::{Findings, json as contract, report, short, warnings};
 use crate::report::format::{Medium, number, percent, printable};
-use crate::report::{html, terminal};
+use crate::report::{Block, html, terminal};
 use crate::trace::{Machine, Signal, Trace, nearest, write_text};
 
 /// Arguments of `eixo diagnose`.
@@ -208,7 +208,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let bytes = Package::of(&improved).with_context(|| path.display().to_string())?.archive()?;
         super::export::read_back(&bytes, "modelDescription.xml").with_context(|| path.display().to_string())?;
         write_text(path, &bytes)?;
-        out_line!("{}", replayed(path, &outcome.replay)?)?;
+        let line = Block::Paragraph(replayed(path, &outcome.replay)?);
+        out!("{}", terminal::blocks(&[line], layout(WIDTH)))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -238,7 +239,12 @@ fn found(diagnosed: &Diagnosed) -> Found {
     Found {
         facts,
         parameters: base.chain(of_causes).filter(|t| t.value.is_finite()).collect(),
-        warnings: diagnosed.warnings.iter().cloned().chain(warnings(d)).collect(),
+        warnings: diagnosed
+            .warnings
+            .iter()
+            .cloned()
+            .chain(warnings(d, Some(diagnosed.machine.signals.motion)))
+            .collect(),
         result: contract::value(d),
         report: report(&diagnosed.findings()),
     }

@@ -67,8 +67,9 @@ pub struct Job {
 }
 
 impl Job {
-    /// Starts one in a folder that holds `axis.toml` and the log.
-    pub fn start(folder: PathBuf, log: String, trust: bool) -> Arc<Self> {
+    /// Starts one in a folder that holds `axis.toml` and the log. What it prints has lines of so many characters, as many as the
+    /// page has room for, where that is known.
+    pub fn start(folder: PathBuf, log: String, trust: bool, width: Option<u64>) -> Arc<Self> {
         let told = Told {
             state: State::Running,
             steps: vec!["reading the log".to_owned()],
@@ -79,7 +80,7 @@ impl Job {
         let job = Arc::new(Self { told: Mutex::new(told), stop: AtomicBool::new(false), began: Instant::now() });
         let own = Arc::clone(&job);
         std::thread::spawn(move || {
-            let state = own.work(&folder, &log, trust);
+            let state = own.work(&folder, &log, trust, width);
             let mut told = own.lock();
             told.seconds = own.began.elapsed().as_secs_f64();
             told.state = state;
@@ -112,7 +113,7 @@ impl Job {
         }
     }
 
-    fn work(&self, folder: &Path, log: &str, trust: bool) -> State {
+    fn work(&self, folder: &Path, log: &str, trust: bool, width: Option<u64>) -> State {
         let mut diagnose =
             vec!["diagnose", log, "--axis", "axis.toml", "--json", "diagnosis.json", "--report", "report.html"];
         diagnose.extend(["--fmu", "improved.fmu", "--progress", "lines"]);
@@ -122,7 +123,7 @@ impl Job {
         for old in ["diagnosis.json", "report.html", "improved.fmu", "circle.html"] {
             let _ = std::fs::remove_file(folder.join(old));
         }
-        let ended = self.run(folder, &diagnose);
+        let ended = self.run(folder, &diagnose, width);
         if self.stop.load(Ordering::SeqCst) {
             return State::Stopped;
         }
@@ -143,7 +144,7 @@ impl Job {
         }
         self.lock().steps.push("the circular test".to_owned());
         let circle = ["circle", "axis.toml", "--diagnosed", "diagnosis.json", "--report", "circle.html"];
-        match self.run(folder, &circle) {
+        match self.run(folder, &circle, width) {
             _ if self.stop.load(Ordering::SeqCst) => return State::Stopped,
             Ok((Some(0 | 1), _, _)) => {}
             Ok((_, _, errors)) => self.lock().aside = Some(errors),
@@ -153,8 +154,8 @@ impl Job {
     }
 
     /// Runs this program for the diagnosis.
-    fn run(&self, folder: &Path, arguments: &[&str]) -> std::io::Result<Ended> {
-        run(folder, arguments, &self.stop, &|step| self.step(step))
+    fn run(&self, folder: &Path, arguments: &[&str], width: Option<u64>) -> std::io::Result<Ended> {
+        run(folder, arguments, width, &self.stop, &|step| self.step(step))
     }
 
     /// The next step.
@@ -175,13 +176,15 @@ impl Job {
 /// How a process ended: exit code, what it printed, its errors.
 pub type Ended = (Option<i32>, String, String);
 
-/// Runs this program in a folder until it ends or is to stop; `step` gets its lines of progress.
+/// Runs this program in a folder until it ends or is to stop; `step` gets its lines of progress. What it prints has lines of `width`
+/// characters, where that is given.
 ///
 /// # Errors
 /// When it cannot be started, or what it prints not be kept.
 pub fn run(
     folder: &Path,
     arguments: &[&str],
+    width: Option<u64>,
     stop: &AtomicBool,
     step: &(dyn Fn(&str) + Sync),
 ) -> std::io::Result<Ended> {
@@ -189,6 +192,8 @@ pub fn run(
     let mut command = Command::new(std::env::current_exe()?);
     command.args(arguments).current_dir(folder).stdin(Stdio::null());
     command.stdout(File::create(&printed)?).stderr(Stdio::piped());
+    // Not that of the terminal in which this was started.
+    command.env_remove("COLUMNS").envs(width.map(|w| ("COLUMNS", w.to_string())));
     #[cfg(unix)]
     {
         use std::os::unix::process::CommandExt;

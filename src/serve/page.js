@@ -199,11 +199,19 @@
   }
 
   // 4
+  // Characters of a line of what the diagnosis prints; it has no size yet while it is hidden.
+  function width() {
+    const brush = document.createElement("canvas").getContext("2d");
+    const style = getComputedStyle($("said"));
+    brush.font = `${style.fontSize} ${style.fontFamily}`;
+    const room = $("findings").clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight);
+    return Math.max(60, Math.min(100, Math.floor(room / brush.measureText("0".repeat(100)).width * 100)));
+  }
   async function start(trust) {
     problem("work-problem");
     $("run").disabled = true;
     try {
-      await post(own("run"), { trust });
+      await post(own("run"), { trust, width: width() });
       show("results", false);
       lead("work");
       watch();

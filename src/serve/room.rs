@@ -155,7 +155,9 @@ impl Room {
         if logs.values().filter(|l| runs(l)).count() >= MOST_JOBS {
             return Err(Refusal::new(409, format!("{MOST_JOBS} diagnoses run already; wait for one, or stop it")));
         }
-        *lock(&log.job) = Some(Job::start(log.folder.clone(), log.file.clone(), asked["trust"] == true));
+        // As the program takes it of a terminal.
+        let width = asked["width"].as_u64().map(|w| w.clamp(60, 200));
+        *lock(&log.job) = Some(Job::start(log.folder.clone(), log.file.clone(), asked["trust"] == true, width));
         Ok(Response::json(200, &log.state()))
     }
 
@@ -200,7 +202,7 @@ impl Log {
     /// Runs this program in the log's folder and gives what it printed.
     fn eixo(&self, arguments: &[String]) -> Result<String, Refusal> {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        match run(&self.folder, &arguments, &CLOSING, &|_| ())? {
+        match run(&self.folder, &arguments, None, &CLOSING, &|_| ())? {
             (Some(0 | 1), said, _) => Ok(said),
             (_, _, errors) => {
                 let line = errors.lines().rev().find_map(|l| l.strip_prefix("error: "));

@@ -30,7 +30,7 @@ pub fn value(d: &Diagnosis) -> Value {
         "remainder": remainder(&d.remainder),
         "gap": gap(&d.gap),
         "parameters": map(d.parameters.iter().map(|p| (p.parameter.name(), parameter(p)))),
-        "warnings": words::warnings(d),
+        "warnings": words::warnings(d, None),
     });
     if let Some(l) = &d.closed_loop {
         all["closed_loop"] = closed_loop(l);

@@ -40,7 +40,7 @@ pub struct Findings<'a> {
 pub fn report(f: &Findings) -> Report {
     let d = f.diagnosis;
     let mut top = vec![Block::Verdict(verdict(d))];
-    top.extend(words::warnings(d).into_iter().map(Block::Warning));
+    top.extend(words::warnings(d, Some(f.motion)).into_iter().map(Block::Warning));
     top.push(Block::Figure(Figure::new(chain(d), words::gap_shows(&d.location.shown, Some(f.motion)))));
     let mut sections = vec![Section::new("", top)];
     if !d.causes.is_empty() {
@@ -67,7 +67,7 @@ pub fn report(f: &Findings) -> Report {
 pub fn short(f: &Findings) -> Vec<Block> {
     let d = f.diagnosis;
     let mut blocks = vec![Block::Verdict(verdict(d))];
-    blocks.extend(words::warnings(d).into_iter().map(Block::Warning));
+    blocks.extend(words::warnings(d, Some(f.motion)).into_iter().map(Block::Warning));
     blocks.push(Block::Paragraph(words::gap_shows(&d.location.shown, Some(f.motion))));
     if !d.causes.is_empty() {
         blocks.push(Block::Table(tables::causes(d)));

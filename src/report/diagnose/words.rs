@@ -103,10 +103,12 @@ pub fn alike(c: &Confusable) -> String {
     format!("their fits differ by {:.1} in BIC on this record", 2.0 * c.difference)
 }
 
-/// What the user should know of the data.
-pub fn warnings(d: &Diagnosis) -> Vec<String> {
+/// What the user should know of the data, of a motion that is known.
+pub fn warnings(d: &Diagnosis, motion: Option<Motion>) -> Vec<String> {
+    let unit = motion.map_or_else(String::new, |m| format!(" {}", m.unit("rad")));
     let rounding = d.rounding.iter().map(|r| {
-        format!("{} read in steps of {:.3e}; the noise floor holds their rounding.", r.channels.join(" and "), r.step)
+        let channels = r.channels.join(" and ");
+        format!("{channels} read in steps of {:.3e}{unit}; the noise floor holds their rounding.", r.step)
     });
     let cut_short = d.cut_short.then(|| {
         "The search for causes ended at its limit of work: not every one of them was exchanged for every other. Diagnose a shorter \
