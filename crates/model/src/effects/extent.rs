@@ -40,11 +40,11 @@ impl Extent<'_> {
         1.0 - inside as f64 / x.len().max(1) as f64
     }
 
-    /// Whether a time turns the phase at the band's end by a fiftieth of a radian: less of it, a fiftieth of the torque at most, is
-    /// within the error of time stamps and of a measured torque.
+    /// Whether a time is a twentieth of a sample and turns the phase at the band's end by a fiftieth of a radian: less of it, a fiftieth of
+    /// the torque at most, is within the error of time stamps and of a measured torque.
     #[must_use]
     pub fn turns_phase(&self, time: f64) -> bool {
-        time.abs() * self.band >= 0.02
+        time.abs() * self.band >= 0.02 && time.abs() >= 0.05 * self.dt
     }
 
     /// Whether an angular frequency lies in the band, with at least two periods in the record.
