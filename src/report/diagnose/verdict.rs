@@ -2,8 +2,8 @@
 
 use super::naming::{held_out, lower, short_title, title};
 use super::percent;
-use super::words::REMAINS;
-use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, Verdict as Answer};
+use super::words::{REMAINS, in_the_noise};
+use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, UNCAUSED, Verdict as Answer};
 use crate::report::{Cell, Tone, Verdict};
 
 /// Error over noise below which a model explains a trace.
@@ -26,7 +26,9 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
                 percent(held.before),
                 percent(held.noise_floor)
             );
-            let sentence = if d.remainder.noise_multiple > REMAINS {
+            let sentence = if d.remainder.share > UNCAUSED {
+                in_the_noise(d)
+            } else if d.remainder.noise_multiple > REMAINS {
                 let left = percent(d.remainder.share);
                 format!("No gap: no cause stands out in the {left} of the torque that the model leaves.")
             } else {

@@ -5,7 +5,7 @@ use super::percent;
 use crate::diagnose::location::{Appearance, Location, OwnFrequency, Shape, Spread};
 use crate::diagnose::{
     AxisParameter, BaseParameter, Cause, ClosedLoop, ClosureOf, Confusable, Diagnosis, LoopRanked, RoundingRole,
-    Verdict,
+    UNCAUSED, Verdict,
 };
 use crate::effects::{Contrast, Effect};
 use crate::examine::NOMINAL_OFF;
@@ -17,6 +17,7 @@ pub fn sentence(d: &Diagnosis) -> String {
     let percent = |v: f64| format!("{:.1} %", 100.0 * v.clamp(-9.99, 1.0));
     let gap = if d.gap.closure_of == ClosureOf::Torque { "the gap in torque" } else { "the gap" };
     match d.verdict {
+        Verdict::NoGap if d.remainder.share > UNCAUSED => in_the_noise(d),
         Verdict::NoGap if d.remainder.noise_multiple > REMAINS => format!(
             "No gap: no cause stands out in the {} of the torque that the model as given leaves.",
             percent(d.remainder.share)
@@ -24,6 +25,11 @@ pub fn sentence(d: &Diagnosis) -> String {
         Verdict::NoGap => "No gap: the model as given explains the record down to the noise.".to_owned(),
         Verdict::Parameters if !d.causes.is_empty() => {
             "Parameters: every nominal parameter is off by the same factor, as from a wrong torque constant.".to_owned()
+        }
+        Verdict::Parameters if d.gap.closure < 0.0 => {
+            "Parameters: the structure is right, its parameters are off by the fitted record; the held-out record contradicts it: the error \
+             grows there."
+                .to_owned()
         }
         Verdict::Parameters => format!(
             "Parameters: the structure is right, its parameters are off; with them fitted {} of {gap} closes.",
@@ -53,6 +59,14 @@ pub fn sentence(d: &Diagnosis) -> String {
             format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}")
         }
     }
+}
+
+/// No gap of a record whose noise makes more torque than the model leaves.
+pub fn in_the_noise(d: &Diagnosis) -> String {
+    format!(
+        "No gap that this record could show: what the model leaves, {:.1} % of the torque, is no more than what the encoders' noise makes.",
+        100.0 * d.remainder.share
+    )
 }
 
 /// Whether all that is left is rounding, and that may not be named.

@@ -25,5 +25,5 @@ pub use model::{BaseParameter, Model};
 pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
 pub use overlay::Overlay;
 pub use record::{CHANNELS, Record, TORQUE};
-pub use torque::{Confusable, Decision, Fit, Weighed, diagnose};
+pub use torque::{Confusable, Decision, Fit, UNCAUSED, Weighed, diagnose};
 pub use verdict::Verdict;

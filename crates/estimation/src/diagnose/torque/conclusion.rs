@@ -27,7 +27,10 @@ pub const LIKELY: f64 = 0.35;
 /// The same of a cause on its own, with which the verdict stands and falls: more likely than not.
 const ALONE: f64 = 0.5;
 /// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
-const UNCAUSED: f64 = 0.05;
+pub const UNCAUSED: f64 = 0.05;
+/// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
+/// that is told at the sampling rate (1/f) a noise has several times as much at the motion's.
+const COLOUR: f64 = 10.0;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 
@@ -150,7 +153,7 @@ impl Search<'_> {
         // One that is not likely explains nothing that needs a cause.
         if let [only] = probabilities[..]
             && !likely(&only)
-            && self.left(plain) <= UNCAUSED
+            && self.needs_no_cause(plain)
         {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             let none = plain.clone();
@@ -173,7 +176,7 @@ impl Search<'_> {
             false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
             true if is_run_off(&chosen, nominal) => Verdict::Unexplained,
-            true if left > UNCAUSED => Verdict::Unexplained,
+            true if !self.needs_no_cause(&chosen) => Verdict::Unexplained,
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
         };
@@ -193,6 +196,13 @@ impl Search<'_> {
             independent,
             confusable,
         }
+    }
+
+    /// Whether what a fit leaves may be the error of a measured current, or the encoders' noise.
+    fn needs_no_cause(&self, fit: &Fit) -> bool {
+        let left = self.left(fit);
+        let of_noise = self.band().torque_share([0, 1].map(|i| self.band().noise_power(i)), self.problem.record);
+        left <= UNCAUSED || left <= of_noise && self.band().noise_multiple(&fit.rows) < COLOUR
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted

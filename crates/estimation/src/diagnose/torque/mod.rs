@@ -40,7 +40,7 @@ use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
 use band::{Rate, Reach};
 use conclusion::LIKELY;
-pub use conclusion::{Confusable, Decision, Weighed};
+pub use conclusion::{Confusable, Decision, UNCAUSED, Weighed};
 pub use fit::Fit;
 use fit::Problem;
 use gap::{Gap, Gaps, rms_about_mean};
