@@ -38,12 +38,16 @@ fn estimate(result: &serde_json::Value, method: &str, list: &str, name: &str, fi
 
 /// Excites and simulates the paper's axis: the files of excitation and trace.
 fn experiment(folder: &Path) -> PathBuf {
+    experiment_under(folder, Hold::Zoh)
+}
+
+fn experiment_under(folder: &Path, hold: Hold) -> PathBuf {
     let torque = folder.join("excitation.csv");
     let out = eixo(&["excite", "-o", text(&torque)]);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     assert!(String::from_utf8_lossy(&out.stdout).contains("crest factor  1.676"));
     let mut trace = load(&torque, &Mapping::default()).expect("the excitation").trace;
-    let options = SimulateOptions { start: 0.0, dt: trace.dt, hold: Hold::Zoh, scheme: Scheme::NEWMARK, substeps: 1 };
+    let options = SimulateOptions { start: 0.0, dt: trace.dt, hold, scheme: Scheme::NEWMARK, substeps: 1 };
     let t = trace.get(Signal::T).expect("T").to_vec();
     let response = simulate(&Parameters::PAPER, Structure::TwoInertia, &Settings::default(), [0.0; 4], &t, &options);
     let column = |f: fn(&eixo::effects::Reading<f64>) -> f64| response.readings.iter().map(f).collect::<Vec<_>>();
@@ -201,6 +205,26 @@ fn the_real_emps_axis_has_the_published_parameters() {
 }
 
 /// Runs identify on a text as trace; it must end with code 2 and say every part, and leave nothing behind.
+#[test]
+fn a_torque_that_runs_straight_between_samples_is_found_to_where_nobody_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let trace = experiment_under(folder.path(), Hold::Linear);
+    let out = folder.path().join("out.json");
+    let told = |arguments: &[&str]| {
+        let run = eixo(&[&["identify", text(&trace), "--json", text(&out)], arguments].concat());
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let result = json(&out);
+        let warned =
+            result["warnings"].as_array().expect("warnings").iter().any(|w| w.as_str().unwrap().contains("--hold"));
+        (estimate(&result, "oe", "parameters", "I2", "value") / 6.07e-6 - 1.0, warned)
+    };
+    let (off, warned) = told(&[]);
+    assert!(off.abs() < 1e-6 && warned, "{off} {warned}");
+    // Who says that it is held is believed.
+    let (off, warned) = told(&["--hold", "zoh"]);
+    assert!(off > 0.3 && !warned, "{off} {warned}");
+}
+
 fn refused(csv: &str, parts: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");

@@ -17,6 +17,7 @@ use super::outputs;
 use super::stdout::out;
 use crate::axis::{Scheme, Structure};
 use crate::fleet::{Found, Tracked};
+use crate::identify::hold;
 use crate::identify::joined::Joined;
 use crate::identify::result::{Estimate, Identification};
 use crate::identify::run::{Method, Request, identify_joined};
@@ -225,10 +226,15 @@ fn examine(
         needed.push(Signal::Theta2);
     }
     needed.into_iter().try_for_each(|s| there.require(s).map(|_| ())).context(file.clone())?;
-    let (pieces, warnings) = examined_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
+    let (mut pieces, warnings) = examined_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
     let joined = Joined::of(&pieces)?;
     let request = request(args, axis.is_some());
-    let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file)?;
+    let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file.clone())?;
+    let told = args.hold.is_some() || axis.is_some();
+    if !told && let Some(other) = hold::straight(&result, &pieces, &machine, &request, &file, progress).context(file)? {
+        (result, pieces) = other;
+        machine.signals.hold = Hold::Linear;
+    }
     result.warnings.splice(0..0, warnings);
     Ok((machine, result, pieces))
 }

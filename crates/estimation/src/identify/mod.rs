@@ -4,6 +4,7 @@ mod assessment;
 pub mod excitation;
 pub mod extended;
 pub mod frequency;
+pub mod hold;
 pub mod identifiability;
 pub mod instrumental;
 pub mod joined;
