@@ -81,6 +81,10 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
     search.gap = search.dynamic_gap(&parameters);
     let known = known.and_then(|k| search.problem.fit(&k.model, &k.terms, k.discrepancy, STEPS));
     let known = known.and_then(|k| search.problem.deepen(&k)).map(|k| search.pruned(k, &mut pool));
+    if known.is_some() {
+        // What it is likelier than must be known.
+        search.extended(&parameters, 0, &mut pool);
+    }
     let mut chosen = search.climb(known.unwrap_or_else(|| parameters.clone()), &mut pool);
     // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
     let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
