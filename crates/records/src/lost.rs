@@ -55,8 +55,8 @@ fn cubic(y: &[f64], k: usize, (row, reach): (usize, usize)) -> ([f64; ROW], f64)
     (expected, (left.max(0.0) / freedom).sqrt())
 }
 
-/// Lost samples of a position whose noise has a standard deviation of `noise`, rows of them each with what its neighbours expect and the rms by which
-/// these disagree.
+/// Lost samples of a position whose noise has a standard deviation of `noise`: rows of them, each with what its neighbours expect and the
+/// rms by which these disagree.
 fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; ROW], f64)> {
     let (row, reach) = pass;
     if y.len() < BLOCK {

@@ -167,13 +167,16 @@ fn at_rest(series: &[f64], position: &[f64], order: usize) -> Option<(Vec<f64>, 
 /// Differences of an order.
 fn differences(y: &[f64], order: usize) -> Vec<f64> {
     let mut d = y.to_vec();
-    for _ in 0..order {
-        for k in 0..d.len() - 1 {
-            d[k] = d[k + 1] - d[k];
-        }
-        d.pop();
-    }
+    (0..order).for_each(|_| differ(&mut d));
     d
+}
+
+/// Each value less the one before it.
+fn differ(d: &mut Vec<f64>) {
+    for k in 1..d.len() {
+        d[k - 1] = d[k] - d[k - 1];
+    }
+    d.pop();
 }
 
 /// The level at which three orders in a row agree, and the lowest of them; else the lowest level.
@@ -198,10 +201,7 @@ fn levels(y: &[f64]) -> Vec<f64> {
         if d.len() < 2 {
             break;
         }
-        for k in 0..d.len() - 1 {
-            d[k] = d[k + 1] - d[k];
-        }
-        d.pop();
+        differ(&mut d);
         // C(2n, n) = C(2n-2, n-1)*(2n)*(2n-1)/n^2.
         let m = n as f64;
         gain *= 2.0 * m * (2.0 * m - 1.0) / (m * m);

@@ -213,7 +213,7 @@ impl Search<'_> {
         let mut best = from;
         let mut passed: Vec<Vec<Term>> = Vec::new();
         for _ in 0..2 * MOST {
-            // What is likelier and explains no material part more is gone back from: once.
+            // What is likelier and explains no material part more is pruned again: the way goes round.
             if passed.contains(&best.terms) {
                 break;
             }

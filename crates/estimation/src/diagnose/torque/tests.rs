@@ -239,6 +239,31 @@ fn samples_taken_late_hide_neither_the_coupling_nor_the_friction_on_its_sides() 
 }
 
 #[test]
+fn noise_of_1_over_f_on_an_axis_that_hardly_moves_is_no_gap() {
+    let paper = Parameters::PAPER;
+    let mut record = of_two_inertias(paper, Settings::default(), 2e-3, 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    for c in [0, 2] {
+        // Octaves of a random walk that forgets: their sum falls with the frequency.
+        let mut octaves = [0.0; 8];
+        for y in record.channels[c].iter_mut().flatten() {
+            for (i, octave) in octaves.iter_mut().enumerate() {
+                let forgets = 0.5_f64.powi(i as i32);
+                *octave += forgets.sqrt() * noise(&mut rng, 1e-3) - forgets * *octave;
+            }
+            *y += octaves.iter().sum::<f64>();
+        }
+    }
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let read = estimate_noise(&record.torque, &channels, None);
+    (record.noise, record.common_noise) = (read.std, read.common);
+    let o = diagnosed_as(&record, Structure::TwoInertia, paper);
+    assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{:?}", o.decision.verdict);
+    // More of the torque is left than a measured current is off by.
+    assert!(o.diagnosis.remainder.share > super::UNCAUSED, "{:?}", o.diagnosis.remainder);
+}
+
+#[test]
 fn of_two_large_causes_both_are_found() {
     let hidden = [
         (Effect::ExternalSpring, 0, 0.02),
