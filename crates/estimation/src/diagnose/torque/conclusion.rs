@@ -180,6 +180,7 @@ impl Search<'_> {
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
         };
+        let chosen = self.problem.finished(&chosen).unwrap_or(chosen);
         ranking.truncate(40);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
         let shares = self.shares(&chosen);

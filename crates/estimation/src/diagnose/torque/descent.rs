@@ -15,8 +15,8 @@ use super::tracking::Bandwidth;
 
 /// Steps tried, each shorter than the one before, until one is better.
 const TRIALS: usize = 7;
-/// Steps in which the shapes of effects are held.
-const SIZES_FIRST: usize = 1;
+/// Steps in which something is held.
+const FIRST_STEPS: usize = 1;
 /// Largest step of a logarithm.
 const FARTHEST_STEP: f64 = 0.5;
 /// Share of a discrepancy's variance that is left at least from one step to the next.
@@ -54,6 +54,17 @@ pub struct Descent<'a> {
     iterations: usize,
     /// Whether the last step would have taken an effect out of what physics lets it be.
     leaves: bool,
+    /// What is held in the first steps.
+    first: First,
+}
+
+/// What a descent holds in its first steps: what its start was not found with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum First {
+    /// The shapes of effects: their sizes were found beside the axis' parameters.
+    Sizes,
+    /// The axis' parameters: the effect was found beside an axis as given.
+    Effects,
 }
 
 impl<'a> Descent<'a> {
@@ -70,7 +81,28 @@ impl<'a> Descent<'a> {
             columns: Vec::new(),
             iterations: 0,
             leaves: false,
+            first: First::Sizes,
         })
+    }
+
+    /// On from where a fit ended.
+    pub fn resumed(problem: &'a Problem<'a>, fit: &'a Fit) -> Self {
+        Self {
+            problem,
+            terms: &fit.terms,
+            coordinates: fit.coordinates.clone(),
+            at: Along { model: fit.model, rows: fit.rows.clone(), s: fit.discrepancy, bandwidth: fit.bandwidth },
+            std: fit.std.clone(),
+            columns: fit.columns.clone(),
+            iterations: fit.iterations,
+            leaves: fit.at_bound,
+            first: First::Sizes,
+        }
+    }
+
+    /// With other things held first.
+    pub fn holding(self, first: First) -> Self {
+        Self { first, ..self }
     }
 
     /// At most so many steps, each followed at the likeliest bandwidth.
@@ -79,10 +111,10 @@ impl<'a> Descent<'a> {
     }
 
     /// Steps at lower and lower bandwidths, as long as they end likelier: the likeliest parameters along the measured motion are off by
-    /// what its noise does to the effects, and there the model drifts away from the record.
-    pub fn sharpen(&mut self) -> Option<()> {
+    /// what its noise does to the effects, and there the model drifts away from the record. At the floor of the noise on request alone.
+    pub fn sharpen(&mut self, at_floor: bool) -> Option<()> {
         let least = self.problem.bandwidth([0.0; 2]);
-        while !self.problem.band.at_floor(&self.at.rows) {
+        while at_floor || !self.problem.band.at_floor(&self.at.rows) {
             let bandwidth = [0, 1].map(|i| (SHARPER * self.at.bandwidth[i]).max(least[i]));
             if !differ(bandwidth, self.at.bandwidth) {
                 break;
@@ -106,7 +138,7 @@ impl<'a> Descent<'a> {
         let mut damping = 0.0;
         for i in 0..effort {
             self.iterations += 1;
-            let gained = self.step(&mut damping, i < SIZES_FIRST)?;
+            let gained = self.step(&mut damping, i < FIRST_STEPS)?;
             let found = band.discrepancy(&self.at.rows);
             let likelier = band.log_likelihood(&self.at.rows, found) > self.log_likelihood();
             let s = if likelier { found } else { self.at.s };
@@ -125,27 +157,20 @@ impl<'a> Descent<'a> {
     }
 
     /// One of Levenberg's steps at the present discrepancy; the gain in log likelihood, if there was one.
-    fn step(&mut self, damping: &mut f64, sizes_only: bool) -> Option<Option<f64>> {
+    fn step(&mut self, damping: &mut f64, begins: bool) -> Option<Option<f64>> {
         let (problem, band) = (self.problem, self.problem.band);
+        let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
+        let share = self.share();
+        let normal = self.normal(&x, share)?;
         let (coordinates, at) = (&self.coordinates, &self.at);
-        self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
-        let x: Vec<f64> = coordinates.iter().map(|c| c.x(&at.model)).collect();
-        let base: Vec<(BaseParameter, f64, usize)> = coordinates
+        let cost = |l: &Lacking, s: Discrepancy, x: &[f64]| {
+            -band.log_likelihood(l, s) - problem.log_prior(coordinates, x) / share
+        };
+        let before = cost(&at.rows, at.s, &x);
+        let mut held: Vec<bool> = coordinates
             .iter()
-            .enumerate()
-            .filter_map(|(i, c)| match c.free {
-                Free::Base(p) => Some((p, c.slope(x[i]), i)),
-                Free::Effect(..) | Free::Loop(_) => None,
-            })
+            .map(|c| begins && if self.first == First::Sizes { c.is_shape() } else { c.is_base() })
             .collect();
-        let grows = band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
-        let cost = |l: &Lacking, x: &[f64]| -band.log_likelihood(l, at.s) - problem.log_prior(coordinates, x);
-        let before = cost(&at.rows, &x);
-        let mut normal = Normal::new(problem, coordinates, &x, &self.columns, at);
-        for ((_, _, i), g) in base.iter().zip(&grows) {
-            normal.g[*i] += g;
-        }
-        let mut held: Vec<bool> = coordinates.iter().map(|c| sizes_only && c.is_shape()).collect();
         let (mut next, mut leaves) = (None, false);
         for _ in 0..TRIALS {
             let (delta, errors) = normal.solve(coordinates, &x, *damping, &held)?;
@@ -170,20 +195,48 @@ impl<'a> Descent<'a> {
                 continue;
             }
             if let Some(rows) = problem.rows(&model, at.bandwidth) {
-                let after = cost(&rows, &y);
+                let s = band.carried(at.s, &at.model, &model);
+                let after = cost(&rows, s, &y);
                 if after < before {
                     *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
-                    next = Some((model, rows, before - after));
+                    next = Some((model, rows, s, before - after));
                     break;
                 }
             }
             *damping = (10.0 * *damping).max(1e-3);
         }
         self.leaves = leaves;
-        Some(next.map(|(model, rows, gain)| {
-            (self.at.model, self.at.rows) = (model, rows);
+        Some(next.map(|(model, rows, s, gain)| {
+            (self.at.model, self.at.rows, self.at.s) = (model, rows, s);
             gain
         }))
+    }
+
+    /// Share of the values that count beside what was known of the parameters, as in the evidence; without any effect all do: what the axis
+    /// alone explains at its best is what effects are measured by.
+    fn share(&self) -> f64 {
+        if self.terms.is_empty() { 1.0 } else { self.problem.band.independent(&self.at.rows, self.at.s) }
+    }
+
+    /// Normal equations at x, with columns of their own.
+    fn normal(&mut self, x: &[f64], share: f64) -> Option<Normal> {
+        let (problem, coordinates, at) = (self.problem, &self.coordinates, &self.at);
+        self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
+        let base = of_the_axis(coordinates, x);
+        let grows = problem.band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
+        let mut normal = Normal::new(problem, coordinates, x, &self.columns, at, share);
+        for ((_, _, i), g) in base.iter().zip(&grows) {
+            normal.g[*i] += g;
+        }
+        Some(normal)
+    }
+
+    /// Standard error of each free value, in its unit, everything free at once: what a step took them to be held some shapes.
+    pub fn standard_errors(&mut self) -> Option<Vec<f64>> {
+        let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
+        let share = self.share();
+        let (_, errors) = self.normal(&x, share)?.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
+        Some(errors.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect())
     }
 
     /// Follows the record at another bandwidth where that is likelier.
@@ -229,6 +282,15 @@ pub fn differ(a: Bandwidth, b: Bandwidth) -> bool {
     (0..2).any(|i| (a[i] / b[i]).ln().abs() > ANOTHER)
 }
 
+/// The axis' own parameters among the coordinates at x: which, its slope, its index.
+fn of_the_axis(coordinates: &[Coordinate], x: &[f64]) -> Vec<(BaseParameter, f64, usize)> {
+    let of = |(i, c): (usize, &Coordinate)| match c.free {
+        Free::Base(p) => Some((p, c.slope(x[i]), i)),
+        Free::Effect(..) | Free::Loop(_) => None,
+    };
+    coordinates.iter().enumerate().filter_map(of).collect()
+}
+
 /// Normal equations `a*delta = g`.
 struct Normal {
     a: DMatrix<f64>,
@@ -237,7 +299,14 @@ struct Normal {
 
 impl Normal {
     /// Of whitened columns, the prior in them.
-    fn new(problem: &Problem<'_>, coordinates: &[Coordinate], x: &[f64], columns: &[[Vec<C>; 2]], at: &Along) -> Self {
+    fn new(
+        problem: &Problem<'_>,
+        coordinates: &[Coordinate],
+        x: &[f64],
+        columns: &[[Vec<C>; 2]],
+        at: &Along,
+        share: f64,
+    ) -> Self {
         let k = coordinates.len();
         let whiten = |rows: &[Vec<C>; 2]| problem.band.whiten(rows, &at.rows.weights, at.s);
         let z = whiten(&at.rows.rows);
@@ -248,8 +317,8 @@ impl Normal {
         let mut g = DVector::from_fn(k, |p, _| -dot(&j[p], &z));
         for i in 0..k {
             if let Free::Base(_) = coordinates[i].free {
-                a[(i, i)] += 1.0 / (PRIOR * PRIOR);
-                g[i] -= (x[i] - coordinates[i].x(&problem.nominal)) / (PRIOR * PRIOR);
+                a[(i, i)] += 1.0 / (PRIOR * PRIOR * share);
+                g[i] -= (x[i] - coordinates[i].x(&problem.nominal)) / (PRIOR * PRIOR * share);
             }
         }
         Self { a, g }

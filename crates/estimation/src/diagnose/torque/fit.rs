@@ -302,8 +302,18 @@ impl Problem<'_> {
     pub fn deepen(&self, fit: &Fit) -> Option<Fit> {
         let mut descent = Descent::new(self, &fit.model, &fit.terms, fit.discrepancy)?;
         descent.run(STEPS)?;
-        descent.sharpen()?;
+        descent.sharpen(false)?;
         Some(Fit { settled: true, ..descent.done() })
+    }
+
+    /// The fit decided for, along the model's own motion as far as that is likelier, with its standard errors. Below the floor of the noise no
+    /// verdict changes by it; the parameters do by many standard errors, where an effect is bent and its torque along the measured motion
+    /// leans with the noise.
+    pub fn finished(&self, fit: &Fit) -> Option<Fit> {
+        let mut descent = Descent::resumed(self, fit);
+        descent.sharpen(true)?;
+        let std = descent.standard_errors()?;
+        Some(Fit { std, settled: fit.settled, at_bound: fit.at_bound, ..descent.done() })
     }
 
     /// Whether physics lets the effects be what they are in a model.

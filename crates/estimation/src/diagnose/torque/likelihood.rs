@@ -267,9 +267,15 @@ impl Band {
                 [of(&inverse, &sc, 0, 0), of(&inverse, &sc, 0, 1)],
                 [of(&inverse, &sc, 1, 0), of(&inverse, &sc, 1, 1)],
             ];
-            for (i, (_, slope, column)) in base.iter().enumerate() {
+            for (i, (parameter, slope, column)) in base.iter().enumerate() {
                 let d = self.visible(&units[i], m);
                 let column = &mut columns[*column];
+                if both && *parameter == BaseParameter::I2 {
+                    // The table's discrepancy grows with its inertia (`carried`).
+                    let grown = slope / model.parameters.i2 * s[1];
+                    column[1][m] -= y[1] * grown;
+                    grows[i] -= 2.0 * weight * grown * c * c;
+                }
                 column[0][m] -= (d[0][0] * e[0] + d[0][1] * e[1]) * *slope;
                 if both {
                     column[1][m] -= (d[1][0] * e[0] + d[1][1] * e[1]) * *slope;
@@ -469,6 +475,15 @@ impl Band {
             }
         }
         s
+    }
+
+    /// The discrepancy of a model at another one: the table's, where both sides are measured, is that of an acceleration.
+    ///
+    /// No torque that is known acts on the table, so that its equation tells its parameters up to a common factor, and its discrepancy as a
+    /// torque grows with that factor. Held as a torque it would hold the factor, which the motor's equation alone tells.
+    pub fn carried(&self, s: Discrepancy, from: &Model, to: &Model) -> Discrepancy {
+        let grown = if self.sight == Sight::Both { to.parameters.i2 / from.parameters.i2 } else { 1.0 };
+        [s[0], s[1] * grown * grown]
     }
 
     /// A step of scoring from a discrepancy.

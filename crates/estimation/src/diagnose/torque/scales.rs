@@ -24,7 +24,8 @@ pub struct Scales {
 
 impl Scales {
     pub fn new(p: &Problem<'_>, fit: &Fit) -> Option<Self> {
-        let t = p.track(&fit.model, p.bandwidth(fit.discrepancy))?;
+        // Parameters that have gone far may not bear the feedback that their discrepancy asks for.
+        let t = p.track(&fit.model, p.bandwidth(fit.discrepancy)).or_else(|| p.track(&fit.model, fit.bandwidth))?;
         let n = t.motion.len() as f64;
         let rms = |f: &dyn Fn(&[f64; 4]) -> f64| (t.motion.iter().map(|m| f(m).powi(2)).sum::<f64>() / n).sqrt();
         let side = |i: usize| {

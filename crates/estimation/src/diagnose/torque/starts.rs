@@ -1,6 +1,7 @@
 //! Where a fit of an effect starts: the shapes on the record's scales, the sizes by linear regression on what the model lacks.
 
 use super::super::model::Model;
+use super::descent::{Descent, First};
 use super::fit::{Fit, Problem, Term};
 use super::likelihood::{C, Discrepancy, Weight};
 use super::scales::Scales;
@@ -47,7 +48,10 @@ impl<'a> Look<'a> {
     pub fn fitted(&self, start: &StartPoint, keep: usize, from: Discrepancy) -> Option<Fit> {
         let mut terms = self.fit.terms.clone();
         terms.insert(keep, start.term);
-        self.problem.fit(&start.model, &terms, from, PROBE)
+        let first = if self.fit.coordinates.is_empty() { First::Effects } else { First::Sizes };
+        let mut descent = Descent::new(&self.problem, &start.model, &terms, from)?.holding(first);
+        descent.run(PROBE)?;
+        Some(descent.done())
     }
 }
 
