@@ -12,6 +12,7 @@ use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
 use super::likelihood::{C, Discrepancy, Lacking};
 use super::tracking::Bandwidth;
+use crate::axis::Structure;
 
 /// Steps tried, each shorter than the one before, until one is better.
 const TRIALS: usize = 7;
@@ -215,7 +216,11 @@ impl<'a> Descent<'a> {
     /// Share of the values that count beside what was known of the parameters, as in the evidence; without any effect all do: what the axis
     /// alone explains at its best is what effects are measured by.
     fn share(&self) -> f64 {
-        if self.terms.is_empty() { 1.0 } else { self.problem.band.independent(&self.at.rows, self.at.s) }
+        if self.terms.is_empty() || self.problem.nominal.structure == Structure::Rigid {
+            1.0
+        } else {
+            self.problem.band.independent(&self.at.rows, self.at.s)
+        }
     }
 
     /// Normal equations at x, with columns of their own.
