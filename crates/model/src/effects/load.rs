@@ -31,7 +31,7 @@ impl<I: Side> Force for Load<I> {
         named: true,
         textbook: [true, false][I::INDEX],
         odds: 1.0,
-        bounds: |p, x| p[0].abs() <= 4.0 * x.torque,
+        bounds: |p, x| p[0].abs() <= 20.0 * x.torque,
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };

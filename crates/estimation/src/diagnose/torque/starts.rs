@@ -48,7 +48,8 @@ impl<'a> Look<'a> {
     pub fn fitted(&self, start: &StartPoint, keep: usize, from: Discrepancy) -> Option<Fit> {
         let mut terms = self.fit.terms.clone();
         terms.insert(keep, start.term);
-        let first = if self.fit.coordinates.is_empty() { First::Effects } else { First::Sizes };
+        let coupled = self.problem.nominal.structure == Structure::TwoInertia;
+        let first = if coupled && self.fit.coordinates.is_empty() { First::Effects } else { First::Sizes };
         let mut descent = Descent::new(&self.problem, &start.model, &terms, from)?.holding(first);
         descent.run(PROBE)?;
         Some(descent.done())
