@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import statistics
 
+import intervals
 import reliability
 from score import percent, wilson
 
@@ -90,7 +91,7 @@ def judge(seal: dict, answer: dict | None, seconds: float | None, memory: float 
         "probabilities_of_suspects": [(probability(c), right(c)) for c in suspects if c.get("family") != "parameters"],
         "verdict_exact": bool(answer) and verdict_of(answer) == seal["verdict"],
         "gaps": [e["gap_over_noise"] for e in seal["effects"]], "remainder": (answer or {}).get("remainder"),
-        "seconds": seconds, "memory_mb": memory,
+        "seconds": seconds, "memory_mb": memory, "standard_errors": intervals.errors(seal, answer, result in GOOD),
     }
 
 
@@ -105,6 +106,10 @@ def count(rows) -> dict:
                                      "good": share(rows, lambda r: r["good"])}
 
 
+def covered(rows) -> dict:
+    return share([z for r in rows for _, z in r["standard_errors"]], lambda z: z < intervals.COVERED)
+
+
 def summary(rows: list[dict]) -> dict:
     """All figures of a scored set."""
     healthy = [r for r in rows if r["group"] in HEALTHY]
@@ -116,7 +121,7 @@ def summary(rows: list[dict]) -> dict:
         "confidently_wrong": share(rows, lambda r: r["confidently_wrong"]), "false_alarms": share(healthy, lambda r: r["false_alarm"]),
         "healthy": share(healthy, lambda r: r["good"]), "verdict_exact": share(healthy, lambda r: r["verdict_exact"]),
         "two": share(of("two"), lambda r: r["good"]), "three": share(of("three"), lambda r: r["good"]),
-        "machine": share(of("machine"), lambda r: r["good"]), "place": share(places, bool),
+        "machine": share(of("machine"), lambda r: r["good"]), "place": share(places, bool), "intervals": covered(rows),
         "calibration": reliability.table([p for r in rows for p in r["probabilities"]]),
         "calibration_of_suspects": reliability.table([p for r in rows for p in r["probabilities_of_suspects"]]),
         "by": {"group": {}, "axis": {}, "condition": {}, "cause": {}, "sensors": {}},
@@ -127,6 +132,10 @@ def summary(rows: list[dict]) -> dict:
         keys += [("condition", c) for c in r["conditions"]] + [("cause", e) for e in r["required"]]
         for by, key in keys:
             out["by"][by].setdefault(key, []).append(r)
+    of_all = sorted({name for r in rows for name, _ in r["standard_errors"]})
+    only = lambda name: [r | {"standard_errors": [e for e in r["standard_errors"] if e[0] == name]} for r in rows]
+    out["intervals_by"] = {"condition": {k: covered(v) for k, v in sorted(out["by"]["condition"].items())},
+                           "parameter": {name: covered(only(name)) for name in of_all}}
     out["by"] = {by: {k: count(v) for k, v in sorted(groups.items())} for by, groups in out["by"].items()}
     for what in ("seconds", "memory_mb"):
         spent = sorted(r[what] for r in rows if r[what] is not None)
@@ -140,7 +149,8 @@ AIMS = (("right", "all conditions together right", ">= 90 %"), ("sick_right", "o
         ("healthy", "healthy axes called healthy", ">= 95 %"), ("verdict_exact", "of these with the very verdict (no gap or parameters)", ""),
         ("two", "two causes", ">= 92 %"), ("three", "three causes", ">= 85 %"),
         ("machine", "like real machines: friction, viscosity, bias, a remainder", ""),
-        ("place", "place of the causes that are right by family", ""))
+        ("place", "place of the causes that are right by family", ""),
+        ("intervals", "95 % intervals of parameters that hold the truth", "85 to 99 %"))
 
 
 def check(need: str, s: dict) -> str | None:
@@ -182,6 +192,9 @@ def markdown(s: dict, rows: list[dict], title: str, picture: str) -> str:
         note = " (required; a case of several counts for each)" if by == "cause" else ""
         lines += ["", f"## By {by}{note}", "", *rows_of(s["by"][by])]
     lines += ["", "## Probabilities", "", f"![reliability diagram]({picture})", "", *reliability.markdown(s["calibration"])]
+    lines += ["", "## Intervals", "", "Values told with a standard error whose 95 % interval holds the sealed one, in answers that are right (intervals.py).", "",
+              "| | share of the values |", "|---|---|"]
+    lines += [f"| {key} | {percent(c)} |" for by in s["intervals_by"].values() for key, c in by.items() if c["n"]]
     lines += ["", "## Slowest", ""] + [f"- {case}: {'cut off' if t is None else f'{t:.1f} s'}" for case, t in s["slowest"]]
     lines += ["", "## Cases not right", "", "Causes in brackets need not be named.", "",
               "| case | group | axis | truth | told | outcome | false | conditions | gap/noise |", "|---" * 9 + "|"]
