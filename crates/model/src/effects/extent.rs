@@ -23,13 +23,36 @@ pub struct Extent<'a> {
     pub inertia: [f64; 2],
     /// Stiffness of the coupling, N.m/rad; zero for a rigid axis.
     pub stiffness: f64,
+    /// Most that friction can have taken out of the axis over the record, J: the work of the torque, and what was stored before.
+    pub energy: f64,
+    /// Way of that side to and fro, rad, and its reversals.
+    pub way: (f64, f64),
 }
+
+/// Share of the energy that friction may seem to have taken beyond what there was: torque and way are measured.
+const MEASURED: f64 = 1.5;
 
 impl Extent<'_> {
     /// Travel of the effect's side, rad.
     #[must_use]
     pub fn travel(&self) -> f64 {
         self.positions.last().unwrap_or(&0.0) - self.positions.first().unwrap_or(&0.0)
+    }
+
+    /// Whether a dry friction of a level, N.m, that springs back by `reach`, rad, at every reversal can have taken no more energy than there
+    /// was: friction dissipates, and a level that holds against any torque is not one that slides all the way.
+    #[must_use]
+    pub fn feeds_dry(&self, level: f64, reach: f64) -> bool {
+        let (way, reversals) = self.way;
+        level.abs() * (way - 4.0 * reach * (1.0 + reversals)).max(0.0) <= MEASURED * self.energy
+    }
+
+    /// The same of a friction that grows with a power of the speed, of `coefficient*speed^power`: at the least that of a steady motion over
+    /// the same way.
+    #[must_use]
+    pub fn feeds(&self, coefficient: f64, power: i32) -> bool {
+        let (way, _) = self.way;
+        coefficient * (way / self.length).powi(power) * way <= MEASURED * self.energy
     }
 
     /// Share of the samples beyond two positions.
@@ -66,6 +89,36 @@ mod tests {
     use crate::effects::Effect;
 
     #[test]
+    fn friction_takes_no_more_energy_than_the_torque_brings() {
+        let extent = Extent {
+            torque: 1.0,
+            positions: &[-1.0, 1.0],
+            speed: 1.0,
+            fastest: 2.0,
+            twist: 0.0,
+            dt: 1e-3,
+            length: 10.0,
+            band: 100.0,
+            inertia: [1.0; 2],
+            stiffness: 0.0,
+            energy: 2.0,
+            way: (20.0, 9.0),
+        };
+        let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);
+        // Over 20 rad a level of 0.1 N.m takes 2 J; at 2 rad/s so do 0.05 N.m.s/rad and half of that of the square.
+        assert!(
+            admits(Effect::CoulombMotor, &[0.1, 0.0, 1.0, 0.0, 0.0])
+                && !admits(Effect::CoulombMotor, &[0.2, 0.0, 1.0, 0.0, 0.0])
+        );
+        assert!(admits(Effect::ViscousMotor, &[0.05, 0.0]) && !admits(Effect::ViscousMotor, &[0.1, 0.0]));
+        assert!(admits(Effect::QuadraticDrag, &[0.025]) && !admits(Effect::QuadraticDrag, &[0.05]));
+        // What only winds a spring at every reversal slides less.
+        assert!(
+            admits(Effect::PreslidingMotor, &[0.2, 0.3, 0.0]) && !admits(Effect::PreslidingMotor, &[0.2, 0.01, 0.0])
+        );
+    }
+
+    #[test]
     fn a_delay_that_the_band_does_not_turn_by_a_fiftieth_of_a_radian_is_none() {
         let extent = Extent {
             torque: 1.0,
@@ -78,6 +131,8 @@ mod tests {
             band: 1000.0,
             inertia: [1.0; 2],
             stiffness: 0.0,
+            energy: 1.0,
+            way: (1.0, 0.0),
         };
         let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);
         assert!(!admits(Effect::Latch, &[-9e-6, 0.0]) && admits(Effect::Latch, &[-9e-5, 0.0]));

@@ -43,7 +43,7 @@ impl<I: Side> Force for Presliding<I> {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0] <= x.torque && p[1] <= 0.2 * x.travel(),
+        bounds: |p, x| p[0] <= x.torque && x.feeds_dry(p[0], p[1]) && p[1] <= 0.2 * x.travel(),
         example: [&[0.006, 0.012, 1e-4], &[0.001, 0.01, 1e-5]][I::INDEX],
         variants: VARIANTS,
     };

@@ -19,7 +19,42 @@ pub struct Scales {
     pub fastest: [f64; 2],
     /// Positions of motor and table, sorted.
     positions: [Vec<f64>; 2],
+    /// Work of the torque, and what weights and springs of no more than its peak can have given between the record's ends, J.
+    work: f64,
+    /// Square of the speed at which the record begins, (rad/s)^2.
+    begins: f64,
+    /// Way of motor and table to and fro, rad, and reversals.
+    ways: [(f64, f64); 2],
     structure: Structure,
+}
+
+/// Noises below which a turn of the motion is none.
+const TURN: f64 = 6.0;
+
+/// The way of a motion, and its reversals, those below a threshold left out.
+fn way(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
+    let (mut way, mut reversals) = (0.0, 0.0);
+    // Where the motion turned last, how far it has come since, and which way.
+    let mut from: Option<f64> = None;
+    let (mut farthest, mut towards) = (0.0, 0.0);
+    for x in positions {
+        let Some(start) = from else {
+            (from, farthest) = (Some(x), x);
+            continue;
+        };
+        if towards == 0.0 {
+            if (x - start).abs() > threshold {
+                (towards, farthest) = ((x - start).signum(), x);
+            }
+        } else if (x - farthest) * towards > 0.0 {
+            farthest = x;
+        } else if (farthest - x) * towards > threshold {
+            way += (farthest - start).abs();
+            reversals += 1.0;
+            (from, towards, farthest) = (Some(farthest), -towards, x);
+        }
+    }
+    (way + from.map_or(0.0, |start| (farthest - start).abs()), reversals)
 }
 
 impl Scales {
@@ -37,10 +72,27 @@ impl Scales {
         let (r1, t1) = side(0);
         let (r2, t2) = side(2);
         let torque = &p.record.torque;
+        let driven = usize::from(p.record.channels[0].is_none() && p.record.channels[1].is_none());
+        let moved = |k: usize| t.motion[k + 1][2 * driven] - t.motion[k][2 * driven];
+        let acting = |k: usize| {
+            let ramp = p.record.ramp(k, 0, 1);
+            0.5 * (ramp.start + ramp.end)
+        };
+        let last = t.motion.len() - 1;
+        let work: f64 = (0..last).map(|k| acting(k) * moved(k)).sum();
+        let shifted = (t.motion[last][2 * driven] - t.motion[0][2 * driven]).abs();
+        let peak = torque.iter().fold(0.0, |m: f64, t| t.abs().max(m));
+        let ways = [0, 1].map(|i: usize| {
+            let noise = p.record.channels[2 * i].as_ref().map_or(0.0, |_| p.record.noise[2 * i]);
+            way(t.motion.iter().map(|m| m[2 * i]), TURN * noise)
+        });
         let mean = torque.iter().sum::<f64>() / n;
         Some(Self {
             torque: (torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / n).sqrt(),
-            peak: torque.iter().fold(0.0, |m, t| t.abs().max(m)),
+            peak,
+            work: work.max(0.0) + peak * shifted,
+            begins: t.motion[0][2 * driven + 1].powi(2),
+            ways,
             speed: [rms(&|m| m[1]), rms(&|m| m[3])],
             twist: rms(&|m| m[0] - m[2]).max(1e-15),
             rotation: [r1, r2],
@@ -86,6 +138,8 @@ impl Scales {
                     all,
                 ],
                 stiffness: if rigid { 0.0 } else { p.k },
+                energy: self.work + 0.5 * all * self.begins,
+                way: self.ways[side],
             };
             (info.bounds)(model.effects.of(e), &extent)
         })
