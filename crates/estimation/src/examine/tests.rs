@@ -175,6 +175,10 @@ fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
     assert!(found.find("drive_off").is_some(), "{:#?}", found.findings);
     let longest = found.longest().unwrap();
     assert!(longest.start == 0 && (7900..8600).contains(&longest.end), "{longest:?}");
+    // A drive that holds a torque against the friction is on.
+    let holding: Vec<f64> = torque.iter().enumerate().map(|(k, t)| if k < 8000 { *t } else { 0.01 }).collect();
+    let found = examine(&Input { torque: Some(&holding), ..input });
+    assert!(found.find("drive_off").is_none() && found.find("standing").is_some(), "{:#?}", found.findings);
 }
 
 /// Slow triangles under control, with an encoder whose noise from sample to sample is as large as the motion.
