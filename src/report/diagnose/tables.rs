@@ -80,8 +80,8 @@ pub fn parameters(all: &[AxisParameter]) -> Table {
 /// The hypotheses tried, so many at most.
 pub fn ranking(d: &Diagnosis, most: usize) -> Table {
     let mut table = Table::new(
-        "Causes tried, the best first",
-        ["cause", "place", "probability", "delta BIC", "chi2 a sample", "gap closed, held out"],
+        "Causes tried, the best first (weight: how the evidence divides among these)",
+        ["cause", "place", "model weight", "delta BIC", "chi2 a sample", "gap closed, held out"],
     );
     for (i, h) in d.ranking.iter().take(most).enumerate() {
         let cells = vec![
