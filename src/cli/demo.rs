@@ -192,6 +192,7 @@ fn disagreement(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) 
         overlays: &outcome.overlays,
         trace: "machine.csv",
         motion: Motion::Rotary,
+        warnings: &[],
     };
     let report = diagnosis::report(&findings);
     write_text(&file("diagnosis.html"), html::page(&linked(report.clone(), "diagnosis.html")).as_bytes())?;

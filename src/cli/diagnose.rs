@@ -92,6 +92,7 @@ impl Diagnosed {
             overlays: &self.outcome.overlays,
             trace: &self.described,
             motion: self.machine.signals.motion,
+            warnings: &self.warnings,
         }
     }
 }
@@ -192,7 +193,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let outcome = &diagnosed.outcome;
     out!("{}", terminal::blocks(&short(&findings), layout(WIDTH)))?;
     if let Some(path) = &args.json {
-        let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis))?;
+        let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis, &diagnosed.warnings))?;
         text.push('\n');
         write_text(path, text.as_bytes())?;
     }
@@ -245,7 +246,7 @@ fn found(diagnosed: &Diagnosed) -> Found {
             .cloned()
             .chain(warnings(d, Some(diagnosed.machine.signals.motion)))
             .collect(),
-        result: contract::value(d),
+        result: contract::value(d, &diagnosed.warnings),
         report: report(&diagnosed.findings()),
     }
 }

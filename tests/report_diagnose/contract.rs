@@ -13,7 +13,7 @@ fn fields(of: &Value) -> String {
 
 #[test]
 fn the_fields_stand_in_their_order() {
-    let d = value(&friction("x-axis"));
+    let d = value(&friction("x-axis"), &[]);
     for (path, expected) in [
         (
             "",
@@ -63,7 +63,7 @@ fn what_is_not_finite_or_not_known_is_null_and_no_loop_is_no_field() {
     let errors = LoopErrors { command: 0.1, position: f64::NAN };
     let ranking = vec![LoopRanked { hypothesis: Hypothesis::Parameters, errors, closure: 0.5 }];
     let commands = Commands::default();
-    let told = value(&d);
+    let told = value(&d, &[]);
     assert!(told.get("closed_loop").is_none());
     assert!(told["causes"][0]["parameters"]["level"]["std"].is_null() && told["ranking"][0]["delta_bic"].is_null());
     d.closed_loop = Some(ClosedLoop {
@@ -75,7 +75,7 @@ fn what_is_not_finite_or_not_known_is_null_and_no_loop_is_no_field() {
         commands,
         agrees: true,
     });
-    let told = &value(&d)["closed_loop"];
+    let told = &value(&d, &[])["closed_loop"];
     assert_eq!(fields(told), "before reidentified after closure ranking agrees");
     assert_eq!(fields(&told["ranking"][0]), "id command position closure");
     assert!(told["ranking"][0]["id"] == "parameters" && told["after"]["position"].is_null());

@@ -13,7 +13,7 @@ use eixo::trace::Motion;
 use fixture::{friction, overlay};
 
 fn made(diagnosis: &Diagnosis) -> Report {
-    report(&Findings { diagnosis, overlays: &[overlay()], trace: "log.csv", motion: Motion::Rotary })
+    report(&Findings { diagnosis, overlays: &[overlay()], trace: "log.csv", motion: Motion::Rotary, warnings: &[] })
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn an_effect_is_named_with_its_place_its_size_and_what_it_means() {
         assert!(page.contains(needle), "{needle}");
     }
     assert!(!page.contains("NaN"));
-    let findings = Findings { diagnosis: &d, overlays: &[], trace: "log.csv", motion: Motion::Rotary };
+    let findings = Findings { diagnosis: &d, overlays: &[], trace: "log.csv", motion: Motion::Rotary, warnings: &[] };
     let text = terminal::blocks(&short(&findings), Layout::default());
     assert!(text.contains("coulomb_motor.level") && text.contains("4.003e-3 ± 1.3e-5 N.m"), "{text}");
     assert!(text.lines().all(|l| l.chars().count() <= 100), "{text}");

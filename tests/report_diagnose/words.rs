@@ -13,7 +13,7 @@ use crate::fixture::friction;
 
 /// A field of the file that is a sentence.
 fn said(d: &Diagnosis, field: &str) -> String {
-    value(d).pointer(field).and_then(|v| v.as_str()).expect(field).to_owned()
+    value(d, &[]).pointer(field).and_then(|v| v.as_str()).expect(field).to_owned()
 }
 
 /// A diagnosis, changed.
@@ -85,7 +85,13 @@ fn every_effect_is_told_with_its_name_its_place_and_what_it_means_on_a_machine()
         for part in [info.title, info.id, info.place.as_str()] {
             assert!(sentence.contains(part), "{part}: {sentence}");
         }
-        let page = html::page(&report(&Findings { diagnosis: &d, overlays: &[], trace: "", motion: Motion::Rotary }));
+        let page = html::page(&report(&Findings {
+            diagnosis: &d,
+            overlays: &[],
+            trace: "",
+            motion: Motion::Rotary,
+            warnings: &[],
+        }));
         assert!(page.contains("On a machine: "), "{}", info.id);
     }
 }
@@ -150,7 +156,7 @@ fn a_residual_is_told_by_what_it_depends_on_its_frequency_and_its_spread() {
 #[test]
 fn a_remainder_is_told_where_it_is_more_than_noise_in_the_units_of_the_axis() {
     let text = |d: &Diagnosis, motion| {
-        let blocks = short(&Findings { diagnosis: d, overlays: &[], trace: "", motion });
+        let blocks = short(&Findings { diagnosis: d, overlays: &[], trace: "", motion, warnings: &[] });
         terminal::blocks(&blocks, Layout::default()).split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let large = |d: &mut Diagnosis| d.remainder.noise_multiple = 20.0;
@@ -163,4 +169,40 @@ fn a_remainder_is_told_where_it_is_more_than_noise_in_the_units_of_the_axis() {
     let none = text(&none, Motion::Rotary);
     assert!(none.contains("No cause explains") && none.contains(" N.m rms"), "{none}");
     assert!(none.contains("no cause stands out in the 0.1"), "{none}");
+}
+
+#[test]
+fn what_is_to_be_known_of_the_record_stands_in_the_file_and_on_the_page() {
+    let d = friction("x-axis");
+    let known = ["[time_jitter] One step in ten between time stamps is off.".to_owned()];
+    let told = value(&d, &known);
+    assert_eq!(told["warnings"][0], known[0]);
+    let own = value(&d, &[]);
+    let own = own["warnings"].as_array().expect("warnings");
+    assert_eq!(told["warnings"].as_array().expect("warnings")[1..], own[..]);
+    let of = |warnings| Findings { diagnosis: &d, overlays: &[], trace: "", motion: Motion::Rotary, warnings };
+    assert!(html::page(&report(&of(&known))).contains(&known[0]));
+    assert!(!html::page(&report(&of(&[]))).contains(&known[0]));
+}
+
+#[test]
+fn the_step_that_tells_rivals_apart_names_them() {
+    let rivals = vec![Confusable { named: Effect::ViscousMotor, other: Effect::ViscousTable, difference: 1.04 }];
+    let page = |d: &Diagnosis| {
+        html::page(&report(&Findings { diagnosis: d, overlays: &[], trace: "", motion: Motion::Rotary, warnings: &[] }))
+    };
+    let names = "do not tell: viscous friction of motor and screw or viscous friction of table and guideways.";
+    assert!(page(&with(|d| d.confusable = rivals)).contains(names));
+    assert!(!page(&with(|d| d.confusable.clear())).contains("do not tell"));
+}
+
+#[test]
+fn a_linear_axis_is_drawn_in_metres_and_newtons() {
+    let d = friction("x-axis");
+    let page =
+        |motion| html::page(&report(&Findings { diagnosis: &d, overlays: &[], trace: "", motion, warnings: &[] }));
+    let head = |against: &str| format!("Against {against}");
+    assert!(page(Motion::Rotary).contains(&head("omega1")), "the fixture has no curve against omega1");
+    assert!(page(Motion::Rotary).contains("omega1 [rad/s]"));
+    assert!(page(Motion::Linear).contains("omega1 [m/s]") && !page(Motion::Linear).contains("omega1 [rad/s]"));
 }

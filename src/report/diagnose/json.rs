@@ -13,9 +13,9 @@ use crate::diagnose::{
 /// Name and version of the format.
 pub const SCHEMA: &str = "eixo.diagnosis/1";
 
-/// The diagnosis as it stands in the file. A number that is not finite is `null`.
+/// The diagnosis as it stands in the file, with what is to be known of the record beside it. A number that is not finite is `null`.
 #[must_use]
-pub fn value(d: &Diagnosis) -> Value {
+pub fn value(d: &Diagnosis, of_the_record: &[String]) -> Value {
     let confusable = d.confusable.iter().map(|c| json!([c.named.info().id, c.other.info().id, words::alike(c)]));
     let mut all = json!({
         "schema": SCHEMA,
@@ -30,7 +30,7 @@ pub fn value(d: &Diagnosis) -> Value {
         "remainder": remainder(&d.remainder),
         "gap": gap(&d.gap),
         "parameters": map(d.parameters.iter().map(|p| (p.parameter.name(), parameter(p)))),
-        "warnings": words::warnings(d, None),
+        "warnings": of_the_record.iter().cloned().chain(words::warnings(d, None)).collect::<Vec<_>>(),
     });
     if let Some(l) = &d.closed_loop {
         all["closed_loop"] = closed_loop(l);

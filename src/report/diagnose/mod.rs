@@ -14,7 +14,7 @@ use super::chain::{ChainDiagram, Symbol};
 use super::chart::{Axis, Chart, Mark, Series, Shape};
 use super::format::{self, Medium};
 use super::{Block, Figure, Report, Section, chain};
-use crate::diagnose::{Diagnosis, Overlay, Site};
+use crate::diagnose::{Diagnosis, Overlay, Site, Verdict};
 use crate::effects::Place;
 use crate::trace::Motion;
 pub use controlled::errors as errors_in_the_loop;
@@ -33,6 +33,8 @@ pub struct Findings<'a> {
     pub trace: &'a str,
     /// Rotary or linear.
     pub motion: Motion,
+    /// What is to be known of the record: from its reading, its examination and its noise.
+    pub warnings: &'a [String],
 }
 
 /// The report.
@@ -40,11 +42,13 @@ pub struct Findings<'a> {
 pub fn report(f: &Findings) -> Report {
     let d = f.diagnosis;
     let mut top = vec![Block::Verdict(verdict(d))];
-    top.extend(words::warnings(d, Some(f.motion)).into_iter().map(Block::Warning));
     top.push(Block::Figure(Figure::new(chain(d), words::gap_shows(&d.location.shown, Some(f.motion)))));
+    // Behind the picture: a log has several of them, and the answer comes first.
+    top.extend(f.warnings.iter().cloned().chain(words::warnings(d, Some(f.motion))).map(Block::Warning));
     let mut sections = vec![Section::new("", top)];
     if !d.causes.is_empty() {
-        sections.push(Section::new("What it is", what(d)));
+        let heading = if d.verdict == Verdict::Unexplained { "What comes nearest" } else { "What it is" };
+        sections.push(Section::new(heading, what(d)));
     }
     sections.push(Section::new("How far the gap shrinks", how_far(f)));
     let in_the_loop = controlled::blocks(d, f.motion);

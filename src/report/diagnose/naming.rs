@@ -9,7 +9,12 @@ pub fn title(hypothesis: &Hypothesis) -> String {
     match hypothesis {
         Hypothesis::NoGap => "nothing: the model as it is".to_owned(),
         Hypothesis::Parameters => "parameters only".to_owned(),
-        Hypothesis::Effects(effects) => effects.iter().map(|e| short_title(e.info())).collect::<Vec<_>>().join(" and "),
+        // A title has an "and" of its own.
+        Hypothesis::Effects(effects) => {
+            let mut titles = effects.iter().map(|e| short_title(e.info()));
+            let first = titles.next().unwrap_or_default().to_owned();
+            titles.fold(first, |all, title| format!("{all} + {}", lower(title)))
+        }
     }
 }
 

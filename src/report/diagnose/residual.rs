@@ -83,7 +83,7 @@ pub(super) fn blocks(w: &Where, motion: Motion) -> Vec<Block> {
     figures.extend(over_frequency(&located.by_frequency, name, unit));
     let mut curves: Vec<&StateCurve> = located.by_state.iter().filter(|c| c.residual == name).collect();
     curves.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    figures.extend(curves.into_iter().take(CURVES).map(|c| against_state(c, unit)));
+    figures.extend(curves.into_iter().take(CURVES).map(|c| against_state(c, unit, motion)));
     let mut blocks = vec![Block::Figures(figures)];
     let parts = parts(&located.by_frequency, name, unit);
     if !parts.rows.is_empty() {
@@ -130,8 +130,9 @@ fn over_frequency(parts: &[FrequencyPart], name: Side, unit: &str) -> Option<Fig
     Some(Figure::new(chart, ""))
 }
 
-fn against_state(c: &StateCurve, unit: &str) -> Figure {
-    let (against, against_unit) = naming::variable(c.against);
+fn against_state(c: &StateCurve, unit: &str, motion: Motion) -> Figure {
+    let (against, rotary) = naming::variable(c.against);
+    let against_unit = motion.unit(rotary);
     let x: Arc<[f64]> = c.bins.iter().map(|b| b.x).collect();
     let mean: Arc<[f64]> = c.bins.iter().map(|b| b.mean).collect();
     let low: Vec<f64> = c.bins.iter().map(|b| b.mean - b.std).collect();

@@ -10,8 +10,11 @@ fn estimate(e: &Estimate, unit: &str) -> Cell {
 
 /// The causes with their parameters.
 pub fn causes(d: &Diagnosis) -> Table {
-    let mut table =
-        Table::new("What the model leaves out", ["cause", "place", "share of the gap", "parameter", "value"]);
+    let caption = match d.verdict {
+        Verdict::Unexplained => "What comes nearest, and does not explain the gap",
+        Verdict::Effect | Verdict::Parameters | Verdict::NoGap => "What the model leaves out",
+    };
+    let mut table = Table::new(caption, ["cause", "place", "share of the gap", "parameter", "value"]);
     for c in &d.causes {
         let name = title(&Hypothesis::Effects(vec![c.effect]));
         let mut head = vec![Cell::text(name), Cell::text(c.site.as_str()), Cell::Bar(c.share_of_gap)];
@@ -68,9 +71,9 @@ pub fn parameters(all: &[AxisParameter]) -> Table {
     for p in all {
         table.row(vec![
             Cell::text(p.parameter.name()),
-            Cell::number(p.nominal),
-            Cell::number(p.reidentified),
-            estimate(&p.fitted, ""),
+            Cell::quantity(p.nominal, p.fitted.unit),
+            Cell::quantity(p.reidentified, p.fitted.unit),
+            estimate(&p.fitted, p.fitted.unit),
             Cell::Percent(p.fitted.value / p.nominal - 1.0),
         ]);
     }

@@ -209,7 +209,11 @@ pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
         motion.unit("N.m"),
         r.site.as_str(),
         percent(r.share),
-        format::number(r.noise_multiple, 2, Medium::Page),
+        if r.noise_multiple < 1000.0 {
+            format::number(r.noise_multiple, 2, Medium::Page)
+        } else {
+            "more than a thousand".to_owned()
+        },
         looks(&r.looks)
     ))
 }
@@ -274,7 +278,7 @@ pub fn in_the_loop(l: &ClosedLoop) -> String {
 
 /// What to do next, in order.
 pub fn steps(d: &Diagnosis) -> Vec<String> {
-    let mut steps = vec![match d.verdict {
+    let steps = [match d.verdict {
         Verdict::NoGap => {
             "Use the model as it is. A gap that this excitation does not show may still be there: repeat with the amplitudes and speeds of the real work."
         }
@@ -286,9 +290,17 @@ pub fn steps(d: &Diagnosis) -> Vec<String> {
             "Look at the machine at the place marked; compare the pictures of the residual with what moves there."
         }
     }];
-    if d.verdict == Verdict::Effect && !d.confusable.is_empty() {
-        steps.push("Before you change the machine, tell the confusable causes apart.");
-    }
-    steps.push(next_experiment(d));
-    steps.into_iter().map(str::to_owned).collect()
+    steps.into_iter().map(str::to_owned).chain(tell_apart(d)).chain([next_experiment(d).to_owned()]).collect()
+}
+
+/// Which causes the next experiment is to tell apart; none where all are told.
+fn tell_apart(d: &Diagnosis) -> Option<String> {
+    let name = |e: Effect| lower(short_title(e.info()));
+    let pairs: Vec<String> = d.confusable.iter().map(|c| format!("{} or {}", name(c.named), name(c.other))).collect();
+    (d.verdict == Verdict::Effect && !pairs.is_empty()).then(|| {
+        format!(
+            "Before you change the machine, find out which it is, for these data do not tell: {}.",
+            pairs.join("; ")
+        )
+    })
 }
