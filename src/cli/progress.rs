@@ -1,7 +1,8 @@
 //! What a long command says while it works.
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -31,6 +32,8 @@ pub struct Progress {
 pub struct Steps {
     bar: ProgressBar,
     lines: bool,
+    /// The step that is counted now, and when it began.
+    counted: Mutex<Option<(String, Instant)>>,
 }
 
 impl Progress {
@@ -38,14 +41,14 @@ impl Progress {
     pub fn steps(self) -> Steps {
         let lines = self.progress == How::Lines;
         if self.progress != How::Auto || super::stdout::is_quiet() || !std::io::stderr().is_terminal() {
-            return Steps { bar: ProgressBar::hidden(), lines };
+            return Steps { bar: ProgressBar::hidden(), lines, counted: Mutex::default() };
         }
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(120));
-        Steps { bar, lines }
+        Steps { bar, lines, counted: Mutex::default() }
     }
 }
 
@@ -55,11 +58,53 @@ impl Steps {
         if self.lines {
             eprintln!("{PROGRESS}{what}");
         }
-        self.bar.set_message(what.to_owned());
+        self.bar.set_message(format!("{what}{}", self.left(what)));
+    }
+
+    /// How long a step of the form `n of N ...` still takes, as its part behind took: `, 3 s left`; nothing of another step or of less than
+    /// two seconds.
+    fn left(&self, what: &str) -> String {
+        let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some((done, all)) = count(what) else {
+            *counted = None;
+            return String::new();
+        };
+        let rest = what.split_once(' ').map_or("", |(_, rest)| rest);
+        match &*counted {
+            Some((of, began)) if of == rest => {
+                let seconds = began.elapsed().as_secs_f64() * (all - done) / done;
+                if seconds < 2.0 { String::new() } else { format!(", {seconds:.0} s left of this step") }
+            }
+            _ => {
+                *counted = Some((rest.to_owned(), Instant::now()));
+                String::new()
+            }
+        }
     }
 
     /// The end.
     pub fn end(self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// `n` and `N` of `n of N ...`.
+fn count(what: &str) -> Option<(f64, f64)> {
+    let mut words = what.split(' ');
+    let done = words.next()?.parse().ok()?;
+    let all = words.next().filter(|of| *of == "of").and_then(|_| words.next())?.parse().ok()?;
+    (1.0..=all).contains(&done).then_some((done, all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_counted_step_has_an_end() {
+        assert_eq!(count("3 of 12 fits of a cause beside 1"), Some((3.0, 12.0)));
+        for what in ["26 hypotheses fitted", "13 of 12 fits", "0 of 12 fits", "the model as given", "3 of many"] {
+            assert_eq!(count(what), None, "{what}");
+        }
     }
 }

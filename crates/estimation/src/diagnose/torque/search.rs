@@ -8,7 +8,7 @@
 //!
 //! Held-out data have no part in it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
@@ -373,7 +373,14 @@ impl Search<'_> {
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         points.truncate(FITTED);
         let from = look.fit.discrepancy;
-        let probed = points.par_iter().filter_map(|start| look.fitted(start, keep, from)).collect();
+        let done = AtomicUsize::new(0);
+        let probe = |start: &StartPoint| {
+            let fitted = look.fitted(start, keep, from);
+            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+            (self.progress)(&format!("{n} of {} fits of a cause beside {}", points.len(), fit.terms.len()));
+            fitted
+        };
+        let probed = points.par_iter().filter_map(probe).collect();
         self.raced(probed, None)
     }
 
