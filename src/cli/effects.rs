@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use super::stdout::out;
+use super::stdout::{layout, out};
 use crate::effects::{EFFECTS, Effect, EffectInfo, Role};
+use crate::report::{Block, Cell, Table, terminal};
 
 /// Arguments of `eixo effects`.
 #[derive(Debug, clap::Args)]
@@ -33,34 +34,42 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn list() -> String {
-    let mut out = String::new();
+    let mut table = Table::new("", ["effect", "place", "what it is"]);
     for effect in EFFECTS {
         let e = effect.info();
-        let _ = writeln!(out, "{:<20} {:<9} {}", e.id, e.place.as_str(), e.title);
+        table.row([e.id, e.place.as_str(), e.title].map(Cell::text).to_vec());
     }
-    out.push_str("\n`eixo effects ID` tells more of one; parameters are set as ID.NAME=VALUE, all off by default\n");
-    out
+    let more = "`eixo effects ID` tells more of one; parameters are set as ID.NAME=VALUE, all off by default";
+    terminal::blocks(&[Block::Table(table), Block::Paragraph(more.to_owned())], layout(WHOLE))
+}
+
+/// A line as long as it is, where it goes to no terminal.
+const WHOLE: u16 = u16::MAX;
+
+/// A text behind its label, wrapped to the width of the terminal.
+fn labelled(label: &str, text: &str) -> String {
+    let room = layout(WHOLE).width.saturating_sub(11);
+    format!("{label:<11}{}\n", terminal::wrapped(text, room, "           "))
 }
 
 fn detail(e: &EffectInfo) -> String {
-    let mut out = format!(
-        "{}: {}\n\nplace      {}\nfamily     {}\nequation   {}\nsignature  {}\nsource     {}\n",
-        e.id,
-        e.title,
-        e.place.as_str(),
-        e.family.as_str(),
-        e.equation,
-        e.signature,
-        e.reference
-    );
+    let room = layout(WHOLE).width;
+    let mut out = terminal::wrapped(&format!("{}: {}", e.id, e.title), room, "") + "\n\n";
+    for (label, text) in [
+        ("place", e.place.as_str()),
+        ("family", e.family.as_str()),
+        ("equation", e.equation),
+        ("signature", e.signature),
+        ("source", e.reference),
+    ] {
+        out += &labelled(label, text);
+    }
     for p in e.parameters {
         let unit = if p.unit.is_empty() { "1" } else { p.unit };
         let word = if p.role == Role::Size { "off at" } else { "default" };
-        let _ = writeln!(
-            out,
-            "\n{}.{} [{unit}]\n    {}; {word} {}, from {} to {}",
-            e.id, p.name, p.doc, p.off, p.min, p.max
-        );
+        let text = format!("{}; {word} {}, from {} to {}", p.doc, p.off, p.min, p.max);
+        let text = terminal::wrapped(&text, room.saturating_sub(4), "    ");
+        let _ = writeln!(out, "\n{}.{} [{unit}]\n    {text}", e.id, p.name);
     }
     out
 }

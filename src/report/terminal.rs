@@ -152,7 +152,7 @@ fn longest_word(text: &str) -> Option<usize> {
 }
 
 /// Text broken at spaces to at most `width` characters a line; further lines begin with `indent`.
-fn wrapped(text: &str, width: u16, indent: &str) -> String {
+pub(crate) fn wrapped(text: &str, width: u16, indent: &str) -> String {
     let width = usize::from(width.max(20));
     let mut lines: Vec<String> = Vec::new();
     for paragraph in printable(text).lines() {
