@@ -105,7 +105,7 @@ pub fn side_by_side(found: &Identification) -> Vec<Block> {
             remarks.insert(0, format!("no estimate: {failure}"));
         }
         if let Some(n) = m.iterations {
-            remarks.push(format!("{n} iterations"));
+            remarks.push(if n == 1 { "1 iteration".to_owned() } else { format!("{n} iterations") });
         }
         table.row(vec![
             Cell::text(m.method),
