@@ -121,7 +121,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     out!("{}", terminal::blocks(&blocks, layout(WIDTH)))?;
     out_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
     out_line!("{}: the log, drawn", page.display())?;
-    out_line!("next: eixo identify {} --axis {}", quoted(&file), quoted(&axis.display().to_string()))?;
+    let what = format!("{} --axis {}", quoted(&file), quoted(&axis.display().to_string()));
+    out_line!("next: eixo identify {what}")?;
+    out_line!("or:   eixo diagnose {what}")?;
     Ok(ExitCode::SUCCESS)
 }
 
