@@ -126,7 +126,7 @@ pub fn cell(cell: &Cell, medium: Medium) -> String {
         Cell::Count(value) => count(*value),
         Cell::Estimate(value, std, unit) => with_unit(estimate(*value, *std, medium), unit, medium),
         Cell::Percent(share) => percent(*share, medium),
-        // A share beside a bar is read at a glance: how small a small one is does not matter.
+        // A share with a bar is compared by length: how small a small one is does not matter.
         Cell::Bar(share) if (f64::MIN_POSITIVE..1e-4).contains(share) => format!("<0.01{}%", space(medium)),
         Cell::Bar(share) => percent(*share, medium),
     }

@@ -5,7 +5,7 @@ use crate::identify::result::{Identification, Series as Curve};
 use crate::report::chart::{Axis, Chart, Colour, Dash, Range, Series, Shape};
 use crate::report::{Block, Cell, Figure, Table};
 
-/// How far each method's parameters lead the torque's estimate astray.
+/// How far the torque that each method's parameters give is from the measured one.
 pub fn excitation_errors(found: &Identification) -> Table {
     let mut table =
         Table::new("The torque estimated from the motion", ["method", "equation", "rms error over rms torque"]);

@@ -174,7 +174,7 @@ impl<const P: usize> Filter<P> {
 /// estimates rest.
 ///
 /// # Errors
-/// When the record is too short, does not excite a direction, or the rounds do not settle.
+/// When the record is too short, does not excite a direction, or the rounds do not converge.
 pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
     let n = long_enough(record.rows(), MOTOR_ELS)?;
     let plain = rows(record)?;
@@ -260,7 +260,7 @@ fn batch<const P: usize>(
             *fresh = e;
         }
         residual = fresh;
-        // Noise at the edge of invertibility (differences of white noise) makes the rounds hover instead of settle: what
+        // Noise at the edge of invertibility (differences of white noise) makes the rounds wander about the solution instead of converging: what
         // stays within half a standard error is no different estimate.
         if moved < if round == ROUNDS { 0.5 } else { 1e-3 } {
             return Ok(fitted);

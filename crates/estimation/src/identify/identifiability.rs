@@ -26,7 +26,7 @@ pub struct Identifiability {
     pub doubts: Vec<String>,
     /// Parameters that this record does not determine.
     pub undetermined: Vec<&'static str>,
-    /// What would settle it, a sentence; empty where nothing is to be settled.
+    /// What experiment would determine it, a sentence; empty where nothing is undetermined.
     pub advice: String,
     /// How well a fit to the first two thirds of the record follows the last third: the worst output, per cent.
     pub held_out_percent: Option<f64>,

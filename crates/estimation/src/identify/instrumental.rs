@@ -32,7 +32,7 @@ fn table(r: &Row) -> Vector4<f64> {
 /// Instrumental-variable estimate from `start`; the rounds it took are the second value.
 ///
 /// # Errors
-/// When the record is too short, the rounds do not settle, or leave physical values.
+/// When the record is too short, the rounds do not converge, or leave physical values.
 pub fn instrumental(
     record: &Record,
     outputs: &OutputError,

@@ -292,10 +292,10 @@ impl<'a> OutputError<'a> {
         for _ in 0..ROUNDS {
             let sigma = problem.levels(&report.0);
             chi2 = 2.0 * report.1.cost / problem.degrees();
-            let settled = sigma.iter().zip(&problem.sigma).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
+            let converged = sigma.iter().zip(&problem.sigma).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
             problem.sigma = sigma;
             report = problem.run(&report.0, ITERATIONS);
-            if settled {
+            if converged {
                 break;
             }
         }
@@ -335,7 +335,7 @@ impl<'a> OutputError<'a> {
                 *bound = 0.0;
             }
         }
-        // Parameters in logarithms: a step of more than a factor e^3 from the start is a fit gone astray.
+        // Parameters in logarithms: a step of more than a factor e^3 from the start is a divergent fit.
         let options = levenberg::Options { iterations, lower, ..levenberg::Options::default() };
         let mut fixed = self.clone();
         fixed.fixed = q.to_vec();

@@ -50,8 +50,8 @@ pub enum RegressionError {
         /// Unknowns.
         unknowns: usize,
     },
-    /// An iteration that did not settle.
-    #[error("{what} did not settle; use OE (--method oe), which needs no noise-free regressors")]
+    /// An iteration that did not converge.
+    #[error("{what} did not converge; use OE (--method oe), which needs no noise-free regressors")]
     Diverged {
         /// What.
         what: &'static str,

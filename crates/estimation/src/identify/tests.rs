@@ -286,7 +286,7 @@ fn intervals_of_every_regression_cover_the_truth_under_coloured_noise() {
         let (trace, p) = disturbed(seed);
         let record = Record::new(&trace, 1.0).unwrap();
         let outputs = OutputError::new(&trace, 1.0, Structure::TwoInertia, Settings::default()).unwrap();
-        // The rounds of batch ELS need not settle on noise that its model cannot be.
+        // The rounds of batch ELS need not converge on noise that its model cannot be.
         let found = [
             least_squares(&record).ok(),
             recursive(&record, 1.0, 1e8).ok().map(|f| f.0),
@@ -313,7 +313,7 @@ fn intervals_of_every_regression_cover_the_truth_under_coloured_noise() {
     }
     println!("{covered:?} of {runs:?}, white {white:?}");
     for ((covered, runs), name) in covered.iter().zip(runs).zip(["LS", "RLS", "ELS", "ELS batch", "IV"]) {
-        // The rounds of batch ELS settle on few of these records: what its intervals cover is known roughly.
+        // The rounds of batch ELS converge on few of these records: what its intervals cover is known roughly.
         let (least, low) = if name == "ELS batch" { (10, 0.75) } else { (100, 0.85) };
         assert!(runs >= least, "{name}: {runs}");
         let share = f64::from(covered.iter().sum::<u32>()) / f64::from(4 * runs);

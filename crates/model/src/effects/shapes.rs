@@ -261,7 +261,7 @@ pub trait Sensor {
 
     /// Whether it changes what the motor's encoder reads, too.
     const MOTOR: bool = false;
-    /// The parameter that is the step to which it rounds the readings, if it does: no derivative, but a lattice in the log.
+    /// The parameter that is the step to which it rounds the readings, if it does: no derivative, but steps in the log.
     const STEP: Option<usize> = None;
     /// The parameter that is how long ago it looks, s, which the history of readings must cover.
     const DELAY: Option<usize> = None;

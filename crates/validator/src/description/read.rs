@@ -30,7 +30,7 @@ pub fn parse_real(text: &str) -> Option<f64> {
     }
 }
 
-/// Parses an `xs:int` or one of its unsigned kin.
+/// Parses an `xs:int` or one of its unsigned relatives of XML Schema.
 #[must_use]
 pub fn parse_integer<T: FromStr>(text: &str) -> Option<T> {
     text.trim().parse().ok()

@@ -68,7 +68,7 @@ pub(crate) fn null_component(binary: &Binary, fmi: Fmi) {
         ($($function:ident ($($arg:expr),*)),*) => {$(
             if let Some(function) = f.$function {
                 note(Call::$function);
-                // SAFETY: none is promised; the validator's child process exists to find out.
+                // SAFETY: nothing is known of it; the validator's child process exists to find out.
                 let _ = unsafe { function(c, $($arg),*) };
                 note(Call::None);
             }
