@@ -18,7 +18,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 enum {
@@ -36,6 +38,9 @@ enum {
     INPUTS_LOST, SET_WRONG, STRING_BUFFER, TUNABLE_IGNORED, REFERENCE_CUT, STATE_LEAK, STATE_LATE, STATE_PROMISE,
     RESET_SLOPE, INITIAL_KEPT, OUTPUT_BEHIND, SLOPE_IGNORED, DEPENDENCY_STEP, NOT_CONSTANT, TIME_HIDDEN, LOCALE_NUMBERS,
     ENUMERATION, DISK, LOG_FOREIGN, FORGES,
+    GET_BEHIND, SET_BEHIND, REFERENCES_CHANGED, GET_INITIAL, SET_FIRST, SET_ORDER, SET_ONCE, STRING_KEPT, STRING_CUT,
+    BOOLEAN_LATE, RESET_LABEL, RESET_EARLY, STATE_EFFECT, STATE_ONCE, ONE_SIZE, EXACT_POINT, EXACT_STOP, SLOPE_SIGN,
+    TOLERANCE, ENDLESS, NAME_LONG, NAME_FORMAT, UMASK, SIGNALS_BLOCKED, TIMER, MAPPED,
     DAEMON
 };
 #ifndef DEFECT
@@ -63,7 +68,7 @@ typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8 
 
 typedef struct {
     double x, v, w, F, k, d, g, time, last_step, noise, slope, stop, elapsed, shown, offset, spare;
-    int mode, on, calls;
+    int mode, on, calls, sets;
     Phase phase;
     char label[32];
 } Values;
@@ -80,6 +85,8 @@ typedef struct {
     Values *pointer;
     double first_x;
     int initialised;
+    const char *kept_label;
+    char *small;
 } Instance;
 
 static double global_w;
@@ -202,6 +209,22 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
     }
     if (IS(SIGNALS)) signal(SIGINT, SIG_IGN);
     if (IS(ENVIRONMENT)) setenv("EIXO_CORPUS", "1", 1);
+    if (IS(NAME_LONG)) strcpy(i->small = malloc(32), name);
+    if (IS(NAME_FORMAT)) {
+        char text[4096];
+        snprintf(text, sizeof text, name);
+    }
+    if (IS(UMASK)) umask(0);
+    if (IS(SIGNALS_BLOCKED)) {
+        sigset_t some;
+        sigemptyset(&some);
+        sigaddset(&some, SIGINT);
+        pthread_sigmask(SIG_BLOCK, &some, NULL);
+    }
+    if (IS(TIMER)) {
+        struct itimerval hour = {{0, 0}, {3600, 0}};
+        setitimer(ITIMER_REAL, &hour, NULL);
+    }
     if (IS(LOCALE) && !setlocale(LC_NUMERIC, "C.UTF-8")) return NULL;
     return i;
 }
@@ -217,6 +240,7 @@ EXPORT void fmi2FreeInstance(Component c) {
             free(i->leaks);
             i->leaks = next;
         }
+    free(i->small);
     i->callbacks.free(i);
 }
 
@@ -239,6 +263,8 @@ EXPORT Status fmi2SetupExperiment(Component c, int has_tolerance, double toleran
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
     if (!i) return ERROR;
     if (!IS(INIT_ORDER) && in(i, INSTANTIATED, "fmi2SetupExperiment")) return ERROR;
+    if (IS(TOLERANCE) && has_tolerance) return fail(i, "no tolerance is used");
+    if (IS(ENDLESS) && !has_stop) return fail(i, "a stop time is needed");
     if (!IS(START_TIME)) i->values.time = begin;
     if (has_stop && !IS(STOP_TIME)) i->values.stop = stop;
     return OK;
@@ -281,9 +307,14 @@ EXPORT Status fmi2Reset(Component c) {
     Instance *i = c;
     if (!i) return ERROR;
     double w = i->values.w, k = i->values.k, slope = i->values.slope;
+    char label[32];
+    memcpy(label, i->values.label, sizeof label);
+    if (IS(RESET_EARLY) && i->values.phase == INITIALIZING) return fail(i, "not initialised yet");
     if (IS(RESET_CRASH)) *(volatile int *)8 = 1;
     if (IS(TERMINATED_RESET) && i->values.phase == TERMINATED) return fail(i, "already ended");
     start(&i->values);
+    i->kept_label = NULL;
+    if (IS(RESET_LABEL)) memcpy(i->values.label, label, sizeof label);
     if (IS(RESET_SLOPE)) i->values.slope = slope;
     if (IS(RESET_FORGETS)) i->values.w = w;
     if (IS(RESET_PARAMETER)) i->values.k = k;
@@ -336,6 +367,10 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
     if (step < 0 && !IS(NEGATIVE)) return fail(i, "negative step");
     if (!IS(WRONG_POINT) && !(step < 0) && fabs(point - s->time) > 1e-9 * fmax(1, fabs(point)))
         return fail(i, "wrong communication point");
+    if (IS(EXACT_POINT) && fabs(point - s->time) > 3e-16) return fail(i, "another communication point");
+    if (IS(EXACT_STOP) && point + step > s->stop) return fail(i, "past the stop time");
+    if (IS(ONE_SIZE) && s->last_step > 0 && step > 0 && fabs(step - s->last_step) > 0.1 * s->last_step)
+        return fail(i, "another step size");
     if (point + step > s->stop + 1e-9 * fmax(1, s->stop)) return fail(i, "past the stop time");
     if (IS(STEP_FAILS) && point > 0.5) return fail(i, "no convergence");
     HOOK();
@@ -351,6 +386,7 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
     if (IS(NAN_INPUT) && !isfinite(s->F)) abort();
     if (IS(NAN_HANG)) while (!(fabs(s->F) < 1e9)) sleep(1);
     if (IS(ZERO)) s->v += 0 * (1 / step);
+    if (IS(MAPPED)) mmap(NULL, 1 << 16, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (IS(STEP_LEAK)) {
         void **block = malloc(100);
         *block = i->leaks;
@@ -398,6 +434,7 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
     s->F += s->slope * step;
     s->slope = 0;
     s->calls++;
+    s->sets = 0;
     if (IS(RANDOM)) {
         struct timespec now;
         clock_gettime(CLOCK_MONOTONIC, &now);
@@ -414,7 +451,10 @@ EXPORT Status fmi2GetReal(Component c, const uint32_t r[], size_t count, double 
     Values *s = &i->values;
     size_t n;
     if (in(i, INITIALIZING | STEPPING | (IS(TERMINATED_GET) ? 0 : TERMINATED), "fmi2GetReal")) return ERROR;
+    if (IS(GET_INITIAL) && s->phase == INITIALIZING) return fail(i, "not initialised yet");
     if (IS(EMPTY_CALL) && !value) return fail(i, "null pointer");
+    if (IS(GET_BEHIND) && count) value[count] = 0;
+    if (IS(REFERENCES_CHANGED) && count > 1) ((uint32_t *)r)[0] = r[1];
     for (n = 0; n < count; n++) {
         switch (IS(REFERENCE_CUT) ? (uint16_t)r[n] : r[n]) {
         case 0: value[n] = s->time - (IS(TIME) ? s->last_step : 0); break;
@@ -471,7 +511,7 @@ EXPORT Status fmi2GetBoolean(Component c, const uint32_t r[], size_t count, int 
     for (n = 0; n < count; n++) {
         switch (r[n]) {
         case 0: value[n] = s->on; break;
-        case 1: value[n] = fabs(s->v) > 1e-3 ? IS(BOOLEAN) ? -1 : 1 : 0; break;
+        case 1: value[n] = fabs(s->v) > 1e-3 ? IS(BOOLEAN) || IS(BOOLEAN_LATE) && s->time > 0.5 ? -1 : 1 : 0; break;
         default: return fail(i, "unknown reference");
         }
     }
@@ -490,7 +530,7 @@ EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const
             continue;
         }
         switch (r[n]) {
-        case 0: value[n] = s->label; break;
+        case 0: value[n] = IS(STRING_KEPT) && i->kept_label ? i->kept_label : s->label; break;
         case 1: value[n] = IS(STRING_NULL) ? NULL : IS(STRING_LATIN) ? "bewegt \xe4" : fabs(s->v) > 1e-3 ? "moving" : "at rest"; break;
         default: return fail(i, "unknown reference");
         }
@@ -503,6 +543,7 @@ EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const d
     if (!i) return ERROR;
     Values *s = &i->values;
     size_t n;
+    if (IS(SET_BEHIND) && count) scratch = value[count];
     for (n = 0; n < count; n++) {
         int before = s->phase == INSTANTIATED || s->phase == INITIALIZING;
         switch (r[n]) {
@@ -515,15 +556,17 @@ EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const d
             s->v = value[n];
             break;
         case 5:
+            if (IS(SET_ONCE) && s->sets++) break;
             s->F = IS(SET_GET) ? (double)(float)value[n] : value[n];
             break;
         case 8:
             if (!before && !IS(FIXED_ACCEPTED)) return fail(i, "k is fixed");
             s->k = value[n] + (IS(SET_WRONG) ? 0.1 : 0);
+            if (IS(SET_ORDER)) s->d = 0.06 * s->k;
             break;
         case 9:
             if (!before && IS(TUNABLE_REFUSED)) return fail(i, "d is not to be set now");
-            if (!IS(TUNABLE_IGNORED) || before) s->d = value[n];
+            if (!IS(TUNABLE_IGNORED) || before) s->d = value[IS(SET_FIRST) ? 0 : n];
             break;
         case 10: return fail(i, "g is constant");
         default:
@@ -559,7 +602,8 @@ EXPORT Status fmi2SetString(Component c, const uint32_t r[], size_t count, const
     for (n = 0; n < count; n++) {
         if (r[n] != 0) return fail(i, "unknown reference");
         if (i->values.phase == STEPPING) return fail(i, "label is fixed");
-        snprintf(i->values.label, sizeof i->values.label, "%s", value[n]);
+        if (IS(STRING_KEPT)) i->kept_label = value[n];
+        snprintf(i->values.label, IS(STRING_CUT) ? 6 : sizeof i->values.label, "%s", value[n]);
     }
     return OK;
 }
@@ -574,6 +618,7 @@ EXPORT Status fmi2GetFMUstate(Component c, State *state) {
     if (IS(STATE_LEAK) && !malloc(1000)) return ERROR;
     if (!*state) *state = IS(STATE_SHARED) ? (void *)&shared_state : calloc(1, sizeof(Saved));
     Saved *saved = *state;
+    if (IS(STATE_EFFECT)) i->values.v *= 0.9;
     saved->values = i->values;
     if (!IS(STATE_SHARED)) saved->w = W(i);
     return OK;
@@ -587,6 +632,7 @@ EXPORT Status fmi2SetFMUstate(Component c, State state) {
     i->values = saved->values;
     if (IS(STATE_LATE)) i->values.elapsed = elapsed;
     if (IS(STATE_PROMISE) && spare) i->values.w = w;
+    if (IS(STATE_ONCE)) saved->values.v = 0;
     if (IS(GLOBAL)) global_w = saved->w;
     if (IS(STATE_FORGETS)) i->values.w = w;
     if (IS(STATE_INPUT)) i->values.F = F;
@@ -670,7 +716,7 @@ EXPORT Status fmi2GetRealOutputDerivatives(Component c, const uint32_t r[], size
     size_t n;
     for (n = 0; n < count; n++) {
         if (order[n] != 1) return fail(i, "order");
-        value[n] = IS(OUTPUT_DERIVATIVE) ? NAN : r[n] == 6 ? i->values.v : der_v(i);
+        value[n] = IS(OUTPUT_DERIVATIVE) ? NAN : (IS(SLOPE_SIGN) ? -1 : 1) * (r[n] == 6 ? i->values.v : der_v(i));
     }
     return OK;
 }

@@ -101,6 +101,9 @@ pub fn mutants() -> Vec<Mutant> {
             bytes[local + 30 + "resources/data.txt".len() + 6] ^= 0x55;
             bytes
         }),
+        mutant("a file that is a folder too", "archive-duplicate", |f| {
+            f.push(add("resources/data.txt/more.txt", b"x"))
+        }),
         mutant("zip bomb", "archive-bomb", |f| f.push(add("resources/zeros", &vec![0; 16 << 20]))),
         mutant("no description", "archive-description", |f| {
             f.remove(0);

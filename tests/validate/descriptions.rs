@@ -91,6 +91,13 @@ const MUTATIONS: &[Mutation] = &[
         &[("factor=\"1000\"/>", "factor=\"1000\"/><DisplayUnit name=\"mm\" factor=\"1e3\"/>")],
     ),
     ("factor of zero", "unit-conversion", &[("factor=\"1000\"", "factor=\"0\"")]),
+    ("display unit the wrong way round", "unit-known", &[("factor=\"1000\"", "factor=\"0.001\"")]),
+    (
+        "unit without its factor",
+        "unit-known",
+        &[("<Unit name=\"s\">", "<Unit name=\"min\"><BaseUnit s=\"1\"/></Unit><Unit name=\"s\">")],
+    ),
+    ("a limit of NaN", "min-max", &[("<Real min=\"0\" start=\"10\"/>", "<Real min=\"NaN\" start=\"10\"/>")]),
     ("unit not defined", "unit-undeclared", &[("<Real unit=\"N\"", "<Real unit=\"kN\"")]),
     (
         "unit of a type not defined",

@@ -15,8 +15,26 @@ const BINARY: &str = "binaries/x86_64-linux/corpus.so";
 
 /// Defects of what FMI 3.0 does not have, or has otherwise: input derivatives, allocation callbacks, a callbacks structure,
 /// the types platform, pending steps to cancel.
-const NOT_OF_3: [&str; 8] =
-    ["PLATFORM", "CANCEL", "INPUT_DERIVATIVE", "SLOPE_IGNORED", "CALLBACKS", "NAME_KEPT", "ALLOCATION", "RESET_SLOPE"];
+const NOT_OF_3: [&str; 17] = [
+    "PLATFORM",
+    "CANCEL",
+    "INPUT_DERIVATIVE",
+    "SLOPE_IGNORED",
+    "CALLBACKS",
+    "NAME_KEPT",
+    "ALLOCATION",
+    "RESET_SLOPE",
+    // Of rules that are tested for FMI 2.0 alone.
+    "GET_BEHIND",
+    "SET_BEHIND",
+    "REFERENCES_CHANGED",
+    "SET_FIRST",
+    "SET_ORDER",
+    "SET_ONCE",
+    "STRING_KEPT",
+    "STRING_CUT",
+    "RESET_LABEL",
+];
 
 /// Defects of what FMI 3.0 alone has.
 const OWN: [(&str, &str); 7] = [
@@ -99,6 +117,7 @@ const EDITS: &[Edit] = &[
     ),
     ("the end before the start", "default-experiment", &[("stopTime=\"1\"", "stopTime=\"-1\"")]),
     ("a unit twice", "unit-unique", &[("<Unit name=\"s\">", "<Unit name=\"N\"/><Unit name=\"s\">")]),
+    ("a factor the wrong way round", "unit-known", &[("factor=\"1000\"", "factor=\"0.001\"")]),
     ("a factor of 0", "unit-conversion", &[("factor=\"1000\"", "factor=\"0\"")]),
     (
         "a unit undefined",

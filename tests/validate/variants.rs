@@ -45,6 +45,13 @@ const TEXTS: &[(&str, Replacements)] = &[
     ("date with an offset", &[("2026-01-02T03:04:05Z", "2024-02-29T23:59:59+05:30")]),
     ("date without a zone", &[("2026-01-02T03:04:05Z", "2026-01-02T03:04:05")]),
     (
+        "units as Dymola writes them",
+        &[(
+            "<Unit name=\"s\">",
+            "<Unit name=\"rad\"><BaseUnit rad=\"1\"/><DisplayUnit name=\"deg\" factor=\"57.29577951308232\"/></Unit><Unit name=\"K\"><BaseUnit K=\"1\"/><DisplayUnit name=\"degC\" offset=\"-273.15\"/></Unit><Unit name=\"Pa\"><BaseUnit kg=\"1\" m=\"-1\" s=\"-2\"/><DisplayUnit name=\"bar\" factor=\"1E-05\"/></Unit><Unit name=\"rad/s\"><BaseUnit s=\"-1\"/><DisplayUnit name=\"rpm\" factor=\"9.549296585513721\"/></Unit><Unit name=\"%\"><BaseUnit factor=\"0.01\"/></Unit><Unit name=\"s\">",
+        )],
+    ),
+    (
         "unit with all exponents",
         &[(
             "<Unit name=\"s\">",

@@ -64,6 +64,13 @@ pub(in super::super) fn signals(setup: &Setup) -> Tested {
     })
 }
 
+pub(in super::super) fn process(setup: &Setup) -> Tested {
+    let before = measure::process();
+    life(setup)?;
+    let changed = before.into_iter().zip(measure::process()).filter(|(a, b)| a.1 != b.1);
+    Ok(changed.map(|((what, before), (_, after))| format!("{what}: {after} instead of {before}")).collect())
+}
+
 pub(in super::super) fn environment(setup: &Setup) -> Tested {
     let read = || -> BTreeSet<_> { std::env::vars_os().collect() };
     let before = read();

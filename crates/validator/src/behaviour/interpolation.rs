@@ -95,5 +95,45 @@ pub(in super::super) fn output_derivatives(p: &Probe) -> Tested {
     let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
     let values = instance.get_output_derivatives(&references, &vec![1; references.len()])?;
     let bad = outputs.iter().zip(values).filter(|(_, value)| !value.is_finite());
-    Ok(bad.map(|(v, value)| format!("the first derivative of \"{}\" is {value}", v.name)).collect())
+    let bad: Vec<String> = bad.map(|(v, value)| format!("the first derivative of \"{}\" is {value}", v.name)).collect();
+    if !bad.is_empty() {
+        return Ok(bad);
+    }
+    drop(instance);
+    slopes(p, &outputs, &references)
+}
+
+/// First derivatives of outputs against what they move by in whole steps, with constant inputs.
+fn slopes(p: &Probe, outputs: &[&Variable], references: &[u32]) -> Tested {
+    let orders = vec![1; references.len()];
+    let mut instance = p.instantiate()?;
+    instance.initialize(p.start, None)?;
+    let mut rows = Vec::new();
+    for k in 0..17 {
+        instance.do_step(p.time(k), p.step)?;
+        let values = instance.get_real(references)?;
+        rows.push((values, instance.get_output_derivatives(references, &orders)?));
+    }
+    let mut problems = Vec::new();
+    for (at, v) in outputs.iter().enumerate() {
+        let (mut clear, mut wrong, mut example) = (0, 0, String::new());
+        for pair in rows.windows(2) {
+            let (given, later) = (pair[0].1[at], pair[1].1[at]);
+            let slope = (pair[1].0[at] - pair[0].0[at]) / p.step;
+            let mean = 0.5 * (given + later);
+            // Only where it is steady over the step, and moves more than rounding.
+            let steady = (later - given).abs() <= 0.2 * mean.abs() || given == 0.0 && later == 0.0;
+            if steady && (slope * p.step).abs() > 1e-6 * pair[1].0[at].abs().max(1e-9) {
+                clear += 1;
+                if (slope - mean).abs() > 0.3 * slope.abs() {
+                    wrong += 1;
+                    example = format!("is {mean} while it moves at {slope}");
+                }
+            }
+        }
+        if clear >= 5 && wrong == clear {
+            problems.push(format!("the first derivative of \"{}\" {example}", v.name));
+        }
+    }
+    Ok(problems)
 }

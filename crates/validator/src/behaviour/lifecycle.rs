@@ -7,8 +7,8 @@ use super::super::description::{BaseType, Causality, Fmi, Value, Variability, Va
 use super::super::host::abi::{CALLS, Call};
 use super::super::host::{Binary, Instance, InstanceOptions, Status, abuse, resource_location};
 use super::measure;
-use super::probe::{Learned, Probe, Tested};
-use super::{Setup, settable_real};
+use super::probe::{Learned, Probe, Tested, not_applicable};
+use super::{Setup, settable_real, settings, values};
 use crate::host::HostError;
 
 pub(in super::super) fn load(setup: &Setup) -> Tested {
@@ -175,6 +175,28 @@ pub(in super::super) fn initialise(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
+/// Initialises an instance, the only one; what to say where that fails.
+fn initialises(p: &Probe, how: &str, tolerance: Option<f64>, stop: Option<f64>) -> Tested {
+    let mut instance = p.instantiate()?;
+    let begun = instance.setup_experiment(tolerance, p.start, stop);
+    let ended = begun.and_then(|()| instance.enter_initialization()).and_then(|()| instance.exit_initialization());
+    let said = last_words(&instance);
+    Ok(ended.err().map(|error| format!("{how} the FMU does not initialise: {error}{said}")).into_iter().collect())
+}
+
+/// "stopTimeDefined = fmi2False: no final value of the independent variable is defined" (section 2.1.6).
+pub(in super::super) fn setup_endless(p: &Probe) -> Tested {
+    initialises(p, "without a stop time", None, None)
+}
+
+/// The tolerance of the default experiment, as importers hand it over (section 2.1.6).
+pub(in super::super) fn setup_tolerance(p: &Probe) -> Tested {
+    match p.d.default_experiment.and_then(|e| e.tolerance).filter(|t| *t > 0.0) {
+        Some(tolerance) => initialises(p, "with the tolerance of its default experiment", Some(tolerance), p.stop),
+        None => not_applicable("the default experiment has no tolerance"),
+    }
+}
+
 pub(in super::super) fn step_status(p: &Probe) -> Tested {
     if p.d.fmi == Fmi::Three {
         return super::three::status(p);
@@ -272,7 +294,46 @@ pub(in super::super) fn determinism(p: &mut Probe) -> Tested {
     Ok(vec![format!("two equal runs differ in {count} variables: {what}, in the second run")])
 }
 
+/// `fmi2Reset` is allowed before and during initialisation too (table of section 4.2.4).
+fn reset_early(p: &Probe) -> Result<Option<String>, HostError> {
+    for (when, entered) in [("an instance just made", false), ("an instance in initialisation mode", true)] {
+        let mut instance = p.instantiate()?;
+        if entered {
+            p.enter(&mut instance)?;
+        }
+        let begun =
+            instance.reset().and_then(|()| p.enter(&mut instance)).and_then(|()| instance.exit_initialization());
+        if let Err(error) = begun.and_then(|()| p.run(&mut instance, 0, 1)) {
+            return Ok(Some(format!("no run after fmi2Reset of {when}: {error}")));
+        }
+    }
+    Ok(None)
+}
+
+/// What parameters and inputs read after a reset where nothing is set, against a new instance; the first difference.
+fn reset_settings(p: &Probe) -> Result<Option<String>, HostError> {
+    let kept = |v: &&Variable| matches!(v.causality, Causality::Parameter | Causality::Input);
+    let variables: Vec<&Variable> = p.d.variables.iter().filter(kept).take(2000).collect();
+    let read = |instance: &mut Instance| -> Result<Vec<Value>, HostError> {
+        instance.initialize(p.start, None)?;
+        variables.iter().map(|v| values::get(instance, v)).collect()
+    };
+    let fresh = read(&mut p.instantiate()?)?;
+    let Some(mut instance) = diverted(p)? else { return Ok(None) };
+    instance.reset()?;
+    let again = read(&mut instance)?;
+    let nan = |a: &Value, b: &Value| matches!((a, b), (Value::Real(x), Value::Real(y)) if x.is_nan() && y.is_nan());
+    let changed =
+        variables.iter().zip(fresh.iter().zip(&again)).find(|(_, (new, again))| new != again && !nan(new, again));
+    Ok(changed.map(|(v, (new, again))| {
+        format!("\"{}\" is {} instead of {} right after initialisation", v.name, values::show(again), values::show(new))
+    }))
+}
+
 pub(in super::super) fn reset(p: &Probe) -> Tested {
+    if let Some(problem) = reset_early(p)? {
+        return Ok(vec![problem]);
+    }
     p.comparable()?;
     let n = p.steps();
     let mut fresh = p.ready()?;
@@ -304,23 +365,27 @@ pub(in super::super) fn reset(p: &Probe) -> Tested {
             Some(what) => format!("{what} right after initialisation"),
             None => what,
         });
+    let what = match what {
+        Some(what) => Some(what),
+        None => reset_settings(p)?,
+    };
     Ok(what.map(|what| format!("a run after fmi2Reset is not that of a new instance: {what}")).into_iter().collect())
 }
 
-/// An instance that has run with other parameters and start values than its own: all that can be set, else those that are
-/// not zero (which often switches something off that does not go with the rest); none where the FMU takes neither.
+/// An instance that has run with other parameters and start values than its own: all that can be set, else Reals alone, else
+/// those that are not zero (which often switches something off that does not go with the rest); none where the FMU takes neither.
 pub(super) fn diverted(p: &Probe) -> Result<Option<Instance>, HostError> {
     let _venture = super::super::host::venture();
-    for zeros in [true, false] {
+    for (zeros, others) in [(true, true), (true, false), (false, false)] {
         let mut instance = p.instantiate()?;
-        if detour(p, &mut instance, zeros).is_ok() {
+        if detour(p, &mut instance, zeros, others).is_ok() {
             return Ok(Some(instance));
         }
     }
     Ok(None)
 }
 
-fn detour(p: &Probe, instance: &mut Instance, zeros: bool) -> Result<(), HostError> {
+fn detour(p: &Probe, instance: &mut Instance, zeros: bool, others: bool) -> Result<(), HostError> {
     for v in &p.d.variables {
         if !matches!(v.causality, Causality::Parameter | Causality::Local | Causality::Output) {
             continue;
@@ -335,6 +400,12 @@ fn detour(p: &Probe, instance: &mut Instance, zeros: bool) -> Result<(), HostErr
             && v.variability == Variability::Tunable
         {
             instance.set_boolean(&[v.value_reference], &[!value])?;
+        } else if others
+            && v.causality == Causality::Parameter
+            && super::probe::settable(v)
+            && let Some(value) = settings::another(p, v)
+        {
+            values::set(instance, v, &value)?;
         }
     }
     p.enter(instance)?;

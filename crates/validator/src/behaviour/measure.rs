@@ -53,6 +53,47 @@ fn count(folder: &str) -> usize {
     std::fs::read_dir(folder).map_or(0, Iterator::count)
 }
 
+/// Bytes of address space that this process has mapped; 0 where the system does not tell.
+pub(super) fn mapped() -> usize {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    text.split(' ').next().and_then(|pages| pages.parse::<usize>().ok()).unwrap_or(0) * 4096
+}
+
+/// What an FMU may change of the process beside files, numbers and signal handlers, each with its name.
+#[cfg(unix)]
+pub(super) fn process() -> Vec<(&'static str, String)> {
+    // SAFETY: all-zero bytes are valid for the structures, which the calls fill in; the mask is set back at once.
+    unsafe {
+        let mask = libc::umask(0o077);
+        libc::umask(mask);
+        let mut blocked: libc::sigset_t = std::mem::zeroed();
+        libc::pthread_sigmask(libc::SIG_BLOCK, std::ptr::null(), &raw mut blocked);
+        let blocked: Vec<i32> = (1..32).filter(|&signal| libc::sigismember(&raw const blocked, signal) == 1).collect();
+        let mut timer: libc::itimerval = std::mem::zeroed();
+        #[cfg(target_os = "linux")]
+        libc::getitimer(libc::ITIMER_REAL, &raw mut timer);
+        let open = |fd: i32| libc::fcntl(fd, libc::F_GETFD) != -1;
+        let mut files: libc::rlimit = std::mem::zeroed();
+        libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut files);
+        vec![
+            ("the mask of permissions of new files (umask)", format!("{mask:03o}")),
+            ("the blocked signals", format!("{blocked:?}")),
+            (
+                "the alarm timer",
+                if timer.it_value.tv_sec + timer.it_value.tv_usec > 0 { "running" } else { "off" }.into(),
+            ),
+            ("the open standard descriptors", format!("{:?}", (0..3).filter(|&fd| open(fd)).collect::<Vec<_>>())),
+            ("the most open files", files.rlim_cur.to_string()),
+        ]
+    }
+}
+
+/// What an FMU may change of the process beside files, numbers and signal handlers, each with its name.
+#[cfg(not(unix))]
+pub(super) fn process() -> Vec<(&'static str, String)> {
+    Vec::new()
+}
+
 /// Open files of this process.
 pub(super) fn open_files() -> usize {
     count("/proc/self/fd")

@@ -2,7 +2,7 @@
 
 use super::super::description::{Causality, Variability};
 use super::super::host::{HostError, Instance};
-use super::probe::{Probe, Tested, not_applicable, not_tested};
+use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
 use super::settable_real;
 use super::values::get_consistent;
 
@@ -45,6 +45,7 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     // Some things show late: an event time, a delay, a counter.
     let (n, cut) = (p.long(), p.steps() / 3);
     let disturbed = takes_disturbance(p);
+    let plain = without_states(p)?;
     let mut instance = p.ready()?;
     // Without this the FMU need not keep what lies before the communication point (section 4.2.2).
     instance.may_go_back = true;
@@ -61,6 +62,12 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
         }
     }
     let n = cut + expected.len();
+    if let Some(plain) = &plain {
+        let both = plain.len().min(n);
+        if let Some(what) = p.difference_beyond_tolerance(&plain[cut..both], &expected[..both - cut], cut) {
+            return Ok(vec![format!("fmi2GetFMUstate changes the run: {what}")]);
+        }
+    }
     let late = instance.get_state()?;
     let last = p.observe(&mut instance)?;
     if disturbed {
@@ -78,6 +85,15 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     if let Some(what) = p.difference_beyond_tolerance(&expected, &found, cut) {
         return Ok(vec![format!("a run from a restored state is not the one before: {what}")]);
     }
+    instance.set_state(&early)?;
+    let again = p.run(&mut instance, cut, cut + expected.len().min(3));
+    let what = match &again {
+        Ok(again) => p.difference_beyond_tolerance(&expected[..again.len()], again, cut),
+        Err(error) => Some(error.to_string()),
+    };
+    if let Some(what) = what {
+        return Ok(vec![format!("a state that was restored once is not restored a second time: {what}")]);
+    }
     instance.set_state(&late)?;
     let mut problems = Vec::new();
     if let Some(what) = p.difference_beyond_tolerance(&[last], &[p.observe(&mut instance)?], n) {
@@ -86,6 +102,16 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     instance.free_state(early)?;
     instance.free_state(late)?;
     Ok(problems)
+}
+
+/// A run in which no state is ever got; none where there can be but one instance.
+fn without_states(p: &Probe) -> Result<Option<Vec<Snapshot>>, HostError> {
+    if p.interface().only_once {
+        return Ok(None);
+    }
+    let mut instance = p.ready()?;
+    instance.may_go_back = true;
+    p.run(&mut instance, 0, p.steps()).map(Some)
 }
 
 pub(in super::super) fn handles(p: &Probe) -> Tested {

@@ -1,7 +1,7 @@
 //! Stepping through time (FMI 2.0.4, sections 4.2.1, 4.2.2 and 4.2.4).
 
 use super::super::description::{BaseType, Causality, Fmi, Variability, Variable};
-use super::super::host::{HostError, Instance};
+use super::super::host::{HostError, Instance, Status};
 use super::probe::{Probe, Tested, not_applicable, not_tested};
 
 /// Real variables whose course is compared between step sizes, at most.
@@ -169,9 +169,77 @@ fn range(rows: &[Vec<f64>], at: usize) -> f64 {
     high - low
 }
 
+/// Whether steps of half and of twice the size both fail, where those of the size do not; what to say then. One of the two
+/// may fail where the FMU has a fixed step of its own, or ends.
+fn takes_one_size(p: &Probe) -> Result<Option<String>, HostError> {
+    let fails = |size: f64| -> Result<Option<Status>, HostError> {
+        let mut instance = p.instantiate()?;
+        instance.initialize(p.start, None)?;
+        let mut time = p.start;
+        for step in [p.step, size * p.step] {
+            let status = instance.do_step_status(time, step, true)?;
+            time += step;
+            if matches!(status, Status::Error | Status::Fatal) {
+                return Ok(Some(status));
+            }
+        }
+        Ok(None)
+    };
+    if fails(1.0)?.is_some() {
+        return Ok(None);
+    }
+    let (Some(status), Some(_)) = (fails(0.5)?, fails(2.0)?) else { return Ok(None) };
+    Ok(Some(format!(
+        "canHandleVariableCommunicationStepSize is true, but after a step of {} s one of half and one of twice that return {status}",
+        p.step
+    )))
+}
+
+/// Communication points that an importer gets by adding step after step are off by their rounding; so is the last one from
+/// the stop time.
+pub(in super::super) fn rounding(p: &Probe) -> Tested {
+    let n = p.long();
+    let stop = p.time(n);
+    // Some units in the last place, as adding step after step leaves them.
+    let off = |time: f64| time + 4.0 * f64::EPSILON * time.abs().max(p.step);
+    let attempt = |rounded: bool| -> Result<Option<(usize, f64, Status)>, HostError> {
+        let mut instance = p.instantiate()?;
+        instance.initialize(p.start, Some(stop))?;
+        for k in 0..n {
+            let exact = p.time(k);
+            let (at, step) = if rounded && (k % 2 == 1 || k + 1 == n) {
+                (off(exact), p.step)
+            } else {
+                (exact, p.step.min(stop - exact))
+            };
+            let status = instance.do_step_status(at, step, true)?;
+            if !status.is_ok() {
+                return Ok(Some((k, at, status)));
+            }
+        }
+        Ok(None)
+    };
+    if attempt(false)?.is_some() {
+        return not_tested("the FMU does not run to its end in equal steps");
+    }
+    Ok(attempt(true)?
+        .map(|(k, at, status)| {
+            let exact = p.time(k);
+            format!(
+                "fmi2DoStep from t = {at} by {} returned {status}; from t = {exact}, which is that but for rounding, it does not (the stop time is {stop})",
+                p.step
+            )
+        })
+        .into_iter()
+        .collect())
+}
+
 pub(in super::super) fn variable(p: &Probe) -> Tested {
     if !p.interface().can_handle_variable_step_size {
         return not_applicable("canHandleVariableCommunicationStepSize is false");
+    }
+    if let Some(said) = takes_one_size(p)? {
+        return Ok(vec![said]);
     }
     let count = 8;
     let courses = two_sizes(p, count)?;

@@ -8,7 +8,7 @@ use super::settable_real;
 /// Relative tolerance between a start value as printed in the XML and as compiled: tools print six digits and more.
 const PRINTED: f64 = 1e-5;
 
-fn get(instance: &mut Instance, v: &Variable) -> Result<Value, HostError> {
+pub(super) fn get(instance: &mut Instance, v: &Variable) -> Result<Value, HostError> {
     let r = [v.value_reference];
     Ok(match v.base() {
         BaseType::Real => Value::Real(instance.get_real(&r)?[0]),
@@ -18,7 +18,7 @@ fn get(instance: &mut Instance, v: &Variable) -> Result<Value, HostError> {
     })
 }
 
-fn set(instance: &mut Instance, v: &Variable, value: &Value) -> Result<(), HostError> {
+pub(super) fn set(instance: &mut Instance, v: &Variable, value: &Value) -> Result<(), HostError> {
     let r = [v.value_reference];
     match value {
         Value::Real(x) => instance.set_real(&r, &[*x]),
@@ -28,7 +28,7 @@ fn set(instance: &mut Instance, v: &Variable, value: &Value) -> Result<(), HostE
     }
 }
 
-fn show(value: &Value) -> String {
+pub(super) fn show(value: &Value) -> String {
     match value {
         Value::Real(x) => x.to_string(),
         Value::Integer(x) => x.to_string(),
@@ -279,9 +279,21 @@ pub(in super::super) fn boolean_values(p: &Probe) -> Tested {
     }
     p.run(&mut instance, 0, 3)?;
     let references: Vec<u32> = booleans.iter().map(|v| v.value_reference).collect();
-    let values = instance.get_boolean_raw(&references)?;
-    let wrong = booleans.iter().zip(values).filter(|(_, value)| !matches!(value, 0 | 1));
-    Ok(wrong.map(|(v, value)| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name)).collect())
+    let say = |v: &Variable, value: i32| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name);
+    let wrong = |values: Vec<i32>| -> Vec<String> {
+        let odd = booleans.iter().zip(values).filter(|(_, value)| !matches!(value, 0 | 1));
+        odd.map(|(v, value)| say(v, value)).collect()
+    };
+    let found = wrong(instance.get_boolean_raw(&references)?);
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    instance.free();
+    let look = |instance: &mut Instance, time: f64| {
+        let first = wrong(instance.get_boolean_raw(&references)?).into_iter().next();
+        Ok(first.map(|said| format!("{said}, at t = {time}")))
+    };
+    Ok(watch(p, false, look)?.into_iter().collect())
 }
 
 pub(in super::super) fn unchanging(p: &Probe) -> Tested {

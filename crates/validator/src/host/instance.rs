@@ -93,7 +93,7 @@ unsafe extern "C" fn release(memory: *mut c_void) {
     unsafe { abi::free(memory) }
 }
 
-fn c_string(text: &str) -> Result<CString, HostError> {
+pub(super) fn c_string(text: &str) -> Result<CString, HostError> {
     CString::new(text).map_err(|_| HostError::Nul(text.to_owned()))
 }
 

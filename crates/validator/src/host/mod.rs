@@ -7,6 +7,7 @@
 
 pub(crate) mod abi;
 pub(crate) mod abuse;
+mod bounds;
 mod instance;
 pub(crate) mod logger;
 mod three;

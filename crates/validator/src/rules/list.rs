@@ -11,8 +11,8 @@
 
 use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
 use super::super::behaviour::{
-    dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, state, steps,
-    surroundings, three, values,
+    dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, settings,
+    state, steps, surroundings, three, values,
 };
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
@@ -111,6 +111,8 @@ rules! { static {
         "Units, and display units of a unit, are unique", "Remove the second one.";
     UNIT_CONVERSION = "unit-conversion" Error Conformance "2.2.2" "2.4.3";
         "Factors of units can be inverted", "Give a finite factor that is not 0.";
+    UNIT_KNOWN = "unit-known" Warning Conformance "2.2.2" "2.4.3";
+        "Factors of well-known units are theirs", "Give the factor to base units for a Unit, and that from the unit to the display unit for a DisplayUnit (1000 for mm of m), or another name.";
     UNIT_UNDECLARED = "unit-undeclared" Error Conformance "2.2.2" "2.4.3";
         "Units in use are defined", "Add the Unit to UnitDefinitions.";
     DISPLAY_UNIT = "display-unit" Error Conformance "2.2.2" "2.4.3";
@@ -212,8 +214,12 @@ rules! { static {
         "An instance can be made and freed", "See the FMU's message; the guid compiled in must be that of modelDescription.xml.";
     INITIALISE = "initialise" Error Conformance "2.1.6" "2.3.2" Loaded(lifecycle::initialise);
         "An instance initialises with its start values", "The start values of modelDescription.xml must make a valid model.";
+    SETUP_ENDLESS = "setup-endless" Error Conformance "2.1.6" "2.3.2" Loaded(lifecycle::setup_endless);
+        "An instance initialises without a stop time", "Accept stopTimeDefined = fmi2False in fmi2SetupExperiment: many importers do not know the end beforehand.";
     VARIABLE_READABLE = "variable-readable" Error Conformance "2.1.7" "2.2.6.2" Loaded(values::readable);
         "Every variable can be read", "Let each valueReference of modelDescription.xml be one of the binary, for the variable's type.";
+    ARRAY_BOUNDS = "array-bounds" Error Conformance "2.1.7" "-" Loaded(settings::bounds);
+        "Getters and setters keep within the arrays that they are given", "Read and write nvr elements, no more, and leave the value references alone; what lies behind is the host's memory.";
     SIMULATE = "simulate" Error Conformance "4.2.2" "4.2.1" Learning(experiment::simulate);
         "The default experiment runs to its end", "Let the model run from its start values with the default step size, or declare another default experiment.";
     STEP_STATUS = "step-status" Error Conformance "4.2.2" "4.2.1" Loaded(lifecycle::step_status);
@@ -226,6 +232,8 @@ rules! { static {
         "Events are handled in event mode", "Accept fmi3EnterEventMode at communication points, and let fmi3UpdateDiscreteStates come to an end; or clear hasEventMode.";
     "configuration-mode" Error Conformance "-" "2.3.6" Loaded(three::configuration_mode);
         "Structural parameters can be set in configuration mode", "Accept fmi3EnterConfigurationMode after fmi3InstantiateCoSimulation, and allocate arrays anew in fmi3ExitConfigurationMode.";
+    "setup-tolerance" Error Conformance "2.1.6" "2.3.2" Loaded(lifecycle::setup_tolerance);
+        "An instance initialises with the tolerance of its default experiment", "Accept toleranceDefined = fmi2True in fmi2SetupExperiment, and leave the tolerance aside where no solver needs it.";
     INSTANCES_REPEATED = "instances-repeated" Error Conformance "2.1.5" "2.3.1" Learning(instances::repeated);
         "A second instance can be made after the first was freed", "Undo in fmi2FreeInstance what fmi2Instantiate did for the whole process, or set canBeInstantiatedOnlyOncePerProcess.";
     DETERMINISM = "determinism" Warning Robustness "2.1" "2.2" Learning(lifecycle::determinism);
@@ -252,10 +260,20 @@ rules! { static {
         "Start values of the binary are those of modelDescription.xml", "Generate both from one source; a host that sets nothing simulates another model than the XML says.";
     "start-settable" Error Conformance "4.2.4" "2.3.2" Loaded(values::start_settable);
         "Start values can be set before initialisation", "Accept fmi2SetXXX of inputs, and of variables with initial exact or approx, after fmi2Instantiate.";
+    "initial-readable" Error Conformance "4.2.4" "2.3.3" Loaded(settings::initial_readable);
+        "Outputs can be read in initialisation mode", "Accept fmi2GetXXX of outputs between fmi2EnterInitializationMode and fmi2ExitInitializationMode; importers solve loops over several FMUs there.";
     "inputs-initial" Error Conformance "4.2.4" "2.3.3" Loaded(experiment::inputs_initial);
         "Inputs set before and during initialisation are there after it", "Do not set inputs back to their start values in fmi2EnterInitializationMode or fmi2ExitInitializationMode.";
     "set-get" Error Conformance "2.1.7" "2.2.6.2" Loaded(values::set_get);
         "Parameters and inputs read as they were set", "Store each value under its own reference.";
+    "set-get-other" Error Conformance "2.1.7" "-" Indirect(settings::others);
+        "Integer, Boolean and String parameters read as they were set", "Store each value under its own reference, whole, and keep it during initialisation.";
+    "set-together" Error Conformance "2.1.7" "-" Indirect(settings::together);
+        "Values set in one call, or in another order, are those set one by one", "Take value[i] for the reference vr[i], and let no setter change another variable; compute what follows in fmi2ExitInitializationMode.";
+    "set-twice" Error Conformance "2.1.7" "-" Indirect(settings::twice);
+        "Of two values set at one instant the second counts", "Store the value in each call.";
+    "string-copied" Error Conformance "2.1.7" "-" Loaded(settings::copied);
+        "Strings that are set are copied", "Copy the text in fmi2SetString; the importer may free or overwrite its own when the call has come back.";
     "set-get-rounded" Note Robustness "2.1.7" "2.2.6.2" Indirect(values::set_get_rounded);
         "Parameters and inputs are kept to the last digit", "Keep Reals as 64-bit numbers; what is cut to 32 bits comes back as another number.";
     "get-consistent" Error Robustness "2.1.7" "2.2.6.2" Loaded(values::get_consistent);
@@ -306,6 +324,8 @@ rules! { static {
         "Outputs are those at the end of the step", "Compute outputs after the integration, from the new states.";
     "step-variable" Error Conformance "4.3.1" "4.4" Loaded(steps::variable);
         "Steps of varying size give the results of equal ones", "Use the size of the present step, or clear canHandleVariableCommunicationStepSize.";
+    "step-rounding" Warning Robustness "4.2.2" "4.2.1" Indirect(steps::rounding);
+        "Communication points and the stop time need not be met to the last digit", "Compare times with a tolerance of some units in the last place; importers that add step after step are off by their rounding.";
     "step-negative" Note Robustness "4.2.2" "4.2.1" Loaded(steps::negative);
         "A step backwards is refused", "Return fmi2Error or fmi2Discard for communicationStepSize < 0.";
     "step-zero" Warning Robustness "4.2.2" "4.2.1" Loaded(steps::zero);
@@ -362,6 +382,8 @@ rules! { static {
         "Steps do not use up memory", "Free or reuse what each fmi2DoStep allocates.";
     "callbacks-copied" Note Robustness "2.1.5" "-" Loaded(effects::callbacks);
         "The callbacks and the instance name are copied", "Copy the structure and the name in fmi2Instantiate; some hosts free theirs afterwards.";
+    "instance-name" Warning Robustness "2.1.5" "2.3.1" Loaded(settings::name);
+        "A long instance name, with percent signs and letters beyond ASCII, is survived", "Allocate as much as the name needs, and pass it to printf through \"%s\".";
     "allocation-failure" Warning Robustness "2.1.5" "-" Loaded(effects::allocation);
         "Failing memory callbacks are survived", "Check what allocateMemory returns, and return null from fmi2Instantiate.";
     "debug-logging" Error Conformance "2.1.5" "2.3.1" Loaded(effects::debug_logging);
@@ -376,6 +398,8 @@ rules! { static {
         "Nothing is printed to standard output", "Use the logger callback.";
     "side-signals" Warning Robustness "2.1" "2.2" Raw(effects::signals);
         "Signal handlers stay", "Leave signals to the host.";
+    "side-process" Warning Robustness "2.1" "2.2" Raw(effects::process);
+        "Limits, masks, timers and standard descriptors of the process stay", "Leave umask, blocked signals, timers, limits and the descriptors 0 to 2 to the host.";
     "side-environment" Warning Robustness "2.1" "2.2" Raw(effects::environment);
         "Environment variables stay", "Pass settings inside the FMU.";
     "side-locale" Warning Robustness "2.1" "2.2" Raw(effects::locale);

@@ -88,6 +88,16 @@ pub(super) fn entries(archive: &mut Archive, findings: &mut Findings) -> bool {
             findings.entry(id::ARCHIVE_DUPLICATE, &entry.name, message);
         }
     }
+    let files: HashSet<&str> = archive.entries().iter().filter(|e| !e.is_dir).map(|e| e.name.as_str()).collect();
+    for entry in archive.entries() {
+        let mut folders = entry.name.match_indices('/').map(|(at, _)| &entry.name[..at]);
+        if let Some(folder) = folders.find(|folder| files.contains(folder)) {
+            let message =
+                format!("lies in the folder {folder}, which is a file of the archive too: only one can be unpacked");
+            findings.entry(id::ARCHIVE_DUPLICATE, &entry.name, message);
+            safe = false;
+        }
+    }
     if archive.has_duplicate_names() {
         findings.whole(id::ARCHIVE_DUPLICATE, "two entries of the archive have the same name");
     }

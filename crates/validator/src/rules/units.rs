@@ -10,6 +10,7 @@ use super::id;
 /// Checks units, display units, and type definitions with their uses.
 pub(super) fn check(d: &Description, findings: &mut Findings) {
     definitions(d, findings);
+    known_factors(d, findings);
     types(d, findings);
     let units: HashMap<&str, HashSet<&str>> =
         d.units.iter().map(|u| (u.name.as_str(), u.display.iter().map(|x| x.name.as_str()).collect())).collect();
@@ -56,6 +57,56 @@ fn definitions(d: &Description, findings: &mut Findings) {
         for x in u.display.iter().filter(|x| x.factor == 0.0 || !x.factor.is_finite() || !x.offset.is_finite()) {
             let message = format!("display unit \"{}\": the factor or offset cannot be inverted", x.name);
             findings.at(id::UNIT_CONVERSION, x.position, message);
+        }
+    }
+}
+
+/// Names of units that mean one thing, with their factor to the unit of the SI without a prefix (The International System of
+/// Units, 9th edition, tables 4, 7 and 8; a revolution a minute is 2 pi rad in 60 s).
+const KNOWN: [(&str, f64); 19] = [
+    ("um", 1e-6),
+    ("mm", 1e-3),
+    ("cm", 1e-2),
+    ("km", 1e3),
+    ("ms", 1e-3),
+    ("min", 60.0),
+    ("h", 3600.0),
+    ("deg", std::f64::consts::PI / 180.0),
+    ("mN", 1e-3),
+    ("kN", 1e3),
+    ("kW", 1e3),
+    ("MW", 1e6),
+    ("mbar", 1e2),
+    ("kPa", 1e3),
+    ("bar", 1e5),
+    ("MPa", 1e6),
+    ("km/h", 1.0 / 3.6),
+    ("rpm", std::f64::consts::PI / 30.0),
+    ("rev/min", std::f64::consts::PI / 30.0),
+];
+
+/// Factors that contradict the unit's name: "unit_value * factor + offset" gives the value in base units and in the display
+/// unit (section 2.2.2). Printed factors are rounded.
+fn known_factors(d: &Description, findings: &mut Findings) {
+    let known = |name: &str| KNOWN.iter().find(|k| k.0 == name).map(|k| k.1);
+    let apart = |a: f64, b: f64| (a - b).abs() > 0.01 * b.abs();
+    for u in &d.units {
+        // Without base units nobody converts, and a name may mean anything.
+        let Some(base) = u.base.filter(|b| b.exponents.iter().any(|e| *e != 0)) else { continue };
+        if let Some(factor) = known(&u.name).filter(|factor| apart(base.factor, *factor)) {
+            let message = format!("unit \"{}\": the factor to base units is {}, not {factor}", u.name, base.factor);
+            findings.at(id::UNIT_KNOWN, u.position, message);
+            continue;
+        }
+        for x in u.display.iter().filter(|x| x.factor != 0.0) {
+            let Some(factor) = known(&x.name).map(|factor| base.factor / factor) else { continue };
+            if apart(x.factor, factor) {
+                let message = format!(
+                    "display unit \"{}\" of \"{}\": the factor is {}, not {factor} (the display value is the value times it)",
+                    x.name, u.name, x.factor
+                );
+                findings.at(id::UNIT_KNOWN, x.position, message);
+            }
         }
     }
 }

@@ -121,6 +121,11 @@ fn starts(v: &Variable, findings: &mut Findings) {
 
 fn ranges(d: &Description, v: &Variable, findings: &mut Findings) {
     let r = d.resolved(v);
+    if let Some(name) = [("min", r.min), ("max", r.max)].iter().find(|(_, x)| x.is_some_and(f64::is_nan)).map(|x| x.0) {
+        let message = format!("variable \"{}\": {name} is NaN, which bounds nothing", v.name);
+        findings.at(id::MIN_MAX, v.attributes.position, message);
+        return;
+    }
     if let (Some(min), Some(max)) = (r.min, r.max)
         && min > max
     {

@@ -16,12 +16,14 @@ use super::super::rules::{self, Finding, Id, Rule, Verdict, id};
 use super::{Options, ValidationError};
 
 /// Rules that must pass before the others make sense, in order.
-const GATES: [Id; 10] = [
+const GATES: [Id; 12] = [
     id::BINARY_LOAD,
     id::BINARY_SYMBOLS,
     id::INSTANTIATE,
     id::INITIALISE,
+    id::SETUP_ENDLESS,
     id::VARIABLE_READABLE,
+    id::ARRAY_BOUNDS,
     id::SIMULATE,
     id::STEP_STATUS,
     id::INSTANCES_REPEATED,
@@ -96,7 +98,7 @@ impl<'a> Bench<'a> {
         let mut tested = Vec::new();
         let mut learned = Learned::default();
         let mut blocked: Option<String> = None;
-        let gates = GATES.iter().filter_map(|id| rules::rule(id.text()));
+        let gates = GATES.iter().filter_map(|id| rules::rule(id.text())).filter(|r| r.section(self.fmi).is_some());
         for rule in gates {
             if let Some(why) = &blocked {
                 tested.push((rule, Verdict::NotTested(why.clone()), vec![]));
