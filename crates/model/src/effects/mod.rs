@@ -142,6 +142,14 @@ macro_rules! effects {
                 }
             }
 
+            /// The parameter at whose zero it is a simpler effect: see [`Force::SIMPLER_AT_ZERO`].
+            #[must_use]
+            pub const fn simpler_at_zero(self) -> Option<usize> {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law as Force>::SIMPLER_AT_ZERO, None),)*
+                }
+            }
+
             /// The parameter that is half of a play, whose contacts the step locates in time.
             #[must_use]
             pub const fn play_parameter(self) -> Option<usize> {

@@ -48,6 +48,9 @@ impl<I: Side> Force for Presliding<I> {
         variants: VARIANTS,
     };
 
+    /// Without reach it is Coulomb's friction.
+    const SIMPLER_AT_ZERO: Option<usize> = Some(1);
+
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S> {
         let z = &mut memory[0];

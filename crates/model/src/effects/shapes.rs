@@ -214,6 +214,8 @@ pub trait Force {
     const CARRIED: bool = false;
     /// Which of its angles the table shows as a length.
     const LENGTH: Option<Length> = None;
+    /// The parameter at whose zero the effect is a simpler one of the list.
+    const SIMPLER_AT_ZERO: Option<usize> = None;
 
     /// Fastest vibration that the effect adds to an inertia of `inertia` kg.m2 at its place, rad/s.
     fn rate(_p: &[f64], _inertia: f64) -> f64 {

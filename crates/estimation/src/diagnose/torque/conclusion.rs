@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::fit::Fit;
-use super::search::{ALIKE, Search, is_more};
+use super::search::{ALIKE, Search, is_more, is_simpler, is_undetermined};
 use crate::effects::Effect;
 use crate::examine::NOMINAL_OFF;
 
@@ -132,8 +132,14 @@ impl Search<'_> {
         let little = self.leaves_little(&chosen);
         let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
         pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
-        let decisive: Vec<f64> =
-            (0..chosen.terms.len()).map(|i| self.decisive(&chosen, i, &parameters, &pool)).collect();
+        let finished = self.problem.finished(&chosen).unwrap_or_else(|| chosen.clone());
+        // With a cause on its own the verdict stands and falls: below two of its standard errors, everything free, it is none.
+        let alone = chosen.terms.len() == 1;
+        let decisive = |i: usize| match alone && is_undetermined(&finished, chosen.terms[i].0, independent) {
+            true => 0.0,
+            false => self.decisive(&chosen, i, &parameters, &pool),
+        };
+        let decisive: Vec<f64> = (0..chosen.terms.len()).map(decisive).collect();
         let mut ranking = self.weighed(pool, independent);
         let probabilities: Vec<f64> = chosen
             .terms
@@ -180,7 +186,7 @@ impl Search<'_> {
             true if chosen.coordinates.is_empty() => Verdict::NoGap,
             true => Verdict::Parameters,
         };
-        let chosen = self.problem.finished(&chosen).unwrap_or(chosen);
+        let chosen = finished;
         ranking.truncate(40);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
         let shares = self.shares(&chosen);
@@ -235,7 +241,7 @@ impl Search<'_> {
         let mut all: Vec<Weighed> = pool
             .into_iter()
             .map(|fit| Weighed { evidence: self.evidence(&fit, independent), fit, probability: 0.0 })
-            .filter(|w| w.evidence.is_finite() && !w.fit.at_bound)
+            .filter(|w| w.evidence.is_finite() && !w.fit.at_bound && !is_simpler(&w.fit, independent))
             .collect();
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let key = |f: &Fit| {

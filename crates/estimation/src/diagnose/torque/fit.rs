@@ -85,6 +85,8 @@ pub struct Problem<'a> {
     pub nominal: Model,
     /// Range of theta1 and theta2 over the record, and its length: what a period is told by.
     pub range: [f64; 2],
+    /// Largest torque of the log, N.m: in its band a torque that jumps overshoots.
+    pub peak: f64,
     pub scales: Option<Scales>,
     /// Spectra of the measured motion; `None` where it is not measured whole.
     motion: Option<Arc<Motion>>,
@@ -94,6 +96,12 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
+    /// A record compared in a band, its largest torque that of the log.
+    #[must_use]
+    pub fn of(record: &'a Record, band: &'a Band, nominal: Model, peak: f64) -> Self {
+        Self { peak, ..Self::new(record, band, nominal) }
+    }
+
     /// A record compared in a band.
     #[must_use]
     pub fn new(record: &'a Record, band: &'a Band, nominal: Model) -> Self {
@@ -109,6 +117,7 @@ impl<'a> Problem<'a> {
             band,
             nominal,
             range,
+            peak: largest(&record.torque),
             scales: None,
             motion: band.motion(record).map(Arc::new),
             resolution: Resolution::Full,
@@ -347,6 +356,11 @@ impl Problem<'_> {
             - 0.5 * f.coordinates.len() as f64 * n.ln()
             - f.terms.iter().map(|t| self.price(*t)).sum::<f64>()
     }
+}
+
+/// Largest absolute value of a series; zero of an empty one.
+pub fn largest(series: &[f64]) -> f64 {
+    series.iter().fold(0.0, |most, v| v.abs().max(most))
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ use band::{Rate, Reach};
 use conclusion::LIKELY;
 pub use conclusion::{Confusable, Decision, UNCAUSED, Weighed};
 pub use fit::Fit;
-use fit::Problem;
+use fit::{Problem, largest};
 use gap::{Gap, Gaps, rms_about_mean};
 use likelihood::Band;
 use search::{NEGLIGIBLE, Search, decide};
@@ -74,6 +74,8 @@ struct Prepared {
     limit: f64,
     /// Torque that shares are told of, rms about its mean, N.m.
     torque_rms: f64,
+    /// Largest torque of the log, N.m.
+    peak: f64,
 }
 
 /// Diagnoses a record of a rigid axis.
@@ -83,7 +85,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
     let decided = |p: &Prepared, suspects: Vec<Effect>, known: Option<&Fit>| {
-        let problem = Problem::new(&p.record, &p.band, case.nominal);
+        let problem = Problem::of(&p.record, &p.band, case.nominal, p.peak);
         decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress }, known)
     };
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
@@ -183,17 +185,19 @@ fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option
             [0.0, QUARTER / nominal.parameters.modal().wn].map(|longest| Rate { longest, straight: false })
         }
     };
+    let peak = largest(&record.torque);
     let at = |rate: Rate| {
         let r = band::decimate(&whole, limit, rate);
         r.part(0..band::smooth(r.len().min(SEARCHED)))
     };
     let [own, slow] = [exact, fast].map(at);
     let alike = slow.len() == own.len() && slow.instants() == own.instants();
-    let (own, left) = referred(own, nominal, limit, exact);
+    let referred = |record, rate| referred(record, nominal, limit, rate, peak);
+    let (own, left) = referred(own, exact);
     if alike || left < EXACT {
         return (own, None);
     }
-    let (slow, left) = referred(slow, nominal, limit, fast);
+    let (slow, left) = referred(slow, fast);
     if left.is_finite() { (slow, Some(own)) } else { (own, None) }
 }
 
@@ -208,14 +212,14 @@ fn likely(decision: &Decision) -> Vec<Effect> {
 
 /// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,
 /// in noises.
-fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate) -> (Prepared, f64) {
+fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate, peak: f64) -> (Prepared, f64) {
     let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);
     let fit = Problem::new(&record, &plain, *nominal).fit(nominal, &[], [f64::MAX; 2], REFERRED);
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
     let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
     let torque_rms = rms_about_mean(&record.torque);
-    (Prepared { record, band, rate, limit, torque_rms }, left)
+    (Prepared { record, band, rate, limit, torque_rms, peak }, left)
 }
 
 impl Prepared {

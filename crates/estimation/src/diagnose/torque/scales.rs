@@ -81,7 +81,7 @@ impl Scales {
         let last = t.motion.len() - 1;
         let work: f64 = (0..last).map(|k| acting(k) * moved(k)).sum();
         let shifted = (t.motion[last][2 * driven] - t.motion[0][2 * driven]).abs();
-        let peak = torque.iter().fold(0.0, |m: f64, t| t.abs().max(m));
+        let peak = p.peak;
         let ways = [0, 1].map(|i: usize| {
             let noise = p.record.channels[2 * i].as_ref().map_or(0.0, |_| p.record.noise[2 * i]);
             way(t.motion.iter().map(|m| m[2 * i]), TURN * noise)

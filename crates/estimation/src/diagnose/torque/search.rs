@@ -459,15 +459,28 @@ pub fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
+/// Whether an effect stands where it is a simpler one: the shape that it has beyond that one's is below two of its standard errors.
+pub fn is_simpler(fit: &Fit, independent: f64) -> bool {
+    fit.coordinates.iter().zip(&fit.std).any(|(c, std)| match c.free {
+        Free::Effect(e, i) if e.simpler_at_zero() == Some(i) => {
+            std.is_finite() && c.value(&fit.model).abs() < 2.0 * std / independent.sqrt()
+        }
+        _ => false,
+    })
+}
+
 /// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
 fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
-    rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|(effect, _)| {
-        rich.coordinates
-            .iter()
-            .zip(&rich.std)
-            .filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == *effect) && !c.is_shape())
-            .all(|(c, std)| c.value(&rich.model).abs() < 2.0 * std / independent.sqrt())
-    })
+    rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|t| is_undetermined(rich, t.0, independent))
+}
+
+/// Whether every size of an effect of a fit is below two of its standard errors, with `independent` of its values so.
+pub fn is_undetermined(fit: &Fit, effect: Effect, independent: f64) -> bool {
+    fit.coordinates
+        .iter()
+        .zip(&fit.std)
+        .filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == effect) && !c.is_shape())
+        .all(|(c, std)| c.value(&fit.model).abs() < 2.0 * std / independent.sqrt())
 }
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
