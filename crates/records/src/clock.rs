@@ -66,6 +66,34 @@ fn epoch(time: &mut [f64], table: &Table, column: &Column, warnings: &mut Vec<St
     Ok(())
 }
 
+/// Share of its width beyond which a clock that starts anew has lost more than a few samples.
+const ANEW: f64 = 0.01;
+
+/// Clocks that start anew go on, and says so: at midnight, and counters of 16 and 32 bits.
+fn anew(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<String>, TraceError> {
+    let (_, factor) = scale(table, column, "time", Quantity::Time)?;
+    let back: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).filter(|d| *d < 0.0).collect();
+    let widths = [
+        (86_400.0, "a clock at midnight"),
+        (65_536.0 * factor, "a counter of 16 bits"),
+        (4_294_967_296.0 * factor, "a counter of 32 bits"),
+    ];
+    let of = |width: f64| !back.is_empty() && back.iter().all(|d| (0.0..ANEW * width).contains(&(d + width)));
+    let Some((width, name)) = widths.into_iter().find(|(w, _)| of(*w)) else { return Ok(None) };
+    let (mut turns, mut before) = (0.0, time[0]);
+    for t in time.iter_mut() {
+        turns += f64::from(u8::from(*t < before));
+        before = *t;
+        *t += turns * width;
+    }
+    Ok(Some(format!(
+        "{}: column {} starts anew {} times ({name}); the time goes on there",
+        table.file,
+        column.column,
+        back.len()
+    )))
+}
+
 /// A gap of more than so many intervals is not bridged: the record is cut there.
 const BRIDGED: f64 = 6.0;
 /// Share of the samples that may be missing in bridged gaps.
@@ -89,7 +117,9 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         return Ok(alone(Clock { grid, rows, stamps: None, resampling: Resampling::None }));
     };
     let mut time = values(table, &column, "time", Quantity::Time, &(0..count))?;
+    warnings.extend(table.position(&column.column).and_then(|k| table.mended(k)).map(str::to_owned));
     epoch(&mut time, table, &column, warnings)?;
+    warnings.extend(anew(&mut time, table, &column)?);
     let mut rows = 0..count;
     if mapping.from.is_some() || mapping.to.is_some() {
         let (from, to) = (mapping.from.unwrap_or(f64::NEG_INFINITY), mapping.to.unwrap_or(f64::INFINITY));

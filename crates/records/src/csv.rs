@@ -35,6 +35,7 @@ pub(super) fn parse(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let format = Format::of(&head, body);
     let rows = rows(body, &format, 0, head.lines + 1).map_err(|r| r.named(file, &format))?;
     Ok(Table {
+        mended: Vec::new(),
         file: file.to_owned(),
         headers: head.headers,
         columns: rows.columns,
@@ -89,8 +90,8 @@ pub(super) fn rows(body: &[u8], format: &Format, row: usize, line: usize) -> Res
     for result in results {
         let parsed = result?;
         for (all, one) in faults.iter_mut().zip(parsed.faults) {
-            if all.is_none() {
-                *all = one;
+            if let Some(one) = one {
+                one.into_first(all);
             }
         }
         lines.extend(parsed.lines);
@@ -232,10 +233,22 @@ fn split(line: &[u8], separator: u8) -> (Vec<String>, bool) {
     (fields, blank)
 }
 
-/// Whether numbers are written with a decimal comma, from the first rows of a file separated by semicolons.
-fn decimal_comma(body: &[u8]) -> bool {
+/// Whether numbers are written with a decimal comma, from the first rows of a file separated by semicolons or tabs. Points and commas of
+/// time stamps say nothing; of a number with both the last one is the decimal sign.
+fn decimal_comma(body: &[u8], separator: u8) -> bool {
     let first = &body[..body.len().min(4096)];
-    memchr(b',', first).is_some() && memchr(b'.', first).is_none()
+    let (mut comma, mut point) = (false, false);
+    for cell in first.split(|c| *c == separator || *c == b'\n').filter(|c| memchr(b':', c).is_none()) {
+        if number(cell, true).is_none() && number(cell, false).is_none() {
+            continue;
+        }
+        match cell.iter().rfind(|c| matches!(c, b',' | b'.')) {
+            Some(b',') => comma = true,
+            Some(_) => point = true,
+            None => {}
+        }
+    }
+    comma && !point
 }
 
 /// Cuts the body at line ends into about as many pieces as keep every thread busy.
@@ -303,7 +316,7 @@ impl Format {
         Self {
             separator: head.separator,
             columns: head.headers.len(),
-            decimal_comma: head.separator != b',' && decimal_comma(body),
+            decimal_comma: head.separator != b',' && decimal_comma(body, head.separator),
             blank_last: head.blank_last,
         }
     }
@@ -385,17 +398,24 @@ impl Job<'_> {
                     (Some(value), at + n)
                 }
                 _ => {
-                    let end = memchr2(format.separator, b'\n', &bytes[at..]).map_or(bytes.len(), |k| at + k);
+                    // A separator within quotes belongs to the cell.
+                    let line = || memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |k| at + k);
+                    let quoted = |k: usize| at + 1 + k;
+                    let from = (bytes[at..].first() == Some(&b'"'))
+                        .then(|| memchr(b'"', &bytes[at + 1..line()]).map(quoted))
+                        .flatten()
+                        .unwrap_or(at);
+                    let end = memchr2(format.separator, b'\n', &bytes[from..]).map_or(bytes.len(), |k| from + k);
                     (number(&bytes[at..end], format.decimal_comma), end)
                 }
             };
             if field < format.columns {
                 let value = value.unwrap_or(f64::NAN);
                 self.out[field][row] = value;
-                if !value.is_finite() && faults[field].is_none() {
+                if !value.is_finite() && faults[field].as_ref().is_none_or(Fault::missing) {
                     let mut text = String::from_utf8_lossy(trim(&bytes[at..end])).into_owned();
                     text.truncate(text.char_indices().nth(40).map_or(text.len(), |(k, _)| k));
-                    faults[field] = Some(Fault { line, text });
+                    Fault { line, text }.into_first(&mut faults[field]);
                 }
             } else if !(field == format.columns && format.blank_last && trim(&bytes[at..end]).is_empty()) {
                 let rest = memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |k| at + k);
@@ -430,16 +450,30 @@ fn ends_field(bytes: &[u8], at: usize, separator: u8) -> bool {
 }
 
 /// A number with blanks or quotes around it.
-fn number(field: &[u8], decimal_comma: bool) -> Option<f64> {
+pub(super) fn number(field: &[u8], decimal_comma: bool) -> Option<f64> {
     let mut text = trim(field);
+    let mut decimal_comma = decimal_comma;
     if text.len() >= 2 && text[0] == b'"' && text[text.len() - 1] == b'"' {
         text = trim(&text[1..text.len() - 1]);
+        // A number stands in quotes for the comma in it, which in groups of three may mean thousands: then it is not told.
+        decimal_comma |= memchr(b',', text).is_some() && !thousands(text);
     }
     if decimal_comma && memchr(b',', text).is_some() {
-        let dotted: Vec<u8> = text.iter().map(|c| if *c == b',' { b'.' } else { *c }).collect();
-        return fast_float2::parse(&dotted).ok();
+        // Points before the comma part thousands.
+        let grouped = |c: u8| c == b'.' && memchr(b':', text).is_none();
+        let dotted: Vec<u8> =
+            text.iter().filter(|c| !grouped(**c)).map(|c| if *c == b',' { b'.' } else { *c }).collect();
+        return fast_float2::parse(&dotted).ok().or_else(|| stamp(text));
     }
     fast_float2::parse(text).ok().or_else(|| stamp(text))
+}
+
+/// Whether a text is one to three digits, the first of them no zero, and groups of three behind commas.
+fn thousands(text: &[u8]) -> bool {
+    let digits = text.strip_prefix(b"-").unwrap_or(text);
+    let mut groups = digits.split(|c| *c == b',');
+    let first = groups.next().unwrap_or_default();
+    (1..=3).contains(&first.len()) && first[0] != b'0' && groups.all(|g| g.len() == 3)
 }
 
 fn trim(bytes: &[u8]) -> &[u8] {

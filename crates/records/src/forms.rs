@@ -29,6 +29,34 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
         return utf16(rest, u16::from_be_bytes, file);
     }
     let text = super::csv::unmarked(bytes);
+    // UTF-16 without its mark: the other byte of a plain character is zero.
+    let head = &text[..text.len().min(HEAD) / 2 * 2];
+    let zeros = |from: usize| head.iter().skip(from).step_by(2).filter(|c| **c == 0).count();
+    if head.len() >= 16 && zeros(1) * 10 > head.len() / 2 * 9 {
+        return utf16(text, u16::from_le_bytes, file);
+    }
+    if head.len() >= 16 && zeros(0) * 10 > head.len() / 2 * 9 {
+        return utf16(text, u16::from_be_bytes, file);
+    }
+    if memchr::memchr(0, head).is_some() {
+        return Err(TraceError::Format {
+            file: file.to_owned(),
+            what: "it is neither text nor a form that is known (CSV, Excel, Parquet, MATLAB, NumPy .npz, JSON, HDF5); export the log as \
+                   CSV"
+                .to_owned(),
+        });
+    }
+    // Text of one byte a letter, as Windows wrote it in the west, and lines that end as on old Macintoshes.
+    if let Err(at) = std::str::from_utf8(head)
+        && at.error_len().is_some()
+    {
+        let text: String = text.iter().map(|c| char::from(*c)).collect();
+        return plain(of(text.as_bytes(), file)?, text.as_bytes());
+    }
+    if memchr::memchr(b'\n', text).is_none() && memchr::memchr(b'\r', text).is_some() {
+        let text: Vec<u8> = text.iter().map(|c| if *c == b'\r' { b'\n' } else { *c }).collect();
+        return plain(of(&text, file)?, &text);
+    }
     let first = text.trim_ascii_start();
     if first.starts_with(b"{")
         || first.starts_with(b"[{")
@@ -48,6 +76,14 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
     Ok(blanks(text).map_or(Form::Plain, Form::Csv))
 }
 
+/// Bytes of a text that tell how its letters are written.
+const HEAD: usize = 1 << 16;
+
+/// CSV in other bytes than the file's.
+fn plain(form: Form, text: &[u8]) -> Result<Form, TraceError> {
+    Ok(if matches!(form, Form::Plain) { Form::Csv(text.to_vec()) } else { form })
+}
+
 fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16, file: &str) -> Result<Form, TraceError> {
     let units = bytes.chunks_exact(2).map(|b| unit([b[0], b[1]]));
     let text: Result<String, _> = char::decode_utf16(units).collect();
@@ -55,10 +91,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16, file: &str) -> Result<Form, Tra
         file: file.to_owned(),
         what: "it begins as UTF-16 and is not; save it as UTF-8".to_owned(),
     })?;
-    match of(text.as_bytes(), file)? {
-        Form::Plain => Ok(Form::Csv(text.into_bytes())),
-        other => Ok(other),
-    }
+    plain(of(text.as_bytes(), file)?, text.as_bytes())
 }
 
 /// Columns that are filled row by row, each by its name.
@@ -77,7 +110,7 @@ impl Filled {
         for (column, fault) in self.columns.iter_mut().zip(&mut self.faults) {
             if column.len() < self.rows {
                 column.push(f64::NAN);
-                fault.get_or_insert_with(|| Fault { line, text: String::new() });
+                Fault { line, text: String::new() }.into_first(fault);
             }
         }
     }
@@ -115,7 +148,7 @@ impl Filled {
         if number.is_none() {
             let mut text = text();
             text.truncate(text.char_indices().nth(40).map_or(text.len(), |(k, _)| k));
-            self.faults[index].get_or_insert(Fault { line, text });
+            Fault { line, text }.into_first(&mut self.faults[index]);
         }
         self.columns[index].push(number.unwrap_or(f64::NAN));
         Ok(())
@@ -134,6 +167,7 @@ impl Filled {
             columns: self.columns,
             faults: self.faults,
             lines: vec![(0, first_line)],
+            mended: Vec::new(),
         }
     }
 }
@@ -147,7 +181,7 @@ fn json(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
             return Err(wrong(format!("row {line}: not an object such as {{\"time\": 0.0, \"T\": 0.1}}")));
         };
         for (name, value) in object {
-            filled.put(name, value.as_f64(), || value.to_string(), line, file)?;
+            cell(filled, name, value, line, file)?;
         }
         filled.end(line);
         Ok(())
@@ -158,12 +192,20 @@ fn json(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
                 row(&mut filled, value, k + 1)?;
             }
         }
+        // An array of objects beside what the logger says of itself.
+        Ok(Value::Object(object)) if object.values().filter(|v| is_rows(v)).count() == 1 => {
+            for value in object.values().filter(|v| is_rows(v)).filter_map(Value::as_array) {
+                for (k, value) in value.iter().enumerate() {
+                    row(&mut filled, value, k + 1)?;
+                }
+            }
+        }
         Ok(Value::Object(object)) if object.values().any(Value::is_array) => {
             let rows = object.values().filter_map(Value::as_array).map(Vec::len).max().unwrap_or(0);
             for k in 0..rows {
                 for (name, values) in &object {
                     let Some(value) = values.as_array().and_then(|v| v.get(k)) else { continue };
-                    filled.put(name, value.as_f64(), || value.to_string(), k + 1, file)?;
+                    cell(&mut filled, name, value, k + 1, file)?;
                 }
                 filled.end(k + 1);
             }
@@ -184,6 +226,26 @@ fn json(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         return Err(wrong("the file holds no columns; a record is one object of numbers a line".to_owned()));
     }
     Ok(filled.table(file, 1))
+}
+
+/// Whether a value is an array of objects.
+fn is_rows(value: &Value) -> bool {
+    value.as_array().and_then(|a| a.first()).is_some_and(Value::is_object)
+}
+
+/// A value of a row: a number, the text of a number or of a time stamp; of an object each of its values, as `axis.torque`.
+fn cell(filled: &mut Filled, name: &str, value: &Value, line: usize, file: &str) -> Result<(), TraceError> {
+    match value {
+        Value::Object(inner) => inner.iter().try_for_each(|(part, value)| match value {
+            // No deeper: a name of three parts is no channel.
+            Value::Object(_) => Ok(()),
+            value => cell(filled, &format!("{name}.{part}"), value, line, file),
+        }),
+        Value::String(text) => {
+            filled.put(name, super::csv::number(text.as_bytes(), false), || text.clone(), line, file)
+        }
+        _ => filled.put(name, value.as_f64(), || value.to_string(), line, file),
+    }
 }
 
 /// A saved log of halscope.

@@ -84,18 +84,55 @@ const POSITION: &[&str] = &[
     "x",
     "winkel",
     "lage",
+    "posición",
+    "posição",
+    "posizione",
+    "angolo",
+    "ángulo",
     "way",
     "weg",
     "displacement",
     "enc",
     "encoder",
 ];
-const SPEED: &[&str] =
-    &["speed", "vel", "velocity", "omega", "w", "v", "drehzahl", "geschwindigkeit", "rpm", "dq", "qd", "n"];
-const TORQUE: &[&str] = &["torque", "force", "moment", "drehmoment", "kraft", "tau", "trq", "effort", "t", "m", "f"];
+const SPEED: &[&str] = &[
+    "speed",
+    "vel",
+    "velocity",
+    "omega",
+    "w",
+    "v",
+    "drehzahl",
+    "geschwindigkeit",
+    "vitesse",
+    "velocidad",
+    "velocidade",
+    "velocità",
+    "rpm",
+    "dq",
+    "qd",
+    "n",
+];
+const TORQUE: &[&str] = &[
+    "couple",
+    "coppia",
+    "par",
+    "torque",
+    "force",
+    "moment",
+    "drehmoment",
+    "kraft",
+    "tau",
+    "trq",
+    "effort",
+    "t",
+    "m",
+    "f",
+];
 const CURRENT: &[&str] = &["current", "iq", "i", "strom", "amps", "cur"];
 const DRIVE: &[&str] = &["load", "input", "u", "voltage", "pwm", "duty", "control", "out", "output", "last"];
-const TIME: &[&str] = &["time", "t", "timestamp", "zeit", "stamp", "sec", "seconds", "clock"];
+const TIME: &[&str] =
+    &["time", "t", "timestamp", "zeit", "zeitstempel", "temps", "tiempo", "tempo", "stamp", "sec", "seconds", "clock"];
 const MOTOR: &[&str] = &["motor", "mot", "m", "1", "drive", "rotor"];
 const TABLE: &[&str] =
     &["load", "table", "tisch", "last", "2", "scale", "linear", "direct", "slide", "ext", "external", "second"];
@@ -107,7 +144,11 @@ const ACCELERATION: &[&str] =
 pub fn guess(table: &Table) -> Vec<Guess> {
     let mut candidates: Vec<(Guess, usize)> = Vec::new();
     for (index, header) in table.headers.iter().enumerate() {
-        let Ok(values) = table.column(index) else { continue };
+        // A column with some cells that are no number is one all the same: what reads it names the cell.
+        let values = table.finite(index);
+        if values.is_empty() || 2 * values.len() < table.rows() {
+            continue;
+        }
         let given = header.unit.as_deref().and_then(Unit::parse);
         let (stem, unit) = match (given, suffix(&header.name)) {
             (Some(unit), _) => (header.name.as_str(), Some(unit)),
@@ -115,7 +156,7 @@ pub fn guess(table: &Table) -> Vec<Guess> {
             (None, None) => (header.name.as_str(), None),
         };
         let words = words(stem);
-        for (role, score) in scores(&header.name, &words, unit.map(|u| u.quantity), values) {
+        for (role, score) in scores(&header.name, &words, unit.map(|u| u.quantity), &values) {
             candidates.push((Guess { role, column: header.name.clone(), unit, score }, index));
         }
     }
@@ -134,6 +175,17 @@ pub fn guess(table: &Table) -> Vec<Guess> {
     };
     found.sort_by_key(|f| order(&f.role));
     found
+}
+
+/// The first column that is called as times are, or in a unit of time, whatever its numbers.
+#[must_use]
+pub fn time_by_name(table: &Table) -> Option<Guess> {
+    table.headers.iter().find_map(|header| {
+        let given = header.unit.as_deref().and_then(Unit::parse);
+        let unit = given.or_else(|| suffix(&header.name).map(|(_, u)| u));
+        let timed = unit.map_or_else(|| super::load::time_name(&header.name), |u| u.quantity == Quantity::Time);
+        timed.then(|| Guess { role: Role::Time, column: header.name.clone(), unit, score: 0 })
+    })
 }
 
 /// The roles that a column may have, each with what speaks for it.

@@ -167,6 +167,8 @@ fn trace(
     let mut trace = Trace::new(grid.start, grid.dt, mapping.hold);
     for (signal, column) in wanted {
         let mut values = values(table, column, signal.name(), signal.quantity(mapping.motion), rows)?;
+        let at = table.position(&column.column);
+        warnings.extend(at.and_then(|k| table.mended(k)).map(str::to_owned));
         if let Some(word) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
             warnings.push(word);
         }
@@ -321,7 +323,7 @@ pub(super) fn values(
 }
 
 /// Whether a column is called as times are: `t`, `Time`, `time_ms`, `timestamp`.
-fn time_name(name: &str) -> bool {
+pub(super) fn time_name(name: &str) -> bool {
     let stem = guess::suffix(name).filter(|(_, unit)| unit.quantity == Quantity::Time).map_or(name, |(stem, _)| stem);
     stem == "t" || ["time", "timestamp", "zeit"].iter().any(|n| stem.eq_ignore_ascii_case(n))
 }

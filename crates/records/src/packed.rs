@@ -45,6 +45,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         columns: Vec::new(),
         faults: Vec::new(),
         lines: Vec::new(),
+        mended: Vec::new(),
     };
     for name in names.iter().filter(|n| n.ends_with(".npy")) {
         let mut array = Vec::new();

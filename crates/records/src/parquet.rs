@@ -200,7 +200,7 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
     source.each(
         &wanted,
         |column, row, text| {
-            faults[column].get_or_insert(Fault { line: row + 1, text });
+            Fault { line: row + 1, text }.into_first(&mut faults[column]);
             Ok(())
         },
         |_, batch| {
@@ -210,7 +210,7 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
             Ok(())
         },
     )?;
-    Ok(Table { file: file.to_owned(), headers: source.headers, columns, faults, lines: Vec::new() })
+    Ok(Table { file: file.to_owned(), headers: source.headers, columns, faults, lines: Vec::new(), mended: Vec::new() })
 }
 
 /// Runs the library on a file that may be damaged in any way: an error or a panic of it is an error of the file.

@@ -69,7 +69,11 @@ impl Rows {
         };
         let columns = vec![Vec::new(); headers.len()];
         let faults = vec![None; headers.len()];
-        Ok(Self { path: path.to_owned(), kind, head: Table { file, headers, columns, faults, lines: Vec::new() } })
+        Ok(Self {
+            path: path.to_owned(),
+            kind,
+            head: Table { file, headers, columns, faults, lines: Vec::new(), mended: Vec::new() },
+        })
     }
 
     /// Reads these columns from the first row to the last.

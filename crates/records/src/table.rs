@@ -45,6 +45,23 @@ impl Kind {
         if first.starts_with(b"PK\x03\x04") {
             return Ok(Self::Packed);
         }
+        for (magic, what) in [
+            (&b"\x1f\x8b"[..], "it is compressed (gzip); unpack it first (gunzip)"),
+            (b"\x28\xb5\x2f\xfd", "it is compressed (zstd); unpack it first (unzstd)"),
+            (b"7z\xbc\xaf", "it is compressed (7z); unpack it first"),
+            (
+                b"\x93NUMPY",
+                "a single NumPy array, whose columns have no names; save it as .npz: numpy.savez(\"log.npz\", time=t, T=T, theta1=q)",
+            ),
+            (b"\x89PNG", "it is a picture, not a record; give the log that it was drawn from"),
+            (b"%PDF", "it is a document, not a record; give the log that it was made of"),
+            (b"<html", "it is a web page, not a record; give the log itself"),
+            (b"<!doctype html", "it is a web page, not a record; give the log itself"),
+        ] {
+            if first.get(..magic.len()).is_some_and(|f| f.eq_ignore_ascii_case(magic)) {
+                return Err(TraceError::Format { file: file.to_owned(), what: what.to_owned() });
+            }
+        }
         if first.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1") {
             return Err(TraceError::Format {
                 file: file.to_owned(),
@@ -93,7 +110,22 @@ pub(super) struct Fault {
     pub text: String,
 }
 
+/// What loggers write where there is no value, in small letters.
+const NO_VALUE: [&str; 12] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "---", "missing"];
+
 impl Fault {
+    /// Whether the cell says that there is no value, and not something else than a number.
+    pub fn missing(&self) -> bool {
+        NO_VALUE.contains(&self.text.trim_matches('"').trim().to_lowercase().as_str())
+    }
+
+    /// Takes the place of a column's first fault: where there is none, and of a missing value where this is none.
+    pub fn into_first(self, first: &mut Option<Self>) {
+        if first.as_ref().is_none_or(|f| f.missing() && !self.missing()) {
+            *first = Some(self);
+        }
+    }
+
     /// As an error of a column of a file.
     pub fn named(&self, file: &str, column: &str) -> TraceError {
         TraceError::Cell { file: file.to_owned(), line: self.line, column: column.to_owned(), text: self.text.clone() }
@@ -111,9 +143,64 @@ pub struct Table {
     pub(super) faults: Vec<Option<Fault>>,
     /// (row, line) where the line of a row is not one more than that of the row before.
     pub(super) lines: Vec<(usize, usize)>,
+    /// Of columns whose missing values were bridged: the column, and what is to be said of it.
+    pub(super) mended: Vec<(usize, String)>,
 }
 
+/// Share of a column's cells that may be missing for them to be bridged.
+const MISSING: f64 = 0.01;
+/// Most cells in a row that are bridged.
+const IN_A_ROW: usize = 3;
+
 impl Table {
+    /// Bridges cells without a number by straight lines where they are few and stand alone; of such a column it is said when it is used.
+    fn bridged(mut self) -> Self {
+        let rows = self.rows();
+        for index in 0..self.columns.len() {
+            let Some(fault) = self.faults[index].as_ref().filter(|f| f.missing()) else { continue };
+            let values = &self.columns[index];
+            let (mut count, mut run, mut longest) = (0, 0, 0);
+            for v in values {
+                run = if v.is_finite() { 0 } else { run + 1 };
+                count += usize::from(run > 0);
+                longest = longest.max(run);
+            }
+            let ends = [values.first(), values.last()].into_iter().flatten().all(|v| v.is_finite());
+            if !ends || longest > IN_A_ROW || count as f64 > MISSING * rows as f64 || values.len() < rows {
+                continue;
+            }
+            let word = format!(
+                "{}: column {} has no number in {count} of {rows} rows, the first row {} ({:?}); they were bridged by straight lines",
+                self.file, self.headers[index].name, fault.line, fault.text
+            );
+            let mut last = 0;
+            for k in 1..values.len() {
+                let values = &mut self.columns[index];
+                if !values[k].is_finite() {
+                    continue;
+                }
+                for j in last + 1..k {
+                    let share = (j - last) as f64 / (k - last) as f64;
+                    values[j] = values[last] + share * (values[k] - values[last]);
+                }
+                last = k;
+            }
+            self.faults[index] = None;
+            self.mended.push((index, word));
+        }
+        self
+    }
+
+    /// What was made of a column that had cells without a number.
+    pub(super) fn mended(&self, index: usize) -> Option<&str> {
+        self.mended.iter().find(|(k, _)| *k == index).map(|(_, word)| word.as_str())
+    }
+
+    /// The finite values of a column, for a look at it.
+    pub(super) fn finite(&self, index: usize) -> Vec<f64> {
+        self.columns[index].iter().copied().filter(|v| v.is_finite()).collect()
+    }
+
     /// Reads a file of any form; `-` is standard input.
     ///
     /// # Errors
@@ -141,7 +228,7 @@ impl Table {
         }
         let (kind, open) = Kind::open(path)?;
         match kind {
-            Kind::Parquet => parquet::read(open, &file),
+            Kind::Parquet => parquet::read(open, &file).map(Self::bridged),
             _ => Self::parse(&std::fs::read(path).map_err(failed)?, &file),
         }
     }
@@ -165,6 +252,7 @@ impl Table {
                 what: "a Parquet file where text is expected; give it by its path".to_owned(),
             }),
         }
+        .map(Self::bridged)
     }
 
     /// Number of rows of data.
@@ -185,7 +273,7 @@ impl Table {
     pub fn position(&self, name: &str) -> Option<usize> {
         let at = |name: &str| self.headers.iter().position(|h| h.name == name);
         at(name).or_else(|| {
-            let parsed = header(name);
+            let parsed = written(name);
             parsed.unit.as_ref()?;
             at(&parsed.name)
         })
@@ -234,8 +322,19 @@ impl Table {
     }
 }
 
-/// `theta1 [rad]` into name and unit; `theta1 (rad)` and `theta1/rad` where what is behind is a unit.
+/// Words for a count of an encoder or converter, which is in no unit: its scale is the user's to say.
+const COUNTS: [&str; 12] =
+    ["count", "counts", "cts", "cnt", "inc", "incr", "increments", "pulse", "pulses", "ticks", "lsb", "raw"];
+
+/// The name of a column, and its unit; that of a count is none.
 pub(super) fn header(field: &str) -> Header {
+    let found = written(field);
+    let counts = found.unit.as_ref().is_some_and(|u| COUNTS.contains(&u.to_lowercase().as_str()));
+    if counts { Header { unit: None, ..found } } else { found }
+}
+
+/// `theta1 [rad]` into name and unit; `theta1 (rad)` and `theta1/rad` where what is behind is a unit.
+fn written(field: &str) -> Header {
     let field = field.trim();
     let parted = |name: &str, unit: &str| Header { name: name.trim().to_owned(), unit: Some(unit.trim().to_owned()) };
     let inner =

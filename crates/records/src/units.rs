@@ -22,6 +22,9 @@ const fn unit(symbol: &'static str, quantity: Quantity, factor: f64) -> Unit {
 const DEG: f64 = PI / 180.0;
 /// Standard gravity, m/s2 (CGPM 1901).
 const G: f64 = 9.806_65;
+/// Inch, m, and pound-force, N (international yard and pound agreement, 1959).
+const INCH: f64 = 0.0254;
+const LBF: f64 = 0.453_592_37 * G;
 
 /// Every unit that is understood, SI first in each quantity.
 pub const UNITS: &[Unit] = &[
@@ -38,7 +41,19 @@ pub const UNITS: &[Unit] = &[
     unit("Ncm", Quantity::Torque, 1e-2),
     unit("kN.m", Quantity::Torque, 1e3),
     unit("kNm", Quantity::Torque, 1e3),
+    unit("lbf.in", Quantity::Torque, LBF * INCH),
+    unit("lb.in", Quantity::Torque, LBF * INCH),
+    unit("in.lb", Quantity::Torque, LBF * INCH),
+    unit("lbf.ft", Quantity::Torque, LBF * 12.0 * INCH),
+    unit("lb.ft", Quantity::Torque, LBF * 12.0 * INCH),
+    unit("ft.lb", Quantity::Torque, LBF * 12.0 * INCH),
+    unit("ozf.in", Quantity::Torque, LBF * INCH / 16.0),
+    unit("oz.in", Quantity::Torque, LBF * INCH / 16.0),
+    unit("kgf.cm", Quantity::Torque, G * 1e-2),
+    unit("kgf.m", Quantity::Torque, G),
     unit("N", Quantity::Force, 1.0),
+    unit("daN", Quantity::Force, 10.0),
+    unit("lbf", Quantity::Force, LBF),
     unit("mN", Quantity::Force, 1e-3),
     unit("kN", Quantity::Force, 1e3),
     unit("rad", Quantity::Angle, 1.0),
@@ -53,6 +68,7 @@ pub const UNITS: &[Unit] = &[
     unit("m", Quantity::Length, 1.0),
     unit("cm", Quantity::Length, 1e-2),
     unit("mm", Quantity::Length, 1e-3),
+    unit("inch", Quantity::Length, INCH),
     unit("um", Quantity::Length, 1e-6),
     unit("nm", Quantity::Length, 1e-9),
     unit("rad/s", Quantity::AngularVelocity, 1.0),
@@ -99,7 +115,9 @@ impl Unit {
             }
         }
         let plain = plain.replace("/s/s", "/s2");
-        UNITS.iter().find(|u| u.symbol == plain)
+        let exact = |plain: &str| UNITS.iter().find(|u| u.symbol == plain);
+        // A hyphen is a product, too: oz-in.
+        exact(&plain).or_else(|| exact(&plain.replace('-', ".")).filter(|u| u.quantity == Quantity::Torque))
     }
 
     /// The units of a quantity, for a message.

@@ -5,8 +5,13 @@ use super::load::{Column, scale};
 use super::signal::{Motion, Quantity, Signal};
 use super::table::Table;
 
-/// Counters of limited width go on where they start anew; says so. A counter of 16 or 32 bits is one whose whole numbers jump
-/// by nearly its width; an angle within one turn jumps by nearly that.
+/// Bits of the counters of positions that are known: converters of resolvers have 10, encoders up to 31.
+const BITS: std::ops::RangeInclusive<u32> = 10..=32;
+/// Of other columns: words of a bus.
+const WORDS: [u32; 2] = [16, 32];
+
+/// Counters of limited width go on where they start anew; says so. A counter is one whose whole numbers stay within its width,
+/// from zero on or about zero, and jump by nearly that; an angle within one turn jumps by nearly that.
 pub(super) fn unwrap(
     values: &mut [f64],
     table: &Table,
@@ -16,16 +21,23 @@ pub(super) fn unwrap(
 ) -> Result<Option<String>, TraceError> {
     let (_, factor) = scale(table, column, signal.name(), signal.quantity(motion))?;
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    let whole = |v: &f64| ((v - column.offset) / factor).fract() == 0.0;
+    let raw = |v: f64| (v - column.offset) / factor;
+    let whole = |v: &f64| (raw(*v) - raw(*v).round()).abs() <= 1e-6;
     let position = matches!(signal.quantity(motion), Quantity::Angle | Quantity::Length);
     let turn = signal.quantity(motion) == Quantity::Angle;
-    let mut widths: Vec<(f64, &str)> = Vec::new();
+    let mut widths: Vec<(f64, String)> = Vec::new();
     if values.iter().take(4096).all(whole) {
-        widths.extend([(65_536.0, "a counter of 16 bits"), (4_294_967_296.0, "a counter of 32 bits")]);
-        widths.iter_mut().for_each(|w| w.0 *= factor.abs());
+        let (least, most) = (raw(low).min(raw(high)), raw(low).max(raw(high)));
+        for bits in BITS.filter(|b| position || WORDS.contains(b)) {
+            let width = f64::from(bits).exp2();
+            let within = |from: f64| least > from - 0.5 && most < from + width - 0.5;
+            if within(0.0) || within(-0.5 * width) {
+                widths.push((width * factor.abs(), format!("a counter of {bits} bits")));
+            }
+        }
     }
     if turn {
-        widths.push((std::f64::consts::TAU * column.scale.abs(), "an angle within one turn"));
+        widths.push((std::f64::consts::TAU * column.scale.abs(), "an angle within one turn".to_owned()));
     }
     for (width, name) in widths {
         let jumps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|d| d.abs() > 0.5 * width).collect();
