@@ -251,8 +251,8 @@ struct Seen {
     examination: Examination,
 }
 
-fn seen(mut trace: Trace, stamps: Option<&[f64]>, machine: &Machine, known: bool) -> anyhow::Result<Seen> {
-    // The table's position is its angle, where the lead of the screw is known.
+/// The table's position is its angle, where the lead of the screw is known.
+pub fn table_as_angle(trace: &mut Trace, machine: &Machine) -> anyhow::Result<()> {
     if let (false, Some(x2)) = (trace.has(Signal::Theta2), trace.get(Signal::X2))
         && machine.parameters.rho > 0.0
     {
@@ -260,6 +260,11 @@ fn seen(mut trace: Trace, stamps: Option<&[f64]>, machine: &Machine, known: bool
         trace.set(Signal::Theta2, theta2)?;
         trace.remove(Signal::X2);
     }
+    Ok(())
+}
+
+fn seen(mut trace: Trace, stamps: Option<&[f64]>, machine: &Machine, known: bool) -> anyhow::Result<Seen> {
+    table_as_angle(&mut trace, machine)?;
     let examination = examine(&Input::of(&trace, stamps).against(machine, known));
     Ok(Seen { trace, examination })
 }

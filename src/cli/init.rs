@@ -95,19 +95,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let file = args.log.display().to_string();
     let mut asker = Asker { yes: args.yes };
     let made = make(&table, &args, &mut asker)?;
-    let text = write(&made, &table, None, &file);
-    let machine =
+    let text = write(&made, &table, &Read::default(), &file);
+    let mut machine =
         Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
-    let loaded = from_table(&table, &args.part.of(machine.signals.clone()))?;
+    let mut loaded = from_table(&table, &args.part.of(machine.signals.clone()))?;
+    let rho = lead(&loaded.trace);
+    if let Some(rho) = rho {
+        machine.parameters.rho = rho;
+    }
+    let shown = loaded.trace.clone();
+    super::examined::table_as_angle(&mut loaded.trace, &machine)?;
     // A first idea of the parameters, from the log itself: it says whether units and signs are right.
     let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
     let rough = rough(&loaded.trace, &machine, &examination);
-    let text = write(&made, &table, rough, &file);
+    let text = write(&made, &table, &Read { rough, rho, refused: examination.refuses() }, &file);
     let machine =
         Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
     let seen = Inspected {
         examination: &examination,
-        trace: &loaded.trace,
+        trace: &shown,
         file: &file,
         motion: machine.signals.motion,
         warnings: &loaded.warnings,
@@ -116,12 +122,26 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write_text(&page, html::page(&report(&seen)).as_bytes())?;
 
     let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Verdict(verdict(&examination))];
+    if let (Some(dt), None) = (made.dt, args.dt) {
+        let word = format!(
+            "No column is a time: {dt} s from row to row is assumed. All that is read from the log depends on it; give it with --dt."
+        );
+        blocks.push(Block::Warning(word));
+    }
     blocks.extend(loaded.warnings.iter().cloned().map(Block::Warning));
     blocks.extend(findings(&examination).into_iter().filter(|b| !matches!(b, Block::Table(_))));
     out!("{}", terminal::blocks(&blocks, layout(WIDTH)))?;
     out_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
     out_line!("{}: the log, drawn", page.display())?;
     let what = format!("{} --axis {}", quoted(&file), quoted(&axis.display().to_string()));
+    if examination.refuses() {
+        out_line!(
+            "next: mend what is told above, in the log or in [signals] of {}; until then no verdict is given. Then:",
+            axis.display()
+        )?;
+    } else if rough.is_none() {
+        out_line!("next: put the inertia into [parameters], which the log does not tell. Then:")?;
+    }
     out_line!("next: eixo identify {what}")?;
     out_line!("or:   eixo diagnose {what}")?;
     Ok(ExitCode::SUCCESS)
@@ -211,17 +231,19 @@ fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
     let has = |s: Signal| guesses.iter().any(|g| g.role == Role::Signal(s));
     anyhow::ensure!(
         has(Signal::T),
-        "{}: no column looks like a torque, a force or a current; the columns are: {}. Name it when asked (without --yes), or \
-         write T = \"...\" into [signals] of an axis file",
+        "{}: no column looks like a torque, a force or a current; the columns are: {}. Name it when asked (without --yes), with \
+         --column T=..., or write T = \"...\" into [signals] of an axis file{}",
         table.file,
-        table.names()
+        table.names(),
+        unreadable(table)
     );
     anyhow::ensure!(
         has(Signal::Theta1) || has(Signal::Theta2) || has(Signal::X2),
-        "{}: no column looks like a position; the columns are: {}. Name it when asked (without --yes), or write theta1 = \"...\" \
-         into [signals] of an axis file",
+        "{}: no column looks like a position; the columns are: {}. Name it when asked (without --yes), with --column theta1=..., or \
+         write theta1 = \"...\" into [signals] of an axis file{}",
         table.file,
-        table.names()
+        table.names(),
+        unreadable(table)
     );
     let quantity =
         |s: Signal| guesses.iter().find(|g| g.role == Role::Signal(s)).and_then(|g| g.unit).map(|u| u.quantity);
@@ -248,6 +270,14 @@ fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
         (_, None) => true,
     };
     guesses.retain(fits);
+    if args.dt.is_none() && !guesses.iter().any(|g| g.role == Role::Time) {
+        // A column that is called as times are and does not rise is no reason to take any interval: what reads it names the row.
+        guesses.extend(crate::trace::guess::time_by_name(table));
+    }
+    if let Some(time) = guesses.iter_mut().find(|g| g.role == Role::Time && g.unit.is_none()) {
+        time.unit = unit_of_time(table, &time.column, asker);
+        time.score = if time.unit.is_some() { 0 } else { time.score };
+    }
     let mut dt = None;
     if !guesses.iter().any(|g| g.role == Role::Time) {
         let answer = args.dt.map_or_else(
@@ -269,6 +299,31 @@ fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
             given.with_context(|| format!("the torque constant is {answer:?}: give a number, as in 0.52"))?;
     }
     Ok(Made { guesses, motion, dt, torque_scale })
+}
+
+/// The unit of a column of time that names none, where its steps are too long for a drive's log in seconds.
+fn unit_of_time(table: &Table, column: &str, asker: &mut Asker) -> Option<&'static Unit> {
+    let values = table.column(table.position(column)?).ok()?;
+    let first = *values.first()?;
+    let step = (values.last()? - first) / (values.len().max(2) - 1) as f64;
+    // Stamps of a calendar have units of their own.
+    let offered = match step {
+        _ if first > 1e8 => return None,
+        s if (0.1..50.0).contains(&s) => "ms",
+        s if (50.0..5e4).contains(&s) => "us",
+        s if (5e4..1e9).contains(&s) => "ns",
+        _ => return None,
+    };
+    let question = format!(
+        "The steps of column {column} are {step} and no unit is given: no drive is logged that slowly in s. Which unit is it?"
+    );
+    Unit::parse(&asker.ask(&question, offered)).filter(|u| u.quantity == Quantity::Time)
+}
+
+/// Of columns whose cells are mostly no numbers: the first of them, in words.
+fn unreadable(table: &Table) -> String {
+    let mut errors = (0..table.headers.len()).filter_map(|k| table.column(k).err());
+    errors.next().map_or_else(String::new, |e| format!(". Columns of text are left out: {e}"))
 }
 
 /// `NAME=VALUE` as two words.
@@ -335,7 +390,9 @@ fn given(table: &Table, args: &Args, guesses: &mut Vec<Guess>) -> anyhow::Result
 fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<[f64; 4]> {
     let piece = examination.longest().map(|p| trace.slice(p));
     let found = identify(piece.as_ref().unwrap_or(trace), machine, &Request::default(), "", &mut |_| ()).ok();
-    let best = found.as_ref().and_then(|f| Some(&f.methods[f.recommended.as_ref()?.method]));
+    // Estimates that are not earned are those of what the model lacks: a weight, friction.
+    let earned = found.as_ref().filter(|f| f.identifiability.identified);
+    let best = earned.and_then(|f| Some(&f.methods[f.recommended.as_ref()?.method]));
     let value = |name: &str| {
         let e = best?.parameters.iter().find(|e| e.name == name)?;
         (e.value > 0.0 && e.value.is_finite() && e.std.is_none_or(|s| s < 0.5 * e.value)).then_some(e.value)
@@ -354,6 +411,22 @@ fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<
     Some([half, half, 0.02 * (k * half).sqrt(), k])
 }
 
+/// The lead of the screw over 2*pi, m/rad, where the table's position follows the motor's angle: the ratio of their ways.
+fn lead(trace: &Trace) -> Option<f64> {
+    let (theta, x) = (trace.get(Signal::Theta1)?, trace.get(Signal::X2)?);
+    let apart = (theta.len() / 64).max(1);
+    let (mut tt, mut tx, mut xx) = (0.0, 0.0, 0.0);
+    for k in apart..theta.len() {
+        let (a, b) = (theta[k] - theta[k - apart], x[k] - x[k - apart]);
+        tt += a * a;
+        tx += a * b;
+        xx += b * b;
+    }
+    // Of two that do not go together nothing is read.
+    let rho = tx / tt;
+    (rho > 0.0 && rho.is_finite() && tx * tx > 0.5 * tt * xx).then_some(rho)
+}
+
 /// Number with four digits, as a person would write it into the file.
 fn four(value: f64) -> String {
     let text = format!("{value:.3e}");
@@ -361,8 +434,20 @@ fn four(value: f64) -> String {
         .map_or(text, |v| if (1e-3..1e4).contains(&v.abs()) || v == 0.0 { v.to_string() } else { format!("{v:e}") })
 }
 
+/// What the numbers of the log say of the axis.
+#[derive(Default)]
+struct Read {
+    /// Inertias, damping and stiffness, roughly.
+    rough: Option<[f64; 4]>,
+    /// The lead of the screw over 2*pi, m/rad.
+    rho: Option<f64>,
+    /// The log cannot be believed as it is.
+    refused: bool,
+}
+
 /// The axis file, with comments.
-fn write(made: &Made, table: &Table, rough: Option<[f64; 4]>, file: &str) -> String {
+fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
+    let Read { rough, rho, refused } = *read;
     let mut out = String::new();
     let text = |s: &str| toml::Value::String(s.to_owned()).to_string();
     let plain = |s: &str| s.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
@@ -370,10 +455,22 @@ fn write(made: &Made, table: &Table, rough: Option<[f64; 4]>, file: &str) -> Str
     let linear = made.motion == Motion::Linear;
     let [inertia, damping, stiffness, torque] =
         if linear { ["kg", "N.s/m", "N/m", "N"] } else { ["kg.m2", "N.m.s/rad", "N.m/rad", "N.m"] };
+    // A current without its torque constant, or a number of the drive, has units of its own.
+    let own =
+        made.of(Signal::T).filter(|g| made.torque_scale == 1.0 && g.unit.is_none_or(|u| u.quantity == Quantity::Drive));
+    let own = own
+        .filter(|g| g.column != Signal::T.name())
+        .map(|g| g.unit.map_or_else(|| plain(&g.column), |u| u.symbol.to_owned()));
+    let angle = if linear { "m" } else { "rad" };
+    let of_own =
+        |si: &str, times: &str| own.as_ref().map_or_else(|| si.to_owned(), |own| format!("{own}{times}/{angle}"));
+    let (inertia, damping, stiffness) = (of_own(inertia, ".s2"), of_own(damping, ".s"), of_own(stiffness, ""));
     let _ = writeln!(out, "# Made by `eixo init` from {}.", plain(file));
     let _ = writeln!(out, "name = {}", text(&name));
     let [i1, i2, b, k] = rough.unwrap_or([1.0, 1.0, 1.0, 1000.0]);
-    let origin = if rough.is_some() {
+    let origin = if refused {
+        "# NOT TO BE BELIEVED: the log has a defect that `eixo inspect` names. Put in the values of the data sheet."
+    } else if rough.is_some() {
         "# Rough values, read from the log itself: put in those of the data sheet where you have them."
     } else {
         "# Placeholders: the log did not say. Put in the values of the data sheet, or those that `eixo identify` finds."
@@ -391,7 +488,14 @@ fn write(made: &Made, table: &Table, rough: Option<[f64; 4]>, file: &str) -> Str
         let _ = writeln!(out, "K = {}     # {stiffness}, stiffness of the coupling", four(k));
     }
     if made.of(Signal::X2).is_some() {
-        let _ = writeln!(out, "rho = 1.0    # m/rad, the lead of the screw over 2*pi: x2 = rho*theta2. PUT IT IN");
+        let _ = match rho {
+            Some(rho) => writeln!(
+                out,
+                "rho = {}    # m/rad, the lead of the screw over 2*pi, as the log has it: x2 = rho*theta2",
+                four(rho)
+            ),
+            None => writeln!(out, "rho = 1.0    # m/rad, the lead of the screw over 2*pi: x2 = rho*theta2. PUT IT IN"),
+        };
     }
     let _ = writeln!(out, "\n[units]\nmotion = \"{}\"", if linear { "linear" } else { "rotary" });
     let _ = writeln!(out, "\n[signals]                          # column of the log for each signal; \"\" for none");

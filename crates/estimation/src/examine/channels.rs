@@ -27,7 +27,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Vec<Ran
             continue;
         }
         let position = channel.name.starts_with("theta");
-        if position {
+        if position || channel.name == "T" {
             bad.extend(jumps(input, channel, findings));
         }
         let stuck = if channel.name == "T" { stuck_torque(input, channel) } else { stuck_motion(input, channel) };
@@ -210,9 +210,9 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
         }
         // Beside it nothing of the kind: neither a fast motion nor the way back.
         let near = [k - 2, k - 1, k + 1, k + 2].map(|i| d(i).abs()).into_iter().fold(0.0, f64::max);
-        if near < 0.4 * size.abs() {
+        if near < 0.4 * size.abs() && channel.name != "T" {
             isolated.push((k + 1, size));
-        } else if (d(k + 1) + size).abs() < 0.4 * size.abs() {
+        } else if near >= 0.4 * size.abs() && (d(k + 1) + size).abs() < 0.4 * size.abs() {
             spikes.push(k + 1..k + 2);
         }
     }
@@ -224,7 +224,11 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
                 Severity::Warn,
                 channel.name,
                 format!("{} has {} samples far off their neighbours.", channel.name, spikes.len()),
-                "Lost bits of a bus or a disturbed cable; each reads as a blow to the axis.",
+                if channel.name == "T" {
+                    "Lost bits of a bus or a disturbed cable; the axis did not feel them, and a model that does is off."
+                } else {
+                    "Lost bits of a bus or a disturbed cable; each reads as a blow to the axis."
+                },
                 "Screen the cable; a fit weighs them like any sample, so use a part without them where there are many.",
             )
             .at(input, spikes),

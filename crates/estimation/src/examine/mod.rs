@@ -13,6 +13,7 @@
 //! A finding of severity [`Severity::Refuse`] says that a verdict from this record would be about its defect.
 
 mod channels;
+mod copies;
 mod encoders;
 mod finding;
 mod least;
@@ -176,6 +177,65 @@ impl Examination {
     }
 }
 
+/// Sampling intervals between which drives are logged, s: a converter's own rate, and one that still shows an acceleration.
+const FASTEST: f64 = 1e-8;
+const SLOWEST: f64 = 10.0;
+/// Speeds beyond what machines turn or move at: three million turns a minute, ten times the fastest turbine; a rifle's bullet.
+const MOST_TURNED: f64 = 3e5;
+const MOST_MOVED: f64 = 1e3;
+/// Torques and forces beyond those of the largest drives: a wind turbine's gear sees 1e7 N.m, a forging press 1e9 N.
+const MOST_TORQUE: f64 = 1e8;
+const MOST_FORCE: f64 = 1e10;
+
+/// Torques and speeds that no machine has: the column is in another unit, or counts.
+fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
+    let linear = input.motion == Motion::Linear;
+    let unit = |rotary| Motion::unit(input.motion, rotary);
+    let say = |signal: &'static str, seen: String, remedy: &str| {
+        Finding::new(
+            "magnitude",
+            Severity::Refuse,
+            signal,
+            seen,
+            "The column counts in another unit than is assumed: every parameter would be off by the factor between the two.",
+            remedy,
+        )
+    };
+    for channel in input.channels() {
+        if channel.name == "T" {
+            let typical = robust::quantile(channel.values.iter().copied(), 0.9);
+            if typical > if linear { MOST_FORCE } else { MOST_TORQUE } {
+                let seen = format!("T is about {} {}: no drive gives that.", finding::told(typical), unit("N.m"));
+                findings.push(say(
+                    "T",
+                    seen,
+                    "Give its unit in the header, or the drive's own factor as scale of T in [signals].",
+                ));
+            }
+            continue;
+        }
+        let position = channel.name.starts_with("theta");
+        // Over several samples: noise and steps of an encoder that is sampled fast are no speed.
+        let apart = if position { (channel.values.len() / 64).clamp(1, 64) } else { 0 };
+        let span = apart as f64 * input.dt;
+        let speed = if position {
+            robust::quantile(channel.values.windows(apart + 1).map(|w| (w[apart] - w[0]) / span), 0.9)
+        } else {
+            robust::quantile(channel.values.iter().copied(), 0.9)
+        };
+        if speed > if linear { MOST_MOVED } else { MOST_TURNED } {
+            let seen =
+                format!("{} moves at about {} {}: no axis does.", channel.name, finding::told(speed), unit("rad/s"));
+            let remedy = if linear {
+                "Give its unit in the header; of an encoder's counts the length of one (m) as scale in [signals]."
+            } else {
+                "Give its unit in the header; of an encoder's counts the angle of one (2*pi over the counts of a turn) as scale in [signals]."
+            };
+            findings.push(say(channel.name, seen, remedy));
+        }
+    }
+}
+
 /// Largest size that is taken for a measurement: its fourth power is still finite.
 const LARGEST: f64 = 1e60;
 
@@ -192,6 +252,8 @@ pub fn examine(input: &Input<'_>) -> Examination {
     }
     let input = &cut(input, n);
     let bad = channels::examine(input, &mut findings);
+    copies::examine(input, &mut findings);
+    sizes(input, &mut findings);
     let usable = usable::examine(input, &bad, &mut findings);
     // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.
     let piece = usable.iter().max_by_key(|r| r.len()).cloned().unwrap_or(0..n);
@@ -216,7 +278,9 @@ pub fn examine(input: &Input<'_>) -> Examination {
         pairs::speeds(&part, &mut findings);
         band = momentum::examine(&part, &mut inertia, &mut findings);
         // A guess is asked for where no nominal value is known.
-        inertia = inertia.or_else(|| if part.nominal.is_none() { rigid::inertia(&part) } else { None });
+        if part.nominal.is_none() {
+            inertia = rigid::inertia(&part).or(inertia);
+        }
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }
@@ -225,7 +289,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
 /// Numbers that can be computed with; says so where they cannot.
 fn numbers(input: &Input<'_>, findings: &mut Vec<Finding>) -> bool {
     let mut sound = true;
-    if !(input.dt > 1e-9 && input.dt < 1e6) {
+    if !(input.dt > FASTEST && input.dt < SLOWEST) {
         sound = false;
         findings.push(Finding::new(
             "interval",

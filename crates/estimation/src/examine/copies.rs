@@ -1,0 +1,112 @@
+//! Columns that are no measurement of their own: another column of the record, scaled, shifted or some samples later.
+//!
+//! ```text
+//! y(k) = a*x(k - l) + b      but for rounding
+//! ```
+//!
+//! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: noise, steps and the twist of the coupling part them.
+
+use super::finding::{Finding, Severity, told};
+use super::{Channel, Input};
+
+/// Share of a column's deviation up to which what another does not explain of it is rounding.
+const ROUNDING: f64 = 1e-6;
+/// Samples that a copy may be late or early: a cycle or two of a slower task.
+const LATE: usize = 10;
+/// Samples that are compared first, all over the record: nearly every pair differs in those.
+const FIRST: usize = 256;
+
+/// How `y` is made of `x`: the factor, where it is a copy.
+fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
+    let some = (x.len() / FIRST).max(1);
+    slope(x, y, some, 100.0 * ROUNDING)?;
+    slope(x, y, 1, ROUNDING)
+}
+
+/// The slope of `y` over `x`, where it is all of `y` at every `stride`-th sample but for a share of its deviation.
+fn slope(x: &[f64], y: &[f64], stride: usize, rounding: f64) -> Option<f64> {
+    let pairs = || x.iter().zip(y).step_by(stride);
+    let n = pairs().count() as f64;
+    let (mx, my) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs() {
+        let (x, y) = (x - mx, y - my);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    // What is left of a constant beside its mean is rounding.
+    let moves = |squares: f64, mean: f64| squares > n * (1e-12 * mean).powi(2);
+    if !(moves(xx, mx) && moves(yy, my)) {
+        return None;
+    }
+    let slope = xy / xx;
+    let left: f64 = pairs().map(|(x, y)| (y - my - slope * (x - mx)).powi(2)).sum();
+    (slope.is_finite() && left <= rounding * rounding * yy).then_some(slope)
+}
+
+/// The speed of a position, by central differences.
+fn speed(x: &[f64], dt: f64) -> Vec<f64> {
+    x.windows(3).map(|w| (w[2] - w[0]) / (2.0 * dt)).collect()
+}
+
+/// Looks for a torque that is a copy of a motion, and a table's encoder that is one of the motor's.
+pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
+    let channel = |name: &str| input.channels().find(|c| c.name == name);
+    let late = |x: Channel<'_>, y: Channel<'_>| {
+        let n = x.values.len();
+        (0..=LATE.min(n / 8)).find_map(|lag| {
+            let (head, tail) = (..n - lag, lag..);
+            let behind = copy(&x.values[head], &y.values[tail.clone()]).map(|a| (a, lag as i64));
+            behind.or_else(|| copy(&x.values[tail], &y.values[head]).map(|a| (a, -(lag as i64))))
+        })
+    };
+    let say = |signal: &'static str, other: &str, factor: f64, lag: i64, means: &str, remedy: &str| {
+        let by = if (factor - 1.0).abs() < 1e-9 { String::new() } else { format!(" times {}", told(factor)) };
+        let when = match lag {
+            0 => String::new(),
+            1.. => format!(", {lag} samples later"),
+            _ => format!(", {} samples earlier", -lag),
+        };
+        Finding::new(
+            "copy",
+            Severity::Refuse,
+            signal,
+            format!("{signal} is a copy of {other}{by}{when}: the two agree to a millionth at every sample."),
+            means,
+            remedy,
+        )
+    };
+    if let Some(t) = channel("T") {
+        let means = "It is no torque that was measured or commanded: nothing of the machine can be read from it.";
+        let remedy = "Map the column of the torque or current in [signals]; a drive whose command is its position alone needs a reference \
+                      that moves.";
+        for other in ["theta1", "omega1", "theta2", "omega2"].into_iter().filter_map(channel) {
+            if let Some((factor, lag)) = late(other, t) {
+                findings.push(say("T", other.name, factor, lag, means, remedy));
+                return;
+            }
+            if other.name.starts_with("theta") && t.values.len() > 2 {
+                let rate = speed(other.values, input.dt);
+                if let Some(factor) = copy(&rate, &t.values[1..t.values.len() - 1]) {
+                    findings.push(say("T", &format!("the speed of {}", other.name), factor, 0, means, remedy));
+                    return;
+                }
+            }
+        }
+    }
+    for (one, two, signal) in [("theta1", "theta2", "theta2"), ("omega1", "omega2", "omega2")] {
+        let (Some(x), Some(y)) = (channel(one), channel(two)) else { continue };
+        // One turned round, or in another unit, is told as that where the table has a motion of its own; here it has none.
+        if let Some((factor, lag)) = late(x, y) {
+            findings.push(say(
+                signal,
+                one,
+                factor,
+                lag,
+                "One sensor was logged twice: the coupling between the two does not show.",
+                "Map the column of the table's own encoder in [signals], or leave it out and describe the axis as structure = \"rigid\".",
+            ));
+        }
+    }
+}
