@@ -50,6 +50,7 @@ fn prepare(folder: &Path) {
     write("bare.csv", &rows(40, plain));
     write("cut.csv", &(head.to_owned() + &rows(40, plain) + "0.04,1\n"));
     write("text.csv", &(head.to_owned() + &rows(40, |k| if k == 9 { "0.009,on,1,1".to_owned() } else { plain(k) })));
+    write("words.csv", &("time,phase\n".to_owned() + &rows(40, |k| format!("{},on", k as f64 * 1e-3))));
     write("gap.csv", &(head.to_owned() + &rows(40, |k| plain(if k < 20 { k } else { k + 5 }))));
     write("back.csv", &(head.to_owned() + &rows(40, |k| plain(if k == 30 { 3 } else { k }))));
     write("unit.csv", &("time,T,theta1 [grads],theta2\n".to_owned() + &rows(40, plain)));
@@ -64,7 +65,7 @@ fn prepare(folder: &Path) {
     std::fs::create_dir(folder.join("logs")).unwrap();
 }
 
-const MISTAKES: [Mistake; 30] = [
+const MISTAKES: [Mistake; 31] = [
     Mistake {
         what: "a file that is not there",
         typed: &["identify", "lgo.csv"],
@@ -206,9 +207,15 @@ const MISTAKES: [Mistake; 30] = [
     },
     Mistake {
         what: "a log of nothing that init knows",
+        typed: &["init", "words.csv", "--yes", "-o", "x.toml"],
+        code: 2,
+        says: &["words.csv", "[signals]", "column phase"],
+    },
+    Mistake {
+        what: "a log with a word among its numbers, given to init",
         typed: &["init", "text.csv", "--yes", "-o", "x.toml"],
         code: 2,
-        says: &["text.csv", "[signals]"],
+        says: &["text.csv", "row 11, column T", "\"on\"", "--from"],
     },
 ];
 

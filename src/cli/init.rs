@@ -107,7 +107,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     super::examined::table_as_angle(&mut loaded.trace, &machine)?;
     // A first idea of the parameters, from the log itself: it says whether units and signs are right.
     let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
-    let rough = rough(&loaded.trace, &machine, &examination);
+    // Of a log that cannot be believed no number is written.
+    let rough = if examination.refuses() { None } else { rough(&loaded.trace, &machine, &examination) };
     let text = write(&made, &table, &Read { rough, rho, refused: examination.refuses() }, &file);
     let machine =
         Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
@@ -136,11 +137,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let what = format!("{} --axis {}", quoted(&file), quoted(&axis.display().to_string()));
     if examination.refuses() {
         out_line!(
-            "next: mend what is told above, in the log or in [signals] of {}; until then no verdict is given. Then:",
+            "first: mend what is told above, in the log or in [signals] of {}; until then no verdict is given",
             axis.display()
         )?;
     } else if rough.is_none() {
-        out_line!("next: put the inertia into [parameters], which the log does not tell. Then:")?;
+        out_line!("first: put the inertia into [parameters], which the log does not tell")?;
     }
     out_line!("next: eixo identify {what}")?;
     out_line!("or:   eixo diagnose {what}")?;
@@ -469,7 +470,7 @@ fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
     let _ = writeln!(out, "name = {}", text(&name));
     let [i1, i2, b, k] = rough.unwrap_or([1.0, 1.0, 1.0, 1000.0]);
     let origin = if refused {
-        "# NOT TO BE BELIEVED: the log has a defect that `eixo inspect` names. Put in the values of the data sheet."
+        "# Placeholders: the log has a defect that `eixo inspect` names. Put in the values of the data sheet."
     } else if rough.is_some() {
         "# Rough values, read from the log itself: put in those of the data sheet where you have them."
     } else {

@@ -514,10 +514,24 @@ mod tests {
     fn a_bad_cell_is_an_error_only_where_its_column_is_used_and_names_its_line() {
         let table = parse("time,T,note\n0,1,start\n\n# pause\n1,nan,go\n2,x,end\n").unwrap();
         assert_eq!(table.column(0).unwrap(), [0.0, 1.0, 2.0]);
+        // A cell that is no number is worse than one without a value, which may be bridged.
         let error = table.column(1).unwrap_err().to_string();
-        assert!(error.contains("row 5, column T") && error.contains("nan"), "{error}");
+        assert!(error.contains("row 6, column T") && error.contains("\"x\""), "{error}");
         assert!(table.column(2).unwrap_err().to_string().contains("row 2, column note"));
         assert_eq!([table.line(0), table.line(1), table.line(2)], [2, 5, 6]);
+    }
+
+    #[test]
+    fn a_decimal_comma_is_told_from_the_points_of_dates_and_from_thousands() {
+        for (text, expected) in [
+            ("time;T\n01.03.2026 12:00:00,5;1,5\n01.03.2026 12:00:01,5;2,5\n", [1.5, 2.5]),
+            ("time;T\n0;1.250,5\n1;2,5\n", [1250.5, 2.5]),
+            ("time,T\n0,\"1,5\"\n1,\"2,5\"\n", [1.5, 2.5]),
+        ] {
+            assert_eq!(parse(text).unwrap().column(1).unwrap(), expected, "{text:?}");
+        }
+        // 1,250 in quotes may be either: it is refused, not guessed.
+        assert!(parse("time,T\n0,\"1,250\"\n1,\"2,500\"\n").unwrap().column(1).is_err());
     }
 
     #[test]

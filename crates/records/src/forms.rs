@@ -374,4 +374,27 @@ mod tests {
             assert_eq!(table(&bytes).column(1).unwrap(), [1.5, -2.5]);
         }
     }
+
+    #[test]
+    fn text_without_a_mark_in_other_letters_or_line_ends_is_read() {
+        let text = "time [s];T [N.m];temp [\u{b0}C]\n0;1,5;20\n0,1;-2,5;20\n";
+        let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let latin: Vec<u8> = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+        let old = text.replace('\n', "\r").into_bytes();
+        for bytes in [wide, latin, old] {
+            let table = table(&bytes);
+            assert_eq!(table.column(1).unwrap(), [1.5, -2.5]);
+            assert_eq!(table.headers[2].unit.as_deref(), Some("\u{b0}C"));
+        }
+    }
+
+    #[test]
+    fn json_of_nested_objects_and_rows_beside_other_things_is_a_table() {
+        let text = br#"{"logger": "x", "rows": [
+            {"t": "2026-03-01T12:00:00Z", "axis": {"T": 1.5, "q": 0.1}}, {"t": "2026-03-01T12:00:01Z", "axis": {"T": -2.5, "q": 0.2}}]}"#;
+        let table = table(text);
+        assert_eq!(table.names(), "t, axis.T, axis.q");
+        assert_eq!(table.column(1).unwrap(), [1.5, -2.5]);
+        assert_eq!(table.column(0).unwrap()[1] - table.column(0).unwrap()[0], 1.0);
+    }
 }

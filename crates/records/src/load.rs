@@ -474,4 +474,41 @@ mod tests {
             assert_eq!(loaded.trace.get(Signal::T).unwrap()[k], k as f64);
         }
     }
+
+    #[test]
+    fn few_missing_values_are_bridged_with_a_word_and_many_or_those_at_an_end_are_refused() {
+        let table = |missing: &[usize]| {
+            let mut text = String::from("time [s],T [N.m]");
+            for k in 0..200 {
+                let cell = if missing.contains(&k) { "NaN".to_owned() } else { format!("{}", 2 * k) };
+                text.push_str(&format!("\n{k},{cell}"));
+            }
+            Table::parse(text.as_bytes(), "log.csv").unwrap()
+        };
+        let loaded = from_table(&table(&[40, 41]), &Mapping::default()).unwrap();
+        assert_eq!(loaded.trace.get(Signal::T).unwrap()[39..43], [78.0, 80.0, 82.0, 84.0]);
+        let said = loaded.warnings.join("\n");
+        assert!(said.contains("column T has no number in 2 of 200 rows, the first row 42"), "{said}");
+        for missing in [&[0][..], &[199], &[40, 80, 120], &[40, 41, 42, 43]] {
+            let error = from_table(&table(missing), &Mapping::default()).unwrap_err().to_string();
+            assert!(error.contains(&format!("row {}, column T", missing[0] + 2)), "{missing:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn counters_and_clocks_that_start_anew_go_on() {
+        // An encoder of 12 bits and a clock of 16 bits of microseconds, both across their ends.
+        let mut text = String::from("time [us],theta1");
+        for k in 0..200 {
+            text.push_str(&format!("\n{},{}", (65_000 + 100 * k) % 65_536, (4000 + 50 * k) % 4096));
+        }
+        let table = Table::parse(text.as_bytes(), "log.csv").unwrap();
+        let loaded = from_table(&table, &Mapping::default()).unwrap();
+        assert!((loaded.trace.dt() - 1e-4).abs() < 1e-12);
+        let theta = loaded.trace.get(Signal::Theta1).unwrap();
+        assert!(theta.windows(2).all(|w| w[1] - w[0] == 50.0), "{theta:?}");
+        let said = loaded.warnings.join("\n");
+        assert!(said.contains("time starts anew 1 times (a counter of 16 bits)"), "{said}");
+        assert!(said.contains("theta1 starts anew 3 times (a counter of 12 bits)"), "{said}");
+    }
 }

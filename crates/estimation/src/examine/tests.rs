@@ -343,6 +343,26 @@ fn broken() -> Vec<(&'static str, Columns, &'static [&'static str])> {
     add("torque late", &mut |c| c.v[0].rotate_right(12), &["misaligned"]);
     add("1e308", &mut |c| c.v[1][17] = 1e308, &["magnitude"]);
     add("dt of 1e300", &mut |c| c.dt = 1e300, &["interval"]);
+    add(
+        "the motor's encoder twice, the second time a cycle later and in another unit",
+        &mut |c| {
+            c.v[3] = c.v[1].iter().map(|v| 0.5 * v - 1.0).collect();
+            c.v[3].rotate_right(2);
+            (0..2).for_each(|k| c.v[3][k] = c.v[3][2]);
+        },
+        &["copy"],
+    );
+    add("the motor's angle as torque", &mut |c| c.v[0] = c.v[1].iter().map(|v| -3.0 * v).collect(), &["copy"]);
+    add(
+        "the motor's speed by differences as torque",
+        &mut |c| {
+            let x = c.v[1].clone();
+            (1..n - 1).for_each(|k| c.v[0][k] = x[k + 1] - x[k - 1]);
+            (c.v[0][0], c.v[0][n - 1]) = (0.0, 0.0);
+        },
+        &["copy"],
+    );
+    add("counts as angle", &mut |c| c.v[1].iter_mut().for_each(|v| *v = (*v * 1e9).round()), &["magnitude"]);
     cases
 }
 
