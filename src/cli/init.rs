@@ -260,6 +260,16 @@ fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
             }
         }
     }
+    // The only position is that of a rigid axis, whose one encoder is called theta1 whatever side it sits on.
+    if !guesses.iter().any(|g| matches!(g.role, Role::Signal(Signal::Theta1 | Signal::Omega1 | Signal::X2))) {
+        for g in &mut guesses {
+            g.role = match g.role {
+                Role::Signal(Signal::Theta2) => Role::Signal(Signal::Theta1),
+                Role::Signal(Signal::Omega2) => Role::Signal(Signal::Omega1),
+                other => other,
+            };
+        }
+    }
     // A column in a unit that its signal cannot have is none of it.
     let fits = |g: &Guess| match (g.role, g.unit) {
         (Role::Signal(s), Some(u)) => {

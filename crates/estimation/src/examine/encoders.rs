@@ -6,7 +6,7 @@ use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
 use super::nominal::explains_the_table;
-use super::pairs::factor;
+use super::pairs::{NEAR, factor_within};
 use super::rigid::{Slow, rigid_up_to};
 use super::spectra::Spectra;
 use super::{Input, Structure};
@@ -90,13 +90,17 @@ pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, 
     (ratio, miscounted(input, ratio, turned))
 }
 
+/// The same for a table that moves less than the motor, in the logarithm of the ratio: friction that holds it on a soft coupling leaves it any
+/// share of the motor's way, a unit just one.
+const HELD: f64 = 0.02;
+
 /// That the table moves so many times as far as the motor because one of them is in another unit.
 fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
     let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
     let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
     let words = lead
         .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
-        .or_else(|| factor(ratio).map(str::to_owned))
+        .or_else(|| factor_within(ratio, if ratio.abs() < 1.0 { HELD } else { NEAR }).map(str::to_owned))
         .filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25)?;
     Some(Finding::new(
         "units",

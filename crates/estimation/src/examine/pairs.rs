@@ -16,12 +16,17 @@ pub(super) const FACTORS: [(f64, &str); 7] = [
     (1e6, "1e6, milliseconds for seconds (squared), or millionths"),
 ];
 /// A ratio this near to a factor is that factor.
-const NEAR: f64 = 0.12;
+pub(super) const NEAR: f64 = 0.12;
 
 /// The factor that a ratio, or its inverse, is near to.
 pub(super) fn factor(ratio: f64) -> Option<&'static str> {
+    factor_within(ratio, NEAR)
+}
+
+/// The factor that a ratio, or its inverse, is as near to as told, in their logarithms.
+pub(super) fn factor_within(ratio: f64, near: f64) -> Option<&'static str> {
     let size = ratio.abs().ln().abs();
-    FACTORS.iter().find(|(f, _)| (size - f.ln()).abs() < NEAR).map(|(_, words)| *words)
+    FACTORS.iter().find(|(f, _)| (size - f.ln()).abs() < near).map(|(_, words)| *words)
 }
 
 /// How an angle follows a speed: `way = gain*integral`, and the square of their correlation.
