@@ -154,7 +154,7 @@ impl Cause {
     #[must_use]
     pub fn alone(effect: Effect, parameter: usize, value: f64, std: f64, motion: Motion) -> Self {
         let info = effect.info();
-        let unit = motion.unit(info.parameters[parameter].unit);
+        let unit = info.parameters[parameter].unit_on(motion);
         let estimate = Estimate { value, std: Some(std).filter(|s| s.is_finite()), unit };
         Self {
             effect,

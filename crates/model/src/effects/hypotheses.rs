@@ -2,8 +2,16 @@
 
 use super::Effect;
 use super::family::Family;
-use super::info::Place;
+use super::info::{ParameterInfo, Place, Start};
 use crate::axis::{Motion, Structure};
+
+impl ParameterInfo {
+    /// Its unit on an axis of that motion; a phase is an angle on every one.
+    #[must_use]
+    pub fn unit_on(&self, motion: Motion) -> &'static str {
+        if matches!(self.start, Start::Phase) { self.unit } else { motion.unit(self.unit) }
+    }
+}
 
 impl Effect {
     /// Whether the effect can be told from a record of an axis of that structure and motion: a rigid one has no coupling and no second
@@ -80,5 +88,12 @@ mod tests {
         for (effect, _) in [Effect::of_gain(), Effect::of_rounding()].into_iter().flatten() {
             assert!(!effect.info().named, "{effect:?}");
         }
+    }
+
+    #[test]
+    fn a_phase_is_an_angle_on_a_linear_axis_too() {
+        let ripple = Effect::TorqueRipple.info();
+        let units: Vec<&str> = ripple.parameters.iter().map(|p| p.unit_on(Motion::Linear)).collect();
+        assert_eq!(units, ["N", "1/m", "rad"]);
     }
 }

@@ -342,7 +342,7 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
             let info = effect.info();
             let parameters = info.variants[*form].free.iter().map(|&p| {
                 let value = fit.model.effects.of(*effect)[p];
-                (p, estimate(decision, Free::Effect(*effect, p), value, motion.unit(info.parameters[p].unit)))
+                (p, estimate(decision, Free::Effect(*effect, p), value, info.parameters[p].unit_on(motion)))
             });
             Cause {
                 effect: *effect,
