@@ -330,7 +330,7 @@ impl Input for ActuatorLag {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.2,
         bounds: |p, x| x.turns_phase(p[0]) && p[0] * x.band <= 20.0,
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],

@@ -57,6 +57,8 @@ pub struct Descent<'a> {
     leaves: bool,
     /// What is held in the first steps.
     first: First,
+    /// Whether steps go straight ahead in values, not in their logarithms.
+    straight: bool,
 }
 
 /// What a descent holds in its first steps: what its start was not found with.
@@ -83,6 +85,7 @@ impl<'a> Descent<'a> {
             iterations: 0,
             leaves: false,
             first: First::Sizes,
+            straight: false,
         })
     }
 
@@ -98,7 +101,16 @@ impl<'a> Descent<'a> {
             iterations: fit.iterations,
             leaves: fit.at_bound,
             first: First::Sizes,
+            straight: false,
         }
+    }
+
+    /// With steps that are straight in the values of the axis' own parameters.
+    ///
+    /// What the axis lacks is linear in them, and the sum of inertias is often known a thousand times better than each: along a curve of
+    /// logarithms that valley is left after a thousandth of its length.
+    pub fn straight(self) -> Self {
+        Self { straight: true, ..self }
     }
 
     /// With other things held first.
@@ -172,14 +184,18 @@ impl<'a> Descent<'a> {
             .iter()
             .map(|c| begins && if self.first == First::Sizes { c.is_shape() } else { c.is_base() })
             .collect();
+        let straight = self.straight;
         let (mut next, mut leaves) = (None, false);
         for _ in 0..TRIALS {
-            let (delta, errors) = normal.solve(coordinates, &x, *damping, &held)?;
+            let (delta, errors) = normal.solve(coordinates, &x, *damping, &held, straight)?;
             if self.std.is_empty() || *damping == 0.0 {
                 self.std = errors;
             }
             let y: Vec<f64> = (0..x.len())
-                .map(|i| (x[i] + delta[i]).clamp(coordinates[i].bounds[0], coordinates[i].bounds[1]))
+                .map(|i| {
+                    let to = if straight { x[i] + delta[i].ln_1p() } else { x[i] + delta[i] };
+                    to.clamp(coordinates[i].bounds[0], coordinates[i].bounds[1])
+                })
                 .collect();
             let model: Model = at.model.at(coordinates, &y);
             if !problem.admits(&model, self.terms) {
@@ -240,7 +256,7 @@ impl<'a> Descent<'a> {
     pub fn standard_errors(&mut self) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
-        let (_, errors) = self.normal(&x, share)?.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
+        let (_, errors) = self.normal(&x, share)?.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()], false)?;
         Some(errors.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect())
     }
 
@@ -336,6 +352,7 @@ impl Normal {
         x: &[f64],
         damping: f64,
         held: &[bool],
+        straight: bool,
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let k = coordinates.len();
         let mut fixed = held.to_vec();
@@ -357,7 +374,7 @@ impl Normal {
             for (p, &i) in free.iter().enumerate() {
                 delta[i] = step[p] / scale[p];
                 std[i] = inverse[(p, p)].max(0.0).sqrt() / scale[p];
-                if coordinates[i].log {
+                if coordinates[i].log && !straight {
                     delta[i] = delta[i].clamp(-FARTHEST_STEP, FARTHEST_STEP);
                 }
                 let to = x[i] + delta[i];
@@ -368,6 +385,10 @@ impl Normal {
                 }
             }
             if !again {
+                if straight {
+                    let farthest = delta.iter().fold(FARTHEST_STEP, |most, d| d.abs().max(most));
+                    delta.iter_mut().for_each(|d| *d *= FARTHEST_STEP / farthest);
+                }
                 return Some((delta, std));
             }
         }

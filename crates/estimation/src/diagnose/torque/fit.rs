@@ -199,6 +199,8 @@ impl Problem<'_> {
         }
     }
 
+    /// What each coordinate changes of what a model lacks. The axis' own parameters act along the motion as measured, which is the model's
+    /// own nearly; where it is not, all is simulated.
     pub fn columns(
         &self,
         model: &Model,
@@ -207,12 +209,16 @@ impl Problem<'_> {
         bandwidth: Bandwidth,
     ) -> Option<Vec<[Vec<C>; 2]>> {
         let x: Vec<f64> = coordinates.iter().map(|c| c.x(model)).collect();
+        let has = |of: fn(&Effect) -> bool| EFFECTS.iter().any(|e| of(e) && model.effects.is_on(*e));
         // A coupling with play does not pull by its twist alone.
-        let linear = !EFFECTS.iter().any(|e| e.info().place == Place::Coupling && model.effects.is_on(*e));
+        let linear = !has(|e| e.info().place == Place::Coupling);
+        // What a third inertia began with is taken out of what any change lacks, too.
+        let settles = self.band.sides().len() == 1 && has(|e| e.is_mode());
+        let motion = self.motion.as_ref().filter(|_| !settles);
         (0..coordinates.len())
             .into_par_iter()
             .map(|i| {
-                if let (Free::Base(p), Some(motion)) = (coordinates[i].free, &self.motion)
+                if let (Free::Base(p), Some(motion)) = (coordinates[i].free, motion)
                     && (linear || matches!(p, BaseParameter::I1 | BaseParameter::I2))
                 {
                     return Some(self.band.base_column(p, motion, coordinates[i].slope(x[i])));
@@ -304,6 +310,13 @@ impl Problem<'_> {
     pub fn fit(&self, start: &Model, terms: &[Term], from: Discrepancy, effort: usize) -> Option<Fit> {
         let mut descent = Descent::new(self, start, terms, from)?;
         descent.run(effort)?;
+        Some(descent.done())
+    }
+
+    /// Fits the axis' own parameters alone by steps that are straight in their values.
+    pub fn straight(&self, from: Discrepancy) -> Option<Fit> {
+        let mut descent = Descent::new(self, &self.nominal, &[], from)?.straight();
+        descent.run(STEPS)?;
         Some(descent.done())
     }
 

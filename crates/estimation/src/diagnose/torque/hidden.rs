@@ -2,11 +2,12 @@
 //!
 //! Held at its place, such an inertia swings freely with `I y'' + B y' + K y = 0`, `y` its position relative to the place. How it swung
 //! when the record began is not known: its torque then has two decaying sines in it, whose sizes belong to the record and to no
-//! hypothesis. What the lacking torque has of those of the axis' own other side is taken out of it (variable projection: Golub, Pereyra, SIAM J. Numer. Anal. 10, 1973).
+//! hypothesis. What the lacking torque has of those is taken out of it (variable projection: Golub, Pereyra, SIAM J. Numer. Anal. 10, 1973).
 
 use rustfft::FftPlanner;
 
 use super::super::model::Model;
+use super::fit::largest;
 use super::likelihood::{Band, C};
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Place};
@@ -32,15 +33,19 @@ impl Hidden {
         (model.structure == Structure::TwoInertia).then_some(Self { side, inertia, stiffness: p.k, damping: p.b })
     }
 
-    /// All of a model of which these sides are measured: on a rigid axis any is the first.
-    pub fn of(model: &Model, sides: &[usize]) -> Vec<Self> {
+    /// Third inertias of a model of which these sides are measured: on a rigid axis any is the first.
+    fn modes(model: &Model, sides: &[usize]) -> impl Iterator<Item = Self> {
         let rigid = model.structure == Structure::Rigid;
-        let modes = EFFECTS.iter().filter(|e| e.is_mode() && model.effects.is_on(**e)).filter_map(|e| {
+        EFFECTS.iter().filter(|e| e.is_mode() && model.effects.is_on(**e)).filter_map(move |e| {
             let side = usize::from(!rigid && e.info().place == Place::Table);
             let of = model.effects.of(*e);
             (rigid || sides.contains(&side)).then_some(Self { side, inertia: of[0], stiffness: of[1], damping: of[2] })
-        });
-        Self::across(model, sides).into_iter().chain(modes).collect()
+        })
+    }
+
+    /// All of a model of which these sides are measured.
+    pub fn of(model: &Model, sides: &[usize]) -> Vec<Self> {
+        Self::across(model, sides).into_iter().chain(Self::modes(model, sides)).collect()
     }
 
     /// Decay and angular frequency of its free vibration; `None` where it does not swing.
@@ -79,23 +84,32 @@ impl Hidden {
     }
 }
 
-/// Takes out of the rows of a model what the side without an encoder began with. A third inertia is no part of the axis, but an effect: to
-/// begin with a swing of its own choice would let the smallest explain anything that dies away.
-pub fn settle(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+/// Takes out of the rows of a model what its inertias without an encoder began with. A third inertia is no part of the axis, but an effect:
+/// it swings at most as it does later along the motion, lest the smallest explain anything that dies away.
+pub fn settle(band: &Band, model: &Model, motion: &[[f64; 4]], rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
     if let Some(hidden) = Hidden::across(model, band.sides()) {
-        take_vibration(band, &hidden, rows, planner);
+        take_vibration(band, &hidden, f64::INFINITY, rows, planner);
+    }
+    // Where each side has an encoder the two tell a sine from what swings.
+    if band.sides().len() > 1 {
+        return;
+    }
+    for hidden in Hidden::modes(model, band.sides()) {
+        let along: Vec<f64> = motion.iter().map(|m| m[2 * hidden.side]).collect();
+        let most = largest(&hidden.pull(&along, band.dt));
+        take_vibration(band, &hidden, most, rows, planner);
     }
 }
 
-/// The same for every inertia of a model without an encoder: a fit may not begin with the swing of a third one, but on a record that no
-/// fit has seen it was swinging already.
+/// The same without bound: on a record that no fit has seen a model may have been swinging in any way.
 pub fn settle_all(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
     for hidden in Hidden::of(model, band.sides()) {
-        take_vibration(band, &hidden, rows, planner);
+        take_vibration(band, &hidden, f64::INFINITY, rows, planner);
     }
 }
 
-fn take_vibration(band: &Band, hidden: &Hidden, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+/// Takes out a free vibration from the record's first sample, its torque there at most so large, N.m.
+fn take_vibration(band: &Band, hidden: &Hidden, most: f64, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
     // Faster than the record shows it is no part of the band.
     let Some(of) = hidden.vibration().filter(|of| of.im * band.dt < std::f64::consts::PI) else { return };
     let step = (of * band.dt).exp();
@@ -106,30 +120,27 @@ fn take_vibration(band: &Band, hidden: &Hidden, rows: &mut [Vec<C>; 2], planner:
         at *= step;
     }
     planner.plan_fft_forward(band.n).process(&mut z);
-    let [mut cosine, mut sine] = [(1.0, C::new(0.5, 0.0)), (-1.0, C::new(0.0, -0.5))].map(|(sign, turn)| {
-        let spectrum = |m: usize| (z[m] + z[(band.n - m) % band.n].conj() * sign) * turn;
+    let scale = 1.0 / (band.n as f64).sqrt();
+    let [cosine, sine] = [(1.0, C::new(0.5, 0.0)), (-1.0, C::new(0.0, -0.5))].map(|(sign, turn)| {
+        let spectrum = |m: usize| (z[m] + z[(band.n - m) % band.n].conj() * sign) * turn * scale;
         band.at_side(hidden.side, &(0..band.omega.len()).map(spectrum).collect::<Vec<C>>())
     });
-    let whole = band.product(&sine, &sine);
-    normalise(band, &mut cosine);
-    take(band, &cosine, &mut sine);
-    take(band, &cosine, rows);
-    if band.product(&sine, &sine) > OWN * OWN * whole {
-        normalise(band, &mut sine);
-        take(band, &sine, rows);
-    }
-}
-
-fn normalise(band: &Band, column: &mut [Vec<C>; 2]) {
-    let size = band.product(column, column).sqrt().max(f64::MIN_POSITIVE);
-    column.iter_mut().flatten().for_each(|v| *v /= size);
-}
-
-/// Takes out of the rows what they have of a column of size one.
-fn take(band: &Band, column: &[Vec<C>; 2], rows: &mut [Vec<C>; 2]) {
-    let share = band.product(column, rows);
-    for (row, column) in rows.iter_mut().zip(column) {
-        row.iter_mut().zip(column).for_each(|(r, c)| *r -= c * share);
+    let product = |a: &[Vec<C>; 2], b: &[Vec<C>; 2]| band.product(a, b);
+    let (cc, ss, cs) = (product(&cosine, &cosine), product(&sine, &sine), product(&cosine, &sine));
+    let (cr, sr) = (product(&cosine, rows), product(&sine, rows));
+    let determinant = cc * ss - cs * cs;
+    // Of a vibration that is one curve within the record, one part.
+    let (a, b) = if determinant > OWN * OWN * cc * ss {
+        ((ss * cr - cs * sr) / determinant, (cc * sr - cs * cr) / determinant)
+    } else {
+        (cr / cc.max(f64::MIN_POSITIVE), 0.0)
+    };
+    let size = a.hypot(b);
+    let share = if size > most { most / size } else { 1.0 };
+    for (e, row) in rows.iter_mut().enumerate() {
+        for (r, (c, s)) in row.iter_mut().zip(cosine[e].iter().zip(&sine[e])) {
+            *r -= (c * a + s * b) * share;
+        }
     }
 }
 

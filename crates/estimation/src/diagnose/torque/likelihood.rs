@@ -322,7 +322,7 @@ impl Band {
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };
-        settle(self, model, &mut rows, planner);
+        settle(self, model, &tracked.motion, &mut rows, planner);
         Lacking { rows, weights: self.weights(model), alike }
     }
 

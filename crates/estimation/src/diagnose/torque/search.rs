@@ -15,11 +15,10 @@ use rayon::prelude::*;
 use super::super::model::{Coordinate, Free, Model};
 use super::conclusion::Decision;
 use super::fit::{Fit, Problem, STEPS, Term};
-use super::likelihood::{Band, Discrepancy};
+use super::likelihood::{Band, Discrepancy, Sight};
 use super::pool::Pool;
 use super::scales::Scales;
 use super::starts::{Look, StartPoint};
-use crate::axis::Structure;
 use crate::effects::Effect;
 
 /// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
@@ -28,8 +27,8 @@ const MATERIAL: f64 = 0.25;
 const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
 const MINOR: f64 = 0.0025;
-/// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling shows
-/// less of it in its twist.
+/// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling with an
+/// encoder on each side shows less of it in its twist.
 pub const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
 /// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
@@ -75,6 +74,9 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
     let nominal = search.problem.nominal;
     let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
     let parameters = search.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
+    // Parameters that leave nothing are the answer, however far along their valley they lie.
+    let straight = search.problem.straight(given.discrepancy).filter(|f| search.at_floor(f) || search.is_negligible(f));
+    let parameters = straight.filter(|f| f.log_likelihood > parameters.log_likelihood).unwrap_or(parameters);
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = Pool::default();
     pool.extend([given.clone(), parameters.clone()]);
@@ -119,6 +121,8 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
         }
         chosen = other;
     }
+    (search.progress)("the forms of what was found");
+    let chosen = search.in_best_form(chosen, &mut pool);
     search.conclude(given, parameters, chosen, pool.into_fits())
 }
 
@@ -306,11 +310,7 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is less than a log's torque is true to.
     fn is_negligible(&self, fit: &Fit) -> bool {
-        let least = match self.problem.nominal.structure {
-            Structure::Rigid => NEGLIGIBLE,
-            Structure::TwoInertia => NEGLIGIBLE_IN_TWIST,
-        };
-        self.left(fit) < least
+        self.left(fit) < if self.band().sight == Sight::Both { NEGLIGIBLE_IN_TWIST } else { NEGLIGIBLE }
     }
 
     /// Whether what a fit leaves holds no further cause.
@@ -432,6 +432,47 @@ impl Search<'_> {
         best
     }
 
+    /// The fit with one of its effects in each form that frees more, everything else from where it stands: what the plain form lacks the
+    /// others may have taken, and without it they would stand elsewhere.
+    fn reformed(&self, fit: &Fit, i: usize) -> Vec<Fit> {
+        let (effect, form) = fit.terms[i];
+        let all = effect.info().variants;
+        let frees_more = |v: &usize| *v != form && all[form].free.iter().all(|p| all[*v].free.contains(p));
+        let richer: Vec<usize> = (0..all.len()).filter(frees_more).collect();
+        let beside = || {
+            if richer.is_empty() {
+                return None;
+            }
+            let mut terms = fit.terms.clone();
+            terms.remove(i);
+            let held = Fit { terms, ..self.problem.given(&self.bare(fit, i))? };
+            Look::beside(&self.problem, &self.problem.freed(&held)?)
+        };
+        let Some(look) = beside() else { return Vec::new() };
+        let points: Vec<StartPoint> =
+            richer.par_iter().flat_map_iter(|v| look.starts((effect, *v)).into_iter().take(2)).collect();
+        let probed = points.par_iter().filter_map(|start| look.fitted(start, i, fit.discrepancy)).collect();
+        self.raced(probed, Some(fit))
+    }
+
+    /// The fit with its effects in the forms of largest evidence: a form that frees more is no further cause, however little it explains.
+    fn in_best_form(&self, fit: Fit, pool: &mut Pool) -> Fit {
+        let mut best = fit;
+        if self.at_floor(&best) {
+            return best;
+        }
+        for i in 0..best.terms.len() {
+            let mut all = self.reformed(&best, i);
+            pool.extend(all.iter().cloned());
+            all.push(best.clone());
+            let share = self.independent(&all);
+            if let Some(other) = self.best(&all, share) {
+                best = other.clone();
+            }
+        }
+        best
+    }
+
     /// Drops effects that the evidence does not need.
     fn pruned(&self, fit: Fit, pool: &mut Pool) -> Fit {
         let mut best = fit;
@@ -493,7 +534,7 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::Parameters;
+    use crate::axis::{Parameters, Structure};
     use crate::effects::{EFFECTS, Settings};
 
     fn fit(terms: &[Term]) -> Fit {
@@ -530,5 +571,26 @@ mod tests {
         assert!(!is_lost(&plain, &rich, 1.0));
         // A quarter of the values: twice the standard error.
         assert!(is_lost(&plain, &rich, 0.25));
+    }
+
+    #[test]
+    fn a_bristle_whose_reach_is_below_two_of_its_errors_is_a_simpler_friction() {
+        let effect = Effect::PreslidingMotor;
+        let reach = effect.simpler_at_zero().expect("Coulomb's friction");
+        let of = |value: f64| {
+            let mut fit = fit(&[(effect, 0)]);
+            fit.model.effects.of_mut(effect)[reach] = value;
+            fit.coordinates.push(Coordinate::new(Free::Effect(effect, reach), &fit.model));
+            fit.std.push(0.1);
+            fit
+        };
+        assert!(is_simpler(&of(0.19), 1.0) && !is_simpler(&of(0.21), 1.0));
+        // A quarter of the values: twice the standard error.
+        assert!(is_simpler(&of(0.39), 0.25) && !is_simpler(&of(0.41), 0.25));
+        // One that could not be told says nothing.
+        let mut unknown = of(0.01);
+        unknown.std.pop();
+        unknown.std.push(f64::INFINITY);
+        assert!(!is_simpler(&unknown, 1.0));
     }
 }

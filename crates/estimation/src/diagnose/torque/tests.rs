@@ -276,3 +276,58 @@ fn of_two_large_causes_both_are_found() {
     let o = diagnosed_as(&of_two_inertias(paper, with(&hidden), 0.05, 0), Structure::TwoInertia, paper);
     assert_eq!(named(&o), ["external_spring", "torque_ripple"], "{:#?}", told(&o));
 }
+
+#[test]
+fn inertias_whose_sum_alone_slow_motion_shows_are_told_apart_by_the_little_that_it_shows_of_each() {
+    let screw = Parameters { i1: 1.63e-3, i2: 9.4e-4, b: 0.038, k: 449.0, rho: 1.0 };
+    let nominal = Parameters { i1: 0.72 * screw.i1, i2: 1.1 * screw.i2, k: 0.87 * screw.k, ..screw };
+    let o = diagnosed_as(&of_two_inertias(screw, Settings::default(), 0.7, 0), Structure::TwoInertia, nominal);
+    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", told(&o));
+    let found = o.models[1].parameters;
+    let off = [found.i1 / screw.i1, found.i2 / screw.i2, found.k / screw.k].map(|r| (r - 1.0).abs());
+    assert!(off.iter().all(|o| *o < 0.03), "{off:?}");
+    assert!(o.diagnosis.remainder.noise_multiple < 1.1, "{:?}", o.diagnosis.remainder);
+}
+
+/// A motor with a third inertia on a spring, which swings from the record's first sample on where it is `plucked`.
+fn with_a_mode(plucked: bool) -> Record {
+    let mode = with(&[(Effect::MotorMode, 0, 0.7), (Effect::MotorMode, 1, 0.7 * 4900.0), (Effect::MotorMode, 2, 1.0)]);
+    let axis = Axis::new(parameters(INERTIA), Structure::Rigid, mode, Scheme::Exact, DT);
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let acts = |t: f64| 3.0 * (4.0 * t).sin() + 2.0 * (9.0 * t + 1.0).cos() + 2.0 * (23.0 * t).sin() + (60.0 * t).cos();
+    let before = if plucked { 140 } else { 0 };
+    let (mut torque, mut theta) = (Vec::new(), Vec::new());
+    for k in 0..before + 500 {
+        let t = DT * f64::from(k);
+        // A blow just before the record begins.
+        let held = if k < before { if k + 12 > before { 40.0 } else { 0.0 } } else { acts(t) };
+        if k >= before {
+            torque.push(held);
+            theta.push(state.theta1() + noise(&mut rng, 1e-6));
+        }
+        state = axis.advance(&state, Ramp { start: held, end: held }, t);
+    }
+    Record {
+        start: DT * f64::from(before),
+        dt: DT,
+        hold: Hold::Zoh,
+        torque,
+        between: None,
+        channels: [Some(theta), None, None, None],
+        noise: [1e-6; 4],
+        common_noise: 0.0,
+        idle: Vec::new(),
+    }
+}
+
+#[test]
+fn a_mode_that_swings_when_a_short_record_begins_is_no_sine_beside_it() {
+    for plucked in [false, true] {
+        let o = diagnosed(&with_a_mode(plucked), INERTIA);
+        assert_eq!(named(&o), ["flexible_mode"], "{plucked} {:#?}", told(&o));
+        let mode = o.improved.effects.of(Effect::MotorMode);
+        let frequency = (mode[1] / mode[0]).sqrt();
+        assert!((frequency / 70.0 - 1.0).abs() < 0.02, "{plucked} {frequency}");
+    }
+}
