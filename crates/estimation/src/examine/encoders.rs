@@ -97,7 +97,7 @@ const HELD: f64 = 0.02;
 /// That the table moves so many times as far as the motor because one of them is in another unit.
 fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
     let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
-    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < 0.12);
+    let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < NEAR);
     let words = lead
         .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
         .or_else(|| factor_within(ratio, if ratio.abs() < 1.0 { HELD } else { NEAR }).map(str::to_owned))

@@ -120,6 +120,14 @@ pub struct ParameterInfo {
     pub doc: &'static str,
 }
 
+impl EffectInfo {
+    /// Whether a form frees all that another one does, and more.
+    #[must_use]
+    pub fn frees_more(&self, form: usize, than: usize) -> bool {
+        form != than && self.variants[than].free.iter().all(|i| self.variants[form].free.contains(i))
+    }
+}
+
 impl ParameterInfo {
     /// A size whose off value is zero.
     #[must_use]

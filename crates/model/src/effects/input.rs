@@ -330,6 +330,7 @@ impl Input for ActuatorLag {
         memory: 0,
         named: true,
         textbook: false,
+        // Every bus shifts a log's torque in time; a lag beside that few logs show.
         odds: 0.2,
         bounds: |p, x| x.turns_phase(p[0]) && p[0] * x.band <= 20.0,
         example: &[3e-3],

@@ -356,8 +356,7 @@ impl Problem<'_> {
             .free
             .iter()
             .any(|i| matches!(e.info().parameters[*i].start, Start::Grid(Scale::Order | Scale::Frequency, _)));
-        let all = e.info().variants;
-        let richer = all[..v].iter().any(|p| p.free.iter().all(|i| all[v].free.contains(i)));
+        let richer = (0..v).any(|plain| e.info().frees_more(v, plain));
         PRICE * if richer { RICHER } else { 1.0 } - e.info().odds.ln()
             + if lines { (self.band.omega.len() as f64).ln() } else { 0.0 }
     }

@@ -436,9 +436,8 @@ impl Search<'_> {
     /// others may have taken, and without it they would stand elsewhere.
     fn reformed(&self, fit: &Fit, i: usize) -> Vec<Fit> {
         let (effect, form) = fit.terms[i];
-        let all = effect.info().variants;
-        let frees_more = |v: &usize| *v != form && all[form].free.iter().all(|p| all[*v].free.contains(p));
-        let richer: Vec<usize> = (0..all.len()).filter(frees_more).collect();
+        let info = effect.info();
+        let richer: Vec<usize> = (0..info.variants.len()).filter(|v| info.frees_more(*v, form)).collect();
         let beside = || {
             if richer.is_empty() {
                 return None;
@@ -526,9 +525,9 @@ pub fn is_undetermined(fit: &Fit, effect: Effect, independent: f64) -> bool {
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
 fn forms(effect: Effect, richer: bool) -> Vec<Term> {
-    let all = effect.info().variants;
-    let contains = |v: usize| all[..v].iter().any(|p| p.free.iter().all(|i| all[v].free.contains(i)));
-    (0..all.len()).filter(|v| contains(*v) == richer).map(|v| (effect, v)).collect()
+    let info = effect.info();
+    let frees_more = |v: usize| (0..v).any(|plain| info.frees_more(v, plain));
+    (0..info.variants.len()).filter(|v| frees_more(*v) == richer).map(|v| (effect, v)).collect()
 }
 
 #[cfg(test)]

@@ -23,6 +23,21 @@ fn noise(rng: &mut ChaCha8Rng, size: f64) -> f64 {
     size * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>()
 }
 
+/// A record of one encoder with a noise of 1e-6 rad.
+fn of_one_encoder(start: f64, torque: Vec<f64>, theta: Vec<f64>) -> Record {
+    Record {
+        start,
+        dt: DT,
+        hold: Hold::Zoh,
+        torque,
+        between: None,
+        channels: [Some(theta), None, None, None],
+        noise: [1e-6; 4],
+        common_noise: 0.0,
+        idle: Vec::new(),
+    }
+}
+
 /// A record of moves under a position controller; `foreign` is a torque that no model knows of.
 fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn(f64) -> f64, seed: u64) -> Record {
     let n = 6000;
@@ -41,17 +56,7 @@ fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn
         let acts = command + foreign(t);
         state = axis.advance(&state, Ramp { start: acts, end: acts }, t);
     }
-    Record {
-        start: 0.0,
-        dt: DT,
-        hold: Hold::Zoh,
-        torque,
-        between: None,
-        channels: [Some(theta), None, None, None],
-        noise: [1e-6; 4],
-        common_noise: 0.0,
-        idle: Vec::new(),
-    }
+    of_one_encoder(0.0, torque, theta)
 }
 
 fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> Outcome {
@@ -308,17 +313,7 @@ fn with_a_mode(plucked: bool) -> Record {
         }
         state = axis.advance(&state, Ramp { start: held, end: held }, t);
     }
-    Record {
-        start: DT * f64::from(before),
-        dt: DT,
-        hold: Hold::Zoh,
-        torque,
-        between: None,
-        channels: [Some(theta), None, None, None],
-        noise: [1e-6; 4],
-        common_noise: 0.0,
-        idle: Vec::new(),
-    }
+    of_one_encoder(DT * f64::from(before), torque, theta)
 }
 
 #[test]
