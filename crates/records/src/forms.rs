@@ -38,7 +38,8 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
     if head.len() >= 16 && zeros(0) * 10 > head.len() / 2 * 9 {
         return utf16(text, u16::from_be_bytes, file);
     }
-    if memchr::memchr(0, head).is_some() {
+    // A few zeros are what a logger leaves that lost its power, and stand in cells that are named; many are no text.
+    if (zeros(0) + zeros(1)) * 20 > head.len() {
         return Err(TraceError::Format {
             file: file.to_owned(),
             what: "it is neither text nor a form that is known (CSV, Excel, Parquet, MATLAB, NumPy .npz, JSON, HDF5); export the log as \
@@ -386,6 +387,19 @@ mod tests {
             assert_eq!(table.column(1).unwrap(), [1.5, -2.5]);
             assert_eq!(table.headers[2].unit.as_deref(), Some("\u{b0}C"));
         }
+    }
+
+    #[test]
+    fn a_few_zeros_in_a_log_stand_in_a_cell_and_many_are_no_text() {
+        let rows: String = (0..40).map(|k| format!("{k},0.5\n")).collect();
+        let mut log = format!("time [s],T [N.m]\n{rows}").into_bytes();
+        let cell = log.len() - 4;
+        log[cell..cell + 2].fill(0);
+        let error = Table::parse(&log, "log").unwrap().column(1).unwrap_err().to_string();
+        assert!(error.contains("41"), "{error}");
+        log[..200].fill(0);
+        let error = Table::parse(&log, "log").unwrap_err().to_string();
+        assert!(error.contains("neither text"), "{error}");
     }
 
     #[test]

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use memchr::memrchr;
 
 use super::error::TraceError;
+use super::forms::{self, Form};
 use super::load::{Mapping, SHORTEST, no_signal, scale, scaled, time_column, wanted};
 use super::sampling::{Decimals, Sampling};
 use super::table::{Kind, Table};
@@ -56,6 +57,11 @@ impl Rows {
                 let failed = |reason| TraceError::Read { path: path.to_owned(), reason };
                 let mut bytes = Vec::new();
                 open.rewind().and_then(|()| open.take(BLOCK as u64).read_to_end(&mut bytes)).map_err(failed)?;
+                if !matches!(forms::of(&bytes, &file)?, Form::Plain) {
+                    let what = "text that has to be brought to CSV first (UTF-16, one byte a letter, JSON, columns set apart by \
+                                blanks, a controller's own log) is not streamed; leave --stream out, or write it as CSV in UTF-8";
+                    return Err(TraceError::Format { file, what: what.to_owned() });
+                }
                 csv::Head::find(csv::unmarked(&bytes), &file)?.headers
             }
             Kind::Mat | Kind::Hdf5 | Kind::Packed => {
