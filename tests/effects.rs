@@ -1,7 +1,10 @@
 //! Effects against closed formulas: on the rigid axis, which has no place for a table but bears what acts on it, friction
 //! that grows with its load, and readings that are late, early or filtered.
 
-use eixo::axis::{Axis, Hold, Parameters, Scheme, SimulateOptions, State, Structure, dt_criterion, simulate, substeps};
+use eixo::axis::{
+    Axis, Hold, Parameters, Scheme, SimulateOptions, State, Structure, dt_criterion, simulate, substeps,
+    substeps_at_speed,
+};
 use eixo::effects::{Effect, Ramp, Settings};
 
 const P: Parameters = Parameters { i1: 2e-3, i2: 1e-3, b: 0.0, k: 0.0, rho: 1.0 };
@@ -342,6 +345,11 @@ fn steps_a_sample_follow_what_swings_fastest() {
     assert_eq!(per(&[(Effect::ExternalSpring, &[k])]), needed((k / INERTIA).sqrt()));
     assert_eq!(per(&[(Effect::Gravity, &[30.0, 40.0, 80.0])]), needed((50.0 * 80.0 / INERTIA).sqrt()));
     assert_eq!(per(&[(Effect::MotorMode, &[1e-3, k])]), needed((k / 1e-3).sqrt()));
+    assert_eq!(per(&[(Effect::Disturbance, &[1.0, 60.0])]), needed(std::f64::consts::TAU * 60.0));
+    // What repeats with the angle repeats in time as fast as its place turns.
+    let ripple = with(&[(Effect::TorqueRipple, &[1.0, 8.0])]);
+    let turning = |speed: [f64; 2]| substeps_at_speed(&P, Structure::Rigid, &ripple, dt, speed);
+    assert_eq!([[0.0; 2], [0.0, 90.0], [90.0, 0.0]].map(turning), [1, 1, needed(8.0 * 90.0)]);
     // The coupling's own mode, and twice that for the absolute value of its torque.
     let flexible = Parameters { k: 400.0, ..P };
     let with_load = |load: f64| {

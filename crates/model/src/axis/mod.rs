@@ -31,7 +31,7 @@ pub use mechanics::Motions;
 pub use oscillator::Scheme;
 pub use parameters::{Modal, Motion, ParameterError, Parameters, PhysicalData, Structure};
 pub use propagator::{Linear, Propagator};
-pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps};
+pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps, substeps_at_speed};
 
 #[cfg(test)]
 pub(crate) mod tests;

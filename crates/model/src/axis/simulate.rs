@@ -57,6 +57,18 @@ pub struct Response<S = f64> {
 /// motion, so many that the fastest mode turns by no more than a quarter of a radian per step.
 #[must_use]
 pub fn substeps(p: &Parameters<f64>, structure: Structure, effects: &Settings<f64>, dt: f64) -> usize {
+    substeps_at_speed(p, structure, effects, dt, [0.0; 2])
+}
+
+/// The same where motor and table are known to turn at some speed, rad/s: a torque that repeats with the angle then repeats in time.
+#[must_use]
+pub fn substeps_at_speed(
+    p: &Parameters<f64>,
+    structure: Structure,
+    effects: &Settings<f64>,
+    dt: f64,
+    speed: [f64; 2],
+) -> usize {
     let on = effects.active();
     if on.motion_is_linear() {
         return 1;
@@ -74,6 +86,9 @@ pub fn substeps(p: &Parameters<f64>, structure: Structure, effects: &Settings<f6
             (Structure::TwoInertia, _) => p.i1,
         };
         rate = rate.max(effect.rate(effects.of(effect), inertia));
+        if let Some(order) = effect.order(effects.of(effect)) {
+            rate = rate.max(order * speed[usize::from(effect.info().place == Place::Table)]);
+        }
     }
     ((rate * dt / 0.25).ceil() as usize).clamp(1, 16)
 }

@@ -34,6 +34,10 @@ impl Force for Disturbance {
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 
+    fn rate(p: &[f64], _inertia: f64) -> f64 {
+        TAU * p[1]
+    }
+
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {
         let angle = p[1] * (TAU * m.time) + p[2];

@@ -33,6 +33,24 @@ impl<S: Scalar> Settings<S> {
         on.sensors().iter().fold(S::default(), |sum, &e| sum + e.late(self.of(e)))
     }
 
+    /// The same encoders read no earlier than their stamps, and how long after its stamp each sample was read, s: a simulation that knows the
+    /// torque to come runs that far ahead instead of coasting.
+    #[must_use]
+    pub fn on_time(&self) -> (Self, f64) {
+        let mut settings = *self;
+        let mut ahead = 0.0;
+        for &effect in self.active().sensors() {
+            let late = effect.late(self.of(effect)).re();
+            if late < 0.0
+                && let Some(delay) = effect.delay_parameter()
+            {
+                settings.of_mut(effect)[delay] = S::default();
+                ahead -= late;
+            }
+        }
+        (settings, ahead)
+    }
+
     /// Time constant of the filter before both encoders are read, s.
     #[must_use]
     pub fn filter(&self, on: &ActiveEffects) -> S {

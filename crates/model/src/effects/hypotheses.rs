@@ -1,8 +1,8 @@
 //! Which effects may be named of an axis, which of them beside each other, and what tells them from their rivals.
 
-use super::Effect;
 use super::family::Family;
 use super::info::{ParameterInfo, Place, Start};
+use super::{Effect, Length};
 use crate::axis::{Motion, Structure};
 
 impl ParameterInfo {
@@ -39,6 +39,16 @@ impl Effect {
         super::EFFECTS.iter().find_map(|e| Some((*e, e.gain_parameter()?)))
     }
 
+    /// Radians of its torque's phase in a radian of its place, of a torque that repeats with the angle.
+    #[must_use]
+    pub fn order(self, values: &[f64]) -> Option<f64> {
+        match self.length()? {
+            Length::Periods(p) => Some(values[p].abs()),
+            Length::Turn => Some(1.0),
+            Length::HalfPlay(_) => None,
+        }
+    }
+
     /// Whether it is a constant torque alone: an amplifier's offset, a weight.
     #[must_use]
     pub fn is_bias(self) -> bool {
@@ -66,7 +76,7 @@ impl Effect {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::{EFFECTS, Length};
+    use crate::effects::EFFECTS;
 
     #[test]
     fn a_gain_a_step_and_a_length_are_parameters_of_their_effect() {

@@ -148,6 +148,12 @@ impl ParameterInfo {
         Self { name, unit, role: Role::Shape, off: start, min, max, nominal: 1.0, start: Start::Off, doc }
     }
 
+    /// Whether a torque is proportional to it: a torque itself, or one per angle, speed or acceleration.
+    #[must_use]
+    pub fn is_torque(&self) -> bool {
+        self.unit.starts_with("N.m") || self.unit.starts_with("kg.m2")
+    }
+
     /// The same with another start of the fit.
     #[must_use]
     pub const fn start(self, start: Start) -> Self {

@@ -32,7 +32,7 @@ impl<S: Scalar> Ramp<S> {
     }
 
     /// The ramp of mean `m0` and first moment `m1` (both over a step of unit length).
-    pub(super) fn from_moments(m0: S, m1: S) -> Self {
+    pub fn from_moments(m0: S, m1: S) -> Self {
         Self { start: m0 * 4.0 - m1 * 6.0, end: m1 * 6.0 - m0 * 2.0 }
     }
 
