@@ -1,7 +1,7 @@
 //! A model under test: parameters, structure, effects; and which of its numbers a fit may move.
 
 use crate::axis::{Parameters, Structure};
-use crate::effects::{Effect, MEMORY, Memory, Role, Settings, memory_of};
+use crate::effects::{Effect, MEMORY, Memory, Place, Role, Settings, memory_of};
 
 /// The axis with its effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -152,6 +152,18 @@ impl Coordinate {
         matches!(self.free, Free::Base(_))
     }
 
+    /// Whether a torque on the table is proportional to it.
+    #[must_use]
+    pub fn scales_with_the_table(&self) -> bool {
+        match self.free {
+            Free::Base(p) => p != BaseParameter::I1,
+            Free::Effect(e, i) => {
+                matches!(e.info().place, Place::Table | Place::Coupling) && e.info().parameters[i].is_torque()
+            }
+            Free::Loop(_) => false,
+        }
+    }
+
     /// x of the model's present value.
     #[must_use]
     pub fn x(&self, model: &Model) -> f64 {
@@ -191,6 +203,13 @@ impl Model {
     #[must_use]
     pub const fn new(parameters: Parameters, structure: Structure, effects: Settings) -> Self {
         Self { parameters, structure, effects, memory: [0.0; MEMORY] }
+    }
+
+    /// The model with encoders read no earlier than their stamps, and how long after its stamp each of its samples was read, s.
+    #[must_use]
+    pub fn on_time(&self) -> (Self, f64) {
+        let (effects, ahead) = self.effects.on_time();
+        (Self { effects, ..*self }, ahead)
     }
 
     /// One hundredth of the critical damping.

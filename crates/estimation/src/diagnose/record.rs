@@ -9,6 +9,9 @@ pub const CHANNELS: [&str; 4] = ["theta1", "omega1", "theta2", "omega2"];
 /// Name of the torque.
 pub const TORQUE: &str = "T";
 
+/// Share of a sample within which an instant is that sample's own.
+const ROUNDING: f64 = 1e-9;
+
 /// One uniformly sampled record of the axis, SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
@@ -65,22 +68,50 @@ impl Record {
         self.between.as_ref().map_or(1, |(m, _)| *m)
     }
 
-    /// The torque over part `j` of the `parts` equal ones of the interval after sample `k`, N.m.
+    /// Speeds of motor and table, rad/s: the peak of a sine of the same mean square; a side that is not measured moves with the other.
     #[must_use]
-    pub fn ramp(&self, k: usize, j: usize, parts: usize) -> Ramp<f64> {
-        let share = |i: usize| i as f64 / parts as f64;
-        if let Some((instants, torque)) = &self.between {
-            let at = |i: usize| {
-                let x = (k as f64 + share(i)) * *instants as f64;
-                let first = (x as usize).min(torque.len() - 1);
-                let next = (first + 1).min(torque.len() - 1);
-                torque[first] + (torque[next] - torque[first]) * (x - first as f64)
-            };
-            return Ramp { start: at(j), end: at(j + 1) };
+    pub fn speeds(&self) -> [f64; 2] {
+        let peak = |sum: f64, n: usize| (2.0 * sum / n.max(1) as f64).sqrt();
+        let of = |side: usize| {
+            let steps = |y: &Vec<f64>| peak(y.windows(2).map(|w| ((w[1] - w[0]) / self.dt).powi(2)).sum(), y.len().saturating_sub(1));
+            let speeds = |v: &Vec<f64>| peak(v.iter().map(|v| v * v).sum(), v.len());
+            self.channels[2 * side].as_ref().map(steps).or_else(|| self.channels[2 * side + 1].as_ref().map(speeds))
+        };
+        let (motor, table) = (of(0), of(1));
+        [motor.or(table), table.or(motor)].map(Option::unwrap_or_default)
+    }
+
+    /// The torque over part `j` of the `parts` equal ones of the interval that begins `ahead` seconds after sample `k`, N.m: of a held
+    /// torque that jumps within it the ramp of the same mean and first moment; before and after the record its first and last.
+    #[must_use]
+    pub fn ramp(&self, k: usize, j: usize, parts: usize, ahead: f64) -> Ramp<f64> {
+        let (instants, torque) = self.between.as_ref().map_or((1, &self.torque), |(m, t)| (*m, t));
+        let last = torque.len() - 1;
+        let ahead = ahead / self.dt;
+        let at = |i: usize| ((k as f64 + i as f64 / parts as f64) + ahead) * instants as f64;
+        let (from, to) = (at(j), at(j + 1));
+        if self.between.is_none() && self.hold == Hold::Zoh {
+            let held = |i: usize| torque[i.min(last)];
+            // A part that ends at a sample ends there, whatever rounding says.
+            let (first, next) = ((from + ROUNDING) as usize, (to - ROUNDING) as usize);
+            if first >= next {
+                return Ramp::held(held(first));
+            }
+            let length = to - from;
+            let (mut mean, mut moment) = (0.0, 0.0);
+            for i in first..=next {
+                let (a, b) = ((i as f64).max(from), ((i + 1) as f64).min(to));
+                let (a, b) = ((a - from) / length, (b - from) / length);
+                mean += held(i) * (b - a);
+                moment += held(i) * (b - a) * 0.5 * (a + b);
+            }
+            return Ramp::from_moments(mean, moment);
         }
-        let whole: Ramp<f64> = self.hold.ramp(&self.torque, k);
-        let at = |i: usize| whole.start + (whole.end - whole.start) * share(i);
-        if parts == 1 || self.hold == Hold::Zoh { whole } else { Ramp { start: at(j), end: at(j + 1) } }
+        let straight = |x: f64| {
+            let first = ((x + ROUNDING) as usize).min(last);
+            torque[first] + (torque[(first + 1).min(last)] - torque[first]) * (x - first as f64).min(1.0)
+        };
+        Ramp { start: straight(from), end: straight(to) }
     }
 
     /// Whether there is no sample.
@@ -93,5 +124,47 @@ impl Record {
     #[must_use]
     pub fn time(&self, k: usize) -> f64 {
         self.start + k as f64 * self.dt
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(hold: Hold, torque: &[f64]) -> Record {
+        Record {
+            start: 0.0,
+            dt: 0.5,
+            hold,
+            torque: torque.to_vec(),
+            between: None,
+            channels: [const { None }; 4],
+            noise: [0.0; 4],
+            common_noise: 0.0,
+            idle: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_held_torque_that_jumps_within_the_step_keeps_its_mean_and_first_moment() {
+        let record = record(Hold::Zoh, &[1.0, 3.0, 3.0]);
+        assert_eq!(record.ramp(0, 0, 1, 0.0), Ramp::held(1.0));
+        assert_eq!(record.ramp(0, 1, 2, 0.0), Ramp::held(1.0));
+        // 0.2 s after the first sample: three fifths of the step at 1, two fifths at 3.
+        let Ramp { start, end } = record.ramp(0, 0, 1, 0.2);
+        let (mean, moment) = (0.6 + 3.0 * 0.4, 0.5 * 0.36 + 3.0 * 0.5 * (1.0 - 0.36));
+        assert!((0.5 * (start + end) - mean).abs() < 1e-12, "{start} {end}");
+        assert!((start / 6.0 + end / 3.0 - moment).abs() < 1e-12, "{start} {end}");
+        // Its last value holds on.
+        assert_eq!(record.ramp(2, 0, 1, 0.7), Ramp::held(3.0));
+    }
+
+    #[test]
+    fn a_straight_torque_is_read_ahead_on_its_line() {
+        let record = record(Hold::Linear, &[1.0, 3.0, 7.0]);
+        assert_eq!(record.ramp(0, 0, 1, 0.0), Ramp { start: 1.0, end: 3.0 });
+        assert_eq!(record.ramp(0, 0, 2, 0.0), Ramp { start: 1.0, end: 2.0 });
+        assert_eq!(record.ramp(0, 0, 1, 0.25), Ramp { start: 2.0, end: 5.0 });
+        assert_eq!(record.ramp(1, 0, 1, 0.5), Ramp { start: 7.0, end: 7.0 });
     }
 }

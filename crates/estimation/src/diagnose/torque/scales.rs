@@ -75,7 +75,7 @@ impl Scales {
         let driven = usize::from(p.record.channels[0].is_none() && p.record.channels[1].is_none());
         let moved = |k: usize| t.motion[k + 1][2 * driven] - t.motion[k][2 * driven];
         let acting = |k: usize| {
-            let ramp = p.record.ramp(k, 0, 1);
+            let ramp = p.record.ramp(k, 0, 1, 0.0);
             0.5 * (ramp.start + ramp.end)
         };
         let last = t.motion.len() - 1;

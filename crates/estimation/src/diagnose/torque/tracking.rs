@@ -15,7 +15,7 @@
 use super::super::model::Model;
 use super::super::record::Record;
 use super::hidden::Hidden;
-use crate::axis::{Axis, Scheme, Structure, substeps};
+use crate::axis::{Axis, Scheme, Structure, substeps_at_speed};
 use crate::effects::TorqueHistory;
 
 /// What the model lacks, and the motion it was lacking it along.
@@ -59,7 +59,7 @@ const COARSER: usize = 4;
 
 /// Steps a sample: as many as effects and torque need.
 pub fn parts(model: &Model, record: &Record, resolution: Resolution) -> usize {
-    let full = substeps(&model.parameters, model.structure, &model.effects, record.dt);
+    let full = substeps_at_speed(&model.parameters, model.structure, &model.effects, record.dt, record.speeds());
     let steps = if resolution == Resolution::Full { full } else { full.div_ceil(COARSER) };
     steps.next_multiple_of(record.instants())
 }
@@ -78,6 +78,8 @@ fn track_with(
     resolution: Resolution,
     kept: &[usize],
 ) -> Option<(Tracked, Vec<crate::effects::Memory<f64>>)> {
+    // What a log holds early is followed with the torque to come.
+    let (model, ahead) = &model.on_time();
     let mut memories = Vec::with_capacity(kept.len());
     let n = record.len();
     let dt = record.dt;
@@ -99,7 +101,7 @@ fn track_with(
         })
     };
     let first = initial(record);
-    let mut state = axis.resume(first, &model.memory, record.start);
+    let mut state = axis.resume(first, &model.memory, record.start + ahead);
     let mut inputs = TorqueHistory::settled(*record.torque.first()?);
     let sensed = !axis.on().sensors().is_empty();
     let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), dt));
@@ -108,7 +110,7 @@ fn track_with(
     let mut motion = Vec::with_capacity(n);
     let mut before = [f64::NAN; 2];
     for k in 0..n {
-        let time = record.start + k as f64 * dt;
+        let time = record.time(k) + ahead;
         let reading = match &history {
             Some(history) => model.effects.transform_sensor(axis.on(), history, dt),
             None => state.reading(),
@@ -150,7 +152,7 @@ fn track_with(
             break;
         }
         for j in 0..per {
-            let mut ramp = record.ramp(k, j, per);
+            let mut ramp = record.ramp(k, j, per, *ahead);
             if !axis.on().inputs().is_empty() {
                 ramp = model.effects.transform_input(axis.on(), ramp, h, &mut inputs);
             }
@@ -260,15 +262,16 @@ impl Run {
         range: &std::ops::Range<usize>,
         motion: [f64; 4],
     ) -> Vec<[f64; 4]> {
+        let (model, ahead) = &model.on_time();
         let per = parts(model, record, Resolution::Full);
         let h = record.dt / per as f64;
         let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
-        let mut state = axis.resume(motion, &self.memory, record.time(range.start));
+        let mut state = axis.resume(motion, &self.memory, record.time(range.start) + ahead);
         // What the torque's way in remembers comes from the samples before.
         let warm = range.start.saturating_sub(WARM);
         let mut inputs = TorqueHistory::settled(record.torque[warm]);
         let torque = |k: usize, inputs: &mut TorqueHistory<f64>, j: usize| {
-            let ramp = record.ramp(k, j, per);
+            let ramp = record.ramp(k, j, per, *ahead);
             if axis.on().inputs().is_empty() { ramp } else { model.effects.transform_input(axis.on(), ramp, h, inputs) }
         };
         for k in warm..range.start {
@@ -287,7 +290,7 @@ impl Run {
             out.push([r.theta1, r.omega1, r.theta2, r.omega2]);
             for j in 0..per {
                 let ramp = torque(k, &mut inputs, j);
-                state = axis.advance(&state, ramp, record.time(k) + j as f64 * h);
+                state = axis.advance(&state, ramp, record.time(k) + ahead + j as f64 * h);
             }
             if let Some(history) = &mut history {
                 model.effects.push_sensors(axis.on(), history, state.reading());
