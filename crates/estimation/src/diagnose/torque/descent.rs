@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
-use super::likelihood::{C, Discrepancy, Lacking};
+use super::likelihood::{Band, C, Discrepancy, Lacking, Sight};
 use super::tracking::Bandwidth;
 use crate::axis::Structure;
 
@@ -57,8 +57,6 @@ pub struct Descent<'a> {
     leaves: bool,
     /// What is held in the first steps.
     first: First,
-    /// Whether steps go straight ahead in values, not in their logarithms.
-    straight: bool,
 }
 
 /// What a descent holds in its first steps: what its start was not found with.
@@ -85,7 +83,6 @@ impl<'a> Descent<'a> {
             iterations: 0,
             leaves: false,
             first: First::Sizes,
-            straight: false,
         })
     }
 
@@ -101,16 +98,7 @@ impl<'a> Descent<'a> {
             iterations: fit.iterations,
             leaves: fit.at_bound,
             first: First::Sizes,
-            straight: false,
         }
-    }
-
-    /// With steps that are straight in the values of the axis' own parameters.
-    ///
-    /// What the axis lacks is linear in them, and the sum of inertias is often known a thousand times better than each: along a curve of
-    /// logarithms that valley is left after a thousandth of its length.
-    pub fn straight(self) -> Self {
-        Self { straight: true, ..self }
     }
 
     /// With other things held first.
@@ -170,6 +158,10 @@ impl<'a> Descent<'a> {
     }
 
     /// One of Levenberg's steps at the present discrepancy; the gain in log likelihood, if there was one.
+    ///
+    /// The axis' own parameters, whose bounds and prior are those of logarithms, go straight ahead in their values: what the axis lacks
+    /// is linear in them, and the sum of inertias is often known a thousand times better than each. Along a curve of logarithms that
+    /// valley would be left after a thousandth of its length.
     fn step(&mut self, damping: &mut f64, begins: bool) -> Option<Option<f64>> {
         let (problem, band) = (self.problem, self.problem.band);
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
@@ -184,16 +176,15 @@ impl<'a> Descent<'a> {
             .iter()
             .map(|c| begins && if self.first == First::Sizes { c.is_shape() } else { c.is_base() })
             .collect();
-        let straight = self.straight;
         let (mut next, mut leaves) = (None, false);
         for _ in 0..TRIALS {
-            let (delta, errors) = normal.solve(coordinates, &x, *damping, &held, straight)?;
+            let (delta, errors) = normal.solve(coordinates, &x, *damping, &held)?;
             if self.std.is_empty() || *damping == 0.0 {
                 self.std = errors;
             }
             let y: Vec<f64> = (0..x.len())
                 .map(|i| {
-                    let to = if straight { x[i] + delta[i].ln_1p() } else { x[i] + delta[i] };
+                    let to = if coordinates[i].is_base() { x[i] + delta[i].ln_1p() } else { x[i] + delta[i] };
                     to.clamp(coordinates[i].bounds[0], coordinates[i].bounds[1])
                 })
                 .collect();
@@ -241,10 +232,11 @@ impl<'a> Descent<'a> {
 
     /// Normal equations at x, with columns of their own.
     fn normal(&mut self, x: &[f64], share: f64) -> Option<Normal> {
-        let (problem, coordinates, at) = (self.problem, &self.coordinates, &self.at);
+        let (problem, band, coordinates, at) = (self.problem, self.problem.band, &self.coordinates, &self.at);
         self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
+        scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
         let base = of_the_axis(coordinates, x);
-        let grows = problem.band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
+        let grows = band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
         let mut normal = Normal::new(problem, coordinates, x, &self.columns, at, share);
         for ((_, _, i), g) in base.iter().zip(&grows) {
             normal.g[*i] += g;
@@ -256,7 +248,7 @@ impl<'a> Descent<'a> {
     pub fn standard_errors(&mut self) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
-        let (_, errors) = self.normal(&x, share)?.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()], false)?;
+        let (_, errors) = self.normal(&x, share)?.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
         Some(errors.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect())
     }
 
@@ -312,6 +304,34 @@ fn of_the_axis(coordinates: &[Coordinate], x: &[f64]) -> Vec<(BaseParameter, f64
     coordinates.iter().enumerate().filter_map(of).collect()
 }
 
+/// Makes the columns agree on what the table's equation does when all torques in it grow alike: it grows with them (Euler's theorem on
+/// homogeneous functions).
+///
+/// No torque that is known acts on the table: where both sides are measured its equation tells its parameters up to a common factor,
+/// as exactly as the encoders read, and the motor's equation alone tells the factor. Columns along the measured motion beside others
+/// along the model's own are not exact enough for a step along so narrow a valley: the table's inertia takes what they differ by.
+fn scaled_with_the_table(
+    band: &Band,
+    coordinates: &[Coordinate],
+    x: &[f64],
+    lacking: &Lacking,
+    columns: &mut [[Vec<C>; 2]],
+) {
+    if band.sight != Sight::Both {
+        return;
+    }
+    let of = |i: &usize| coordinates[*i].free == Free::Base(BaseParameter::I2);
+    let Some(inertia) = (0..x.len()).find(of) else { return };
+    let mut rest = lacking.rows[1].clone();
+    for i in (0..x.len()).filter(|&i| i != inertia && coordinates[i].scales_with_the_table()) {
+        let rate = if coordinates[i].log { 1.0 } else { x[i] };
+        for (rest, column) in rest.iter_mut().zip(&columns[i][1]) {
+            *rest -= column * rate;
+        }
+    }
+    columns[inertia][1] = rest;
+}
+
 /// Normal equations `a*delta = g`.
 struct Normal {
     a: DMatrix<f64>,
@@ -352,7 +372,6 @@ impl Normal {
         x: &[f64],
         damping: f64,
         held: &[bool],
-        straight: bool,
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let k = coordinates.len();
         let mut fixed = held.to_vec();
@@ -374,7 +393,7 @@ impl Normal {
             for (p, &i) in free.iter().enumerate() {
                 delta[i] = step[p] / scale[p];
                 std[i] = inverse[(p, p)].max(0.0).sqrt() / scale[p];
-                if coordinates[i].log && !straight {
+                if coordinates[i].log && !coordinates[i].is_base() {
                     delta[i] = delta[i].clamp(-FARTHEST_STEP, FARTHEST_STEP);
                 }
                 let to = x[i] + delta[i];
@@ -385,10 +404,9 @@ impl Normal {
                 }
             }
             if !again {
-                if straight {
-                    let farthest = delta.iter().fold(FARTHEST_STEP, |most, d| d.abs().max(most));
-                    delta.iter_mut().for_each(|d| *d *= FARTHEST_STEP / farthest);
-                }
+                let farthest = coordinates.iter().zip(&delta).filter(|(c, _)| c.is_base()).map(|(_, d)| d.abs());
+                let shorter = FARTHEST_STEP / farthest.fold(FARTHEST_STEP, f64::max);
+                delta.iter_mut().for_each(|d| *d *= shorter);
                 return Some((delta, std));
             }
         }

@@ -313,13 +313,6 @@ impl Problem<'_> {
         Some(descent.done())
     }
 
-    /// Fits the axis' own parameters alone by steps that are straight in their values.
-    pub fn straight(&self, from: Discrepancy) -> Option<Fit> {
-        let mut descent = Descent::new(self, &self.nominal, &[], from)?.straight();
-        descent.run(STEPS)?;
-        Some(descent.done())
-    }
-
     /// Fits the hypothesis on from where a fit of it ended, to the end: as near to the model's own motion as the record allows.
     pub fn deepen(&self, fit: &Fit) -> Option<Fit> {
         let mut descent = Descent::new(self, &fit.model, &fit.terms, fit.discrepancy)?;

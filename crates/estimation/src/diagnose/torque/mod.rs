@@ -217,9 +217,6 @@ fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate, peak: f64) 
     let plain = Band::new(&record, nominal, limit, &mask);
     let problem = Problem::new(&record, &plain, *nominal);
     let fit = problem.fit(nominal, &[], [f64::MAX; 2], REFERRED);
-    // Parameters that leave nothing say best how the noise is seen.
-    let straight = problem.straight([f64::MAX; 2]).filter(|f| plain.at_floor(&f.rows));
-    let fit = straight.or(fit);
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
     let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
     let torque_rms = rms_about_mean(&record.torque);

@@ -74,9 +74,6 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
     let nominal = search.problem.nominal;
     let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
     let parameters = search.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
-    // Parameters that leave nothing are the answer, however far along their valley they lie.
-    let straight = search.problem.straight(given.discrepancy).filter(|f| search.at_floor(f) || search.is_negligible(f));
-    let parameters = straight.filter(|f| f.log_likelihood > parameters.log_likelihood).unwrap_or(parameters);
     search.problem.scales = Scales::new(&search.problem, &parameters);
     let mut pool = Pool::default();
     pool.extend([given.clone(), parameters.clone()]);

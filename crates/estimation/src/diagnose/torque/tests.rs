@@ -6,7 +6,8 @@ use super::super::model::Model;
 use super::super::noise::estimate_noise;
 use super::super::record::Record;
 use super::super::verdict::Verdict;
-use super::diagnose;
+use super::tracking::{Resolution, track};
+use super::{UNCAUSED, diagnose};
 use crate::axis::{Axis, Hold, Motion, Parameters, Scheme, Structure};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use rand::{RngExt, SeedableRng};
@@ -170,23 +171,27 @@ fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
 /// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.
 fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, late: usize) -> Record {
     let (n, dt) = (3000, 2e-3);
-    let axis = Axis::new(parameters, Structure::TwoInertia, effects, Scheme::Exact, 0.5 * dt);
+    // Fine enough for all that the effects do.
+    let fine = 16;
+    let h = dt / f64::from(fine);
+    let axis = Axis::new(parameters, Structure::TwoInertia, effects, Scheme::Exact, h);
     let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
     let acts = |t: f64| {
         let tones = [(2.1, 0.3), (5.3, 1.7), (9.7, 4.1), (17.3, 2.9), (31.1, 5.3)];
         amplitude * tones.iter().map(|(w, p)| (w * t + p).sin()).sum::<f64>()
     };
+    let late = late * fine as usize / 2;
     let mut past = vec![0.0; late + 1];
     let (mut torque, mut motor, mut table) = (Vec::new(), Vec::new(), Vec::new());
-    for k in 0..2 * n {
-        let t = 0.5 * dt * f64::from(k);
+    for k in 0..fine * n {
+        let t = h * f64::from(k);
         past.push(state.theta2());
-        if k % 2 == 0 {
+        if k % fine == 0 {
             torque.push(acts(t));
             motor.push(state.theta1());
             table.push(past[past.len() - 1 - late]);
         }
-        let held = acts(t - 0.5 * dt * f64::from(k % 2));
+        let held = acts(t - h * f64::from(k % fine));
         state = axis.advance(&state, Ramp { start: held, end: held }, t);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -265,7 +270,7 @@ fn noise_of_1_over_f_on_an_axis_that_hardly_moves_is_no_gap() {
     let o = diagnosed_as(&record, Structure::TwoInertia, paper);
     assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{:?}", o.decision.verdict);
     // More of the torque is left than a measured current is off by.
-    assert!(o.diagnosis.remainder.share > super::UNCAUSED, "{:?}", o.diagnosis.remainder);
+    assert!(o.diagnosis.remainder.share > UNCAUSED, "{:?}", o.diagnosis.remainder);
 }
 
 #[test]
@@ -292,6 +297,20 @@ fn inertias_whose_sum_alone_slow_motion_shows_are_told_apart_by_the_little_that_
     let off = [found.i1 / screw.i1, found.i2 / screw.i2, found.k / screw.k].map(|r| (r - 1.0).abs());
     assert!(off.iter().all(|o| *o < 0.03), "{off:?}");
     assert!(o.diagnosis.remainder.noise_multiple < 1.1, "{:?}", o.diagnosis.remainder);
+}
+
+#[test]
+fn the_common_factor_of_all_at_the_table_is_found_beside_its_friction() {
+    // The table's equation knows no torque but by this factor, and itself a hundred times better than the motor's knows the factor.
+    let screw = Parameters { i1: 1.63e-3, i2: 9.4e-4, b: 0.038, k: 449.0, rho: 1.0 };
+    let nominal = Parameters { i2: 0.8 * screw.i2, b: 0.8 * screw.b, k: 0.8 * screw.k, ..screw };
+    let friction = with(&[(Effect::CoulombTable, 0, 0.15), (Effect::ViscousMotor, 0, 0.01)]);
+    let o = diagnosed_as(&of_two_inertias(screw, friction, 0.7, 0), Structure::TwoInertia, nominal);
+    assert_eq!(named(&o), ["dry_friction", "viscous_friction"], "{:#?}", told(&o));
+    let found = o.improved.parameters;
+    let level = o.improved.effects.of(Effect::CoulombTable)[0] / 0.15;
+    let off = [found.i2 / screw.i2, found.k / screw.k, level].map(|r| (r - 1.0).abs());
+    assert!(off.iter().all(|o| *o < 3e-3), "{off:?}");
 }
 
 /// A motor with a third inertia on a spring, which swings from the record's first sample on where it is `plucked`.
@@ -325,4 +344,42 @@ fn a_mode_that_swings_when_a_short_record_begins_is_no_sine_beside_it() {
         let frequency = (mode[1] / mode[0]).sqrt();
         assert!((frequency / 70.0 - 1.0).abs() < 0.02, "{plucked} {frequency}");
     }
+}
+
+#[test]
+fn a_log_read_early_is_followed_with_the_torque_to_come() {
+    // Read 1.3 samples after its stamp: coasting there is off by half the acceleration times the square of that time.
+    let (early, n) = (1.3 * DT, 400);
+    let torque = |k: usize| [1.0, -2.0, 0.5, 3.0][k / 7 % 4];
+    let axis = |h: f64| Axis::new(parameters(INERTIA), Structure::Rigid, Settings::default(), Scheme::Exact, h);
+    let (to_reading, on) = (axis(early - DT), axis(2.0 * DT - early));
+    let held = |k: usize| Ramp { start: torque(k), end: torque(k) };
+    // A sample is read within the interval after the next one.
+    let mut state = axis(DT).advance(&axis(DT).state(0.0, 0.0, 0.0, 0.0, 0.0), held(0), 0.0);
+    let mut theta = Vec::new();
+    for k in 0..n {
+        let read = to_reading.advance(&state, held(k + 1), 0.0);
+        theta.push(read.theta1());
+        state = on.advance(&read, held(k + 1), 0.0);
+    }
+    let record = Record {
+        start: 0.0,
+        dt: DT,
+        hold: Hold::Zoh,
+        torque: (0..n).map(torque).collect(),
+        between: None,
+        channels: [Some(theta), None, None, None],
+        noise: [1e-9; 4],
+        common_noise: 0.0,
+        idle: Vec::new(),
+    };
+    let lacks = |delay: f64| {
+        let latch = with(&[(Effect::Latch, 0, delay)]);
+        let model = Model::new(parameters(INERTIA), Structure::Rigid, latch);
+        let tracked = track(&model, &record, [2.0; 2], Resolution::Full).expect("finite");
+        tracked.torque[0][50..n - 50].iter().fold(0.0, |m: f64, t| m.max(t.abs()))
+    };
+    // What is left is the error of the speed at the record's begin, which the feedback takes out.
+    assert!(lacks(-early) < 1e-3, "{}", lacks(-early));
+    assert!(lacks(-early + 0.1 * DT) > 0.1, "{}", lacks(-early + 0.1 * DT));
 }
