@@ -7,7 +7,7 @@ use super::super::host::{HostError, Instance, Status};
 use super::lifecycle::last_words;
 use super::probe::{Learned, Probe, Snapshot, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
-use super::values::{get, set, show};
+use super::values::{get, same, set, show};
 
 /// Longest default run, in wall time; later steps are left out.
 const RUN: Duration = Duration::from_millis(500);
@@ -228,7 +228,7 @@ pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
             Err(error) => problems.push(format!(
                 "the parameter \"{name}\" can be set to {value} before initialisation, and not in initialisation mode: {error}"
             )),
-            Ok(within) if within.0 != before.0 => problems.push(format!(
+            Ok(within) if !same(&within.0, &before.0) => problems.push(format!(
                 "the parameter \"{name}\" was set to {value} in initialisation mode and reads {} after it; set before it, it reads {}",
                 show(&within.0),
                 show(&before.0)
