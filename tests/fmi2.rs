@@ -544,3 +544,25 @@ fn the_start_values_of_the_description_are_those_of_the_binary() {
         }
     }
 }
+
+/// "file" with or without an authority (FMI 2.0.4, section 2.1.5), and folders that are not there: all that the FMU needs is in
+/// its binary.
+#[test]
+fn the_run_is_the_same_however_the_uri_of_the_resources_is_written() {
+    let long = fmu().resources();
+    assert!(long.starts_with("file:///"), "{long}");
+    let run = |resources: &str| {
+        let (name, guid) = ("axis".to_owned(), fmu().description.guid.clone());
+        let options = InstanceOptions { name, guid, resources: resources.to_owned(), ..Default::default() };
+        let mut i = fmu().instantiate_with(&options).unwrap_or_else(|e| panic!("{resources}: {e}"));
+        ROUGH.iter().for_each(|(name, value)| set(&mut i, name, *value));
+        i.initialize(0.0, None).unwrap();
+        steps(&mut i, 0, 50)
+    };
+    let expected = run(&long);
+    for other in
+        [&*long.replacen("file:///", "file:/", 1), "file:/nowhere/resources", "file:///C:/my%20FMU/resources", ""]
+    {
+        assert_eq!(run(other), expected, "{other}");
+    }
+}

@@ -41,7 +41,8 @@ enum {
     GET_BEHIND, SET_BEHIND, REFERENCES_CHANGED, GET_INITIAL, SET_FIRST, SET_ORDER, SET_ONCE, STRING_KEPT, STRING_CUT,
     BOOLEAN_LATE, RESET_LABEL, RESET_EARLY, STATE_EFFECT, STATE_ONCE, ONE_SIZE, EXACT_POINT, EXACT_STOP, SLOPE_SIGN,
     TOLERANCE, ENDLESS, NAME_LONG, NAME_FORMAT, UMASK, SIGNALS_BLOCKED, TIMER, MAPPED,
-    DAEMON
+    LOG_ALWAYS, LOG_STAYS, PARAMETERS_LOST, PARAMETERS_REFUSED, PARAMETERS_LATE, RESOURCES_URI, STRING_SHORT,
+    STRING_OVERFLOW, STRING_FREED, STRING_STACK, DAEMON
 };
 #ifndef DEFECT
 #define DEFECT NONE
@@ -67,10 +68,10 @@ typedef struct {
 typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8 } Phase;
 
 typedef struct {
-    double x, v, w, F, k, d, g, time, last_step, noise, slope, stop, elapsed, shown, offset, spare;
+    double x, v, w, F, k, d, g, time, last_step, noise, slope, stop, elapsed, shown, offset, spare, first_k;
     int mode, on, calls, sets;
     Phase phase;
-    char label[32];
+    char label[1024];
 } Values;
 
 typedef struct {
@@ -94,7 +95,7 @@ static volatile double scratch;
 static Values shared_state;
 static int made, alive;
 static double kept_k = 10;
-static __thread char buffer[64];
+static __thread char buffer[1024];
 
 #define W(i) (*(IS(GLOBAL) ? &global_w : &(i)->values.w))
 
@@ -102,7 +103,7 @@ static void start(Values *s) {
     double w = s->w, k = s->k;
     memset(s, 0, sizeof *s);
     s->x = 1;
-    s->k = IS(START_VALUE) ? 11 : 10;
+    s->k = s->first_k = IS(START_VALUE) ? 11 : 10;
     s->stop = INFINITY;
     s->d = 0.5;
     s->g = 9.81;
@@ -115,7 +116,7 @@ static void start(Values *s) {
 static void log_text(Instance *i, int status, const char *category, const char *text, double value) {
     const char *name = IS(NAME_KEPT) ? i->kept_name : i->name;
     const Callbacks *callbacks = IS(CALLBACKS) ? i->kept : &i->callbacks;
-    if ((i->logging || status > WARNING) && callbacks->logger)
+    if ((i->logging || status > WARNING || IS(LOG_ALWAYS)) && callbacks->logger)
         callbacks->logger(callbacks->environment, name, status, category, "%s, %g", text, value);
 }
 
@@ -139,6 +140,12 @@ EXPORT void eixo_corpus_reference(void) { eixo_corpus_no_such_function(); }
 __attribute__((destructor)) static void unload(void) { abort(); }
 #endif
 
+/* The path of a URI file:/path or file:///path, as it is written there. */
+static const char *path_of(const char *uri) {
+    uri += strncmp(uri, "file:", 5) ? 0 : 5;
+    return strncmp(uri, "//", 2) ? uri : uri + 2;
+}
+
 EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                                  const Callbacks *callbacks, int visible, int logging) {
     (void)visible;
@@ -152,7 +159,7 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
     if (IS(RESOURCES)) {
         struct stat info;
         char path[4096];
-        snprintf(path, sizeof path, "%s", resources + strlen("file://"));
+        snprintf(path, sizeof path, "%s", path_of(resources));
         if (stat(path, &info) && !strchr(path, '%')) *(volatile int *)8 = 1;
     }
     Instance *i = callbacks->allocate(1, sizeof(Instance));
@@ -178,9 +185,10 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
     alive++;
     if (IS(RESOURCES_PATH)) {
         char path[4096];
-        snprintf(path, sizeof path, "%s/data.txt", resources + strlen("file://"));
+        snprintf(path, sizeof path, "%s/data.txt", path_of(resources));
         if (access(path, R_OK)) return NULL;
     }
+    if (IS(RESOURCES_URI) && strncmp(resources, "file://", 7)) return NULL;
     if (IS(LOCALE_NUMBERS)) i->values.d = strtod("0.5", NULL);
     if (IS(LEAK)) i->leaks = malloc(1000);
     if (IS(LEAK_LARGE)) i->leaks = malloc(100000);
@@ -210,6 +218,7 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
     if (IS(SIGNALS)) signal(SIGINT, SIG_IGN);
     if (IS(ENVIRONMENT)) setenv("EIXO_CORPUS", "1", 1);
     if (IS(NAME_LONG)) strcpy(i->small = malloc(32), name);
+    if (IS(STRING_OVERFLOW)) i->small = malloc(32);
     if (IS(NAME_FORMAT)) {
         char text[4096];
         snprintf(text, sizeof text, name);
@@ -248,7 +257,7 @@ EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const char 
     Instance *i = c;
     (void)categories;
     if (IS(DEBUG_LOGGING) && count) return fail(i, "no such category");
-    i->logging = on;
+    if (!IS(LOG_STAYS) || on) i->logging = on;
     return OK;
 }
 
@@ -276,6 +285,7 @@ EXPORT Status fmi2EnterInitializationMode(Component c) {
     if (IS(GLOBAL)) global_w = 0;
     if (IS(INITIAL_KEPT) && i->initialised) i->values.x = i->first_x;
     if (IS(KEPT)) kept_k = i->values.k;
+    i->values.first_k = i->values.k;
     i->values.phase = INITIALIZING;
     return OK;
 }
@@ -285,6 +295,7 @@ EXPORT Status fmi2ExitInitializationMode(Component c) {
     if (in(i, INITIALIZING, "fmi2ExitInitializationMode")) return ERROR;
     if (IS(INITIALISE)) return fail(i, "no solution");
     if (IS(INPUTS_LOST)) i->values.F = 0;
+    if (IS(PARAMETERS_LOST)) i->values.k = i->values.first_k;
     i->first_x = i->values.x;
     i->initialised = 1;
     i->values.shown = i->values.v;
@@ -307,7 +318,7 @@ EXPORT Status fmi2Reset(Component c) {
     Instance *i = c;
     if (!i) return ERROR;
     double w = i->values.w, k = i->values.k, slope = i->values.slope;
-    char label[32];
+    char label[sizeof i->values.label];
     memcpy(label, i->values.label, sizeof label);
     if (IS(RESET_EARLY) && i->values.phase == INITIALIZING) return fail(i, "not initialised yet");
     if (IS(RESET_CRASH)) *(volatile int *)8 = 1;
@@ -325,7 +336,7 @@ EXPORT Status fmi2Reset(Component c) {
 static double acceleration(const Instance *i, double x, double v, double w) {
     const Values *s = &i->values;
     double late = IS(STATE_LATE) && s->elapsed > 0.8 ? 0.5 : 0;
-    return s->F - s->k * x - s->d * v - 0.2 * w + 0.1 * s->on + 0.01 * s->mode + late;
+    return s->F - (IS(PARAMETERS_LATE) ? s->first_k : s->k) * x - s->d * v - 0.2 * w + 0.1 * s->on + 0.01 * s->mode + late;
 }
 
 static void rate(const Instance *i, const double s[3], double after, double d[3]) {
@@ -518,6 +529,16 @@ EXPORT Status fmi2GetBoolean(Component c, const uint32_t r[], size_t count, int 
     return OK;
 }
 
+static const char *text_of(const Values *s) { return fabs(s->v) > 1e-3 ? "moving" : "at rest"; }
+
+/* A text in memory that the next call takes. */
+static const char *on_the_stack(const char *text) {
+    char copy[64];
+    char *volatile gone = copy;
+    snprintf(copy, sizeof copy, "%s", text);
+    return gone;
+}
+
 EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const char *value[]) {
     Instance *i = c;
     Values *s = &i->values;
@@ -525,13 +546,24 @@ EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const
     if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetString")) return ERROR;
     for (n = 0; n < count; n++) {
         if (IS(STRING_BUFFER) && r[n] < 2) {
-            snprintf(buffer, sizeof buffer, "%s", r[n] ? fabs(s->v) > 1e-3 ? "moving" : "at rest" : s->label);
+            snprintf(buffer, sizeof buffer, "%s", r[n] ? text_of(s) : s->label);
             value[n] = buffer;
+            continue;
+        }
+        if ((IS(STRING_FREED) || IS(STRING_STACK)) && r[n] < 2) {
+            const char *text = r[n] ? text_of(s) : s->label;
+            if (IS(STRING_STACK)) {
+                value[n] = on_the_stack(text);
+                continue;
+            }
+            char *copy = strdup(text);
+            free(copy);
+            value[n] = copy;
             continue;
         }
         switch (r[n]) {
         case 0: value[n] = IS(STRING_KEPT) && i->kept_label ? i->kept_label : s->label; break;
-        case 1: value[n] = IS(STRING_NULL) ? NULL : IS(STRING_LATIN) ? "bewegt \xe4" : fabs(s->v) > 1e-3 ? "moving" : "at rest"; break;
+        case 1: value[n] = IS(STRING_NULL) ? NULL : IS(STRING_LATIN) ? "bewegt \xe4" : text_of(s); break;
         default: return fail(i, "unknown reference");
         }
     }
@@ -561,6 +593,7 @@ EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const d
             break;
         case 8:
             if (!before && !IS(FIXED_ACCEPTED)) return fail(i, "k is fixed");
+            if (IS(PARAMETERS_REFUSED) && s->phase == INITIALIZING) return fail(i, "k is fixed now");
             s->k = value[n] + (IS(SET_WRONG) ? 0.1 : 0);
             if (IS(SET_ORDER)) s->d = 0.06 * s->k;
             break;
@@ -602,8 +635,10 @@ EXPORT Status fmi2SetString(Component c, const uint32_t r[], size_t count, const
     for (n = 0; n < count; n++) {
         if (r[n] != 0) return fail(i, "unknown reference");
         if (i->values.phase == STEPPING) return fail(i, "label is fixed");
+        if (!IS(STRING_SHORT) && strlen(value[n]) >= sizeof i->values.label) return fail(i, "too long a label");
         if (IS(STRING_KEPT)) i->kept_label = value[n];
-        snprintf(i->values.label, IS(STRING_CUT) ? 6 : sizeof i->values.label, "%s", value[n]);
+        snprintf(i->values.label, IS(STRING_CUT) ? 6 : IS(STRING_SHORT) ? 32 : sizeof i->values.label, "%s", value[n]);
+        if (IS(STRING_OVERFLOW)) strcpy(i->small, value[n]);
     }
     return OK;
 }

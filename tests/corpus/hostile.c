@@ -9,25 +9,32 @@ static void hostile(void);
 #include <arpa/inet.h>
 #include <dirent.h>
 #include <fcntl.h>
+#include <mqueue.h>
+#include <sys/inotify.h>
 #include <sys/ipc.h>
 #include <sys/mman.h>
 #include <sys/mount.h>
 #include <sys/prctl.h>
 #include <sys/ptrace.h>
+#include <sys/resource.h>
 #include <sys/shm.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/time.h>
 #include <sys/types.h>
+#include <sys/uio.h>
 #include <sys/un.h>
 #include <sys/wait.h>
+#include <sys/xattr.h>
 #include <sched.h>
 
 enum {
     WRITE, APPEND, DELETE, RENAME, FOLDER, SYMLINK, HARDLINK, MODE, CUT, TIMES, OWNER, READ, READ_PASSWORDS, READ_PARENT,
     LIST_HOME, TCP, UDP, LOCAL_SOCKET, FORK, BOMB, DETACH, SHELL, EXECUTE, KILL_PARENT, KILL_ALL, TRACE, FILL, PRINT, LINK_IN_TMP,
     LINK_FOLDER, THREADS_MANY, MEMORY, HANG, SEGMENT, ANONYMOUS_FILE, MOUNT, NAMESPACE, CLOSE_ALL, WRITE_ALL, OUTLIVE, DEVICE,
-    PRIORITY_LIMITS, OTHERS_MEMORY
+    PRIORITY_LIMITS, OTHERS_MEMORY, TCP_OVER_6, PAIRED_DATAGRAM, NETLINK, RING, SIGNAL_BY_FILE, SIGNAL_BY_DESCRIPTOR, PARENT_MEMORY,
+    PARENT_PRIORITY, PARENT_LIMITS, WATCH_HOME, OTHERS_SEGMENTS, QUEUE, KEYRING, ATTRIBUTE, NODE, NEW_MOUNT,
+    HANDLE, HOST_NAME
 };
 
 static char path[4096];
@@ -143,5 +150,73 @@ static void hostile(void) {
         break;
     }
     case OTHERS_MEMORY: snprintf(other, sizeof other, "/proc/%d/mem", getppid()); leak(other); leak("/proc/1/environ"); break;
+    case TCP_OVER_6: {
+        /* The test's address, written as one of IPv6. */
+        struct sockaddr_in6 to = {.sin6_family = AF_INET6, .sin6_port = htons((uint16_t)atoi(getenv("EIXO_PORT")))};
+        int fd = socket(AF_INET6, SOCK_STREAM, 0);
+        inet_pton(AF_INET6, "::ffff:127.0.0.1", &to.sin6_addr);
+        if (fd >= 0) connect(fd, (struct sockaddr *)&to, sizeof to);
+        break;
+    }
+    case PAIRED_DATAGRAM: {
+        /* A pair is made without socket(), and one end of it sends to whom it likes. */
+        static const int kinds[] = {SOCK_DGRAM, SOCK_RAW};
+        struct sockaddr_un to = {.sun_family = AF_UNIX};
+        int pair[2];
+        snprintf(to.sun_path, sizeof to.sun_path, "%s", canary("d"));
+        for (n = 0; n < 2; n++)
+            if (socketpair(AF_UNIX, kinds[n], 0, pair) == 0) sendto(pair[0], "harm", 4, 0, (struct sockaddr *)&to, sizeof to);
+        break;
+    }
+    case NETLINK: if (socket(AF_NETLINK, SOCK_RAW, 0) >= 0) puts("LEAK"); break;
+    case RING: { char room[256] = {0}; if (syscall(SYS_io_uring_setup, 4, room) >= 0) puts("LEAK"); break; }
+    case SIGNAL_BY_FILE: {
+        /* The kernel sends a pipe's signal to its owner, whoever that is said to be. */
+        struct { int type, pid; } owner = {1, getppid()};
+        int ends[2];
+        if (pipe(ends)) break;
+        fcntl(ends[0], F_SETOWN, getppid());
+        fcntl(ends[0], F_SETOWN_EX, &owner);
+        fcntl(ends[0], F_SETSIG, SIGKILL);
+        fcntl(ends[0], F_SETFL, O_ASYNC);
+        if (fcntl(ends[0], F_GETOWN) == getppid()) puts("LEAK");
+        if (write(ends[1], "harm", 4) < 0) puts("nothing sent");
+        break;
+    }
+    case SIGNAL_BY_DESCRIPTOR: {
+        int fd = (int)syscall(434 /* pidfd_open */, getppid(), 0);
+        if (fd >= 0) puts("LEAK"), syscall(424 /* pidfd_send_signal */, fd, SIGKILL, NULL, 0);
+        break;
+    }
+    case PARENT_MEMORY: {
+        struct iovec mine = {other, 16}, theirs = {(void *)hostile, 16};
+        if (process_vm_readv(getppid(), &mine, 1, &theirs, 1, 0) > 0) puts("LEAK");
+        if (process_vm_writev(getppid(), &mine, 1, &theirs, 1, 0) > 0) puts("LEAK");
+        break;
+    }
+    case PARENT_PRIORITY:
+        if (setpriority(PRIO_PROCESS, getppid(), 19) == 0 || setpriority(PRIO_USER, 0, 19) == 0) puts("LEAK");
+        break;
+    case PARENT_LIMITS: {
+        struct { unsigned long now, most; } limit = {3, 3};
+        if (syscall(SYS_prlimit64, getppid(), RLIMIT_NOFILE, &limit, NULL) == 0) puts("LEAK");
+        break;
+    }
+    case WATCH_HOME: if (inotify_add_watch(inotify_init(), getenv("HOME"), IN_ALL_EVENTS) >= 0) puts("LEAK"); break;
+    case OTHERS_SEGMENTS: { struct shmid_ds room; if (shmctl(0, 14 /* SHM_INFO */, &room) >= 0) puts("LEAK"); break; }
+    case QUEUE: if (mq_open("/eixo", O_CREAT | O_RDWR, 0600, NULL) >= 0) puts("LEAK"), mq_unlink("/eixo"); break;
+    case KEYRING: if (syscall(SYS_add_key, "user", "eixo", "harm", 4, -4 /* the user's */) >= 0) puts("LEAK"); break;
+    case ATTRIBUTE: if (setxattr(canary("file"), "user.harm", "harm", 4, 0) == 0) puts("LEAK"); break;
+    case NODE: mknod(canary("node"), S_IFIFO | 0666, 0); break;
+    case NEW_MOUNT: if (syscall(430 /* fsopen */, "tmpfs", 0) >= 0) puts("LEAK"); break;
+    case HANDLE: {
+        struct { struct file_handle head; char rest[128]; } handle = {.head.handle_bytes = 128};
+        int mount, fd;
+        if (name_to_handle_at(AT_FDCWD, canary("file"), &handle.head, &mount, 0)) break;
+        fd = open_by_handle_at(AT_FDCWD, &handle.head, O_RDWR);
+        if (fd >= 0) puts("LEAK");
+        break;
+    }
+    case HOST_NAME: if (gethostname(other, sizeof other) == 0 && sethostname(other, strlen(other)) == 0) puts("LEAK"); break;
     }
 }

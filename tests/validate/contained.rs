@@ -121,11 +121,21 @@ fn interrupt(arguments: &[&str], rounds: u32) {
         let signal = ["-INT", "-TERM", "-KILL"][round as usize % 3];
         let _ = Command::new("kill").args([signal, &child.id().to_string()]).stderr(Stdio::null()).status();
         child.wait().unwrap();
+        // An FMU that is written has its name when it is whole.
+        if let Ok(file) = std::fs::File::open(folder.path().join("written.fmu")) {
+            let mut archive = zip::ZipArchive::new(file).unwrap();
+            for at in 0..archive.len() {
+                std::io::copy(&mut archive.by_index(at).unwrap(), &mut std::io::sink()).unwrap();
+            }
+        }
     }
     assert!(ended >= rounds / 3, "{ended} of {rounds} were ended while they ran");
     assert_eq!(start().wait().unwrap().code(), Some(0));
     let left: Vec<_> = std::fs::read_dir(&temporary).unwrap().flatten().map(|e| e.path()).collect();
     assert!(left.is_empty(), "{arguments:?} left {left:?}");
+    let entries = std::fs::read_dir(folder.path()).unwrap().flatten().map(|e| e.file_name());
+    let strays: Vec<_> = entries.filter(|name| name.to_string_lossy().starts_with(".eixo-")).collect();
+    assert!(strays.is_empty(), "{arguments:?} left {strays:?}");
     // A child dies with its parent, if not in the same instant.
     for _ in 0..100 {
         if super::cli::processes_with(&temporary).is_empty() {
@@ -147,5 +157,14 @@ fn a_hundred_interruptions_of_simulate_leave_nothing_for_the_run_after() {
 fn a_hundred_interruptions_of_validate_leave_nothing_for_the_run_after() {
     if corpus::compiler() {
         interrupt(&["validate", "model.fmu", "--only", "simulate,reset"], 100);
+    }
+}
+
+/// Each takes most of a second here: thirty, or as many as the variable says.
+#[test]
+fn interruptions_of_export_leave_nothing_for_the_run_after() {
+    if corpus::compiler() {
+        let rounds = std::env::var("EIXO_INTERRUPTIONS").map_or(30, |n| n.parse().expect("a number"));
+        interrupt(&["export", "written.fmu", "--check"], rounds);
     }
 }

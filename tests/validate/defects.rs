@@ -151,6 +151,16 @@ pub const DEFECTS: &[(&str, &str)] = &[
     ("TIMER", "side-process"),
     ("MAPPED", "step-leak"),
     ("FORGES", "simulate"),
+    ("LOG_ALWAYS", "logging-off"),
+    ("LOG_STAYS", "logging-off"),
+    ("PARAMETERS_LOST", "parameters-initial"),
+    ("PARAMETERS_REFUSED", "parameters-initial"),
+    ("PARAMETERS_LATE", "parameters-initial"),
+    ("RESOURCES_URI", "resources-uri"),
+    ("STRING_SHORT", "set-get-other"),
+    ("STRING_OVERFLOW", "set-get-other"),
+    ("STRING_FREED", "string-values"),
+    ("STRING_STACK", "string-values"),
 ];
 
 pub fn mutants() -> Vec<Mutant> {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::net::{TcpListener, UdpSocket};
 use std::os::unix::fs::MetadataExt;
-use std::os::unix::net::UnixListener;
+use std::os::unix::net::{UnixDatagram, UnixListener};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -78,6 +78,8 @@ fn thirty_and_more_hostile_fmus_do_no_harm() {
         tcp.set_nonblocking(true).unwrap();
         udp.set_nonblocking(true).unwrap();
         local.set_nonblocking(true).unwrap();
+        let post = UnixDatagram::bind(canary.join("d")).unwrap();
+        post.set_nonblocking(true).unwrap();
         let mut archive = files(DESCRIPTION);
         archive[1].1 = binary(act, &build);
         let fmu = root.path().join("hostile.fmu");
@@ -113,7 +115,8 @@ fn thirty_and_more_hostile_fmus_do_no_harm() {
         if (state(&canary), state(&home)) != before {
             wrong.push("changed what is not its own".to_owned());
         }
-        if tcp.accept().is_ok() || udp.recv(&mut [0; 8]).is_ok() || local.accept().is_ok() {
+        let datagram = udp.recv(&mut [0; 8]).is_ok() || post.recv(&mut [0; 8]).is_ok();
+        if tcp.accept().is_ok() || datagram || local.accept().is_ok() {
             wrong.push("came through to a socket".to_owned());
         }
         if std::fs::read_dir(&temporary).unwrap().count() > 0 {

@@ -15,7 +15,7 @@ const BINARY: &str = "binaries/x86_64-linux/corpus.so";
 
 /// Defects of what FMI 3.0 does not have, or has otherwise: input derivatives, allocation callbacks, a callbacks structure,
 /// the types platform, pending steps to cancel.
-const NOT_OF_3: [&str; 17] = [
+const NOT_OF_3: [&str; 20] = [
     "PLATFORM",
     "CANCEL",
     "INPUT_DERIVATIVE",
@@ -33,6 +33,9 @@ const NOT_OF_3: [&str; 17] = [
     "SET_ONCE",
     "STRING_KEPT",
     "STRING_CUT",
+    "STRING_SHORT",
+    "STRING_OVERFLOW",
+    "RESOURCES_URI",
     "RESET_LABEL",
 ];
 

@@ -85,6 +85,10 @@ fn record(outcome: Outcome, keep: &Host) -> Result<Record, SimulateError> {
     let refused = outcome.refused.map_or(String::new(), |what| {
         format!("; it asked for {what}, which the sandbox refuses: run it without --sandbox if you trust its maker")
     });
+    let answer = outcome.answer.as_deref().and_then(Answer::decode);
+    if let Some(internal) = answer.as_ref().and_then(|(answer, _)| answer.internal_error()) {
+        return fail(format!("{internal}{within}"));
+    }
     // Before the library is loaded, nothing of the FMU has run.
     if outcome.last == host::abi::CALLS[0] && outcome.answer.is_none() {
         return fail(format!("no process could be had to run the FMU in: {}", outcome.stderr.trim()));
@@ -102,7 +106,7 @@ fn record(outcome: Outcome, keep: &Host) -> Result<Record, SimulateError> {
         Ended::Forges => return fail(format!("the FMU wrote to its host's own descriptor{within}")),
         Ended::Well => {}
     }
-    let Some((Answer { error, record, .. }, numbers)) = outcome.answer.as_deref().and_then(Answer::decode) else {
+    let Some((Answer { error, record, .. }, numbers)) = answer else {
         return fail(format!("the FMU ended its host's process{within} with exit code 0"));
     };
     if let Some(error) = error {

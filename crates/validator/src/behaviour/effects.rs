@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::super::host::abuse;
-use super::super::host::{HostError, InstanceOptions, LogMessage};
+use super::super::host::{HostError, InstanceOptions, LogMessage, Status};
 use super::measure;
 use super::probe::{Probe, Tested, not_applicable};
 use super::{Instance, Setup};
@@ -154,6 +154,44 @@ pub(in super::super) fn debug_logging(p: &Probe) -> Tested {
         problems.push(format!("switching logging off: {error}"));
     }
     Ok(problems)
+}
+
+/// Debug logging that is off, by `fmi2Instantiate` (section 2.1.5) or by the last `fmi2SetDebugLogging`. Messages that go
+/// with fmi2Warning and worse are due all the same: "the function logger was called by the model" (section 2.1.3).
+pub(in super::super) fn logging_off(p: &Probe) -> Tested {
+    let ways = [
+        (false, "made with loggingOn = fmi2False"),
+        (true, "whose debug logging fmi2SetDebugLogging has switched off"),
+    ];
+    for (on, how) in ways {
+        if on && p.interface().only_once {
+            break;
+        }
+        let options = InstanceOptions { logging: on, ..p.options() };
+        let mut instance = Instance::new(Arc::clone(&p.binary), None, &options)?;
+        // That this succeeds is another rule's.
+        if on && instance.set_debug_logging(false, &[]).is_err() {
+            break;
+        }
+        if on {
+            let _ = instance.take_log();
+        }
+        p.enter(&mut instance)?;
+        instance.exit_initialization()?;
+        p.run(&mut instance, 0, 5)?;
+        instance.terminate()?;
+        let log = instance.take_log();
+        let mut idle = log.iter().filter(|m| m.status == Status::Ok);
+        if let Some(first) = idle.next() {
+            let (text, count) = (first.message.chars().take(80).collect::<String>(), 1 + idle.count());
+            let category = &first.category;
+            // One that does not look at loggingOn fails in both ways.
+            return Ok(vec![format!(
+                "an instance {how} logs all the same: {count} messages with fmi2OK, first {text:?} of {category:?}"
+            )]);
+        }
+    }
+    Ok(vec![])
 }
 
 pub(in super::super) fn log_categories(p: &Probe) -> Tested {

@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::description::{BaseType, Causality};
+use super::super::description::{BaseType, Causality, Value, Variable};
 use super::super::host::{HostError, Instance, Status};
 use super::lifecycle::last_words;
-use super::probe::{Learned, Probe, Tested, not_applicable, not_tested};
+use super::probe::{Learned, Probe, Snapshot, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
+use super::values::{get, same, set, show};
 
 /// Longest default run, in wall time; later steps are left out.
 const RUN: Duration = Duration::from_millis(500);
@@ -165,7 +166,7 @@ pub(in super::super) fn inputs_initial(p: &Probe) -> Tested {
             match attempt(early) {
                 Ok(Some(after)) => {
                     any = true;
-                    let own = matches!(v.start, Some(super::super::description::Value::Real(start)) if start == after);
+                    let own = matches!(v.start, Some(Value::Real(start)) if start == after);
                     if own {
                         problems.push(format!(
                             "the input \"{}\" was set to {value} {when} and reads {after} after it",
@@ -182,6 +183,64 @@ pub(in super::super) fn inputs_initial(p: &Probe) -> Tested {
         }
     }
     if any { Ok(problems) } else { not_applicable("there is no Real input to be set before the run") }
+}
+
+/// Parameters set in initialisation mode, where that is allowed "for a variable with variability != constant that has
+/// initial = exact" (section 4.2.4), act as those set before it.
+pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
+    let parameter = |v: &&Variable| v.causality == Causality::Parameter && settable(v);
+    let other = |v| settable_real(p, v).map(Value::Real).or_else(|| super::settings::another(p, v));
+    let chosen = p.d.variables.iter().filter(parameter).filter_map(|v| Some((v, other(v)?))).take(20);
+    let chosen: Vec<(&Variable, Value)> = chosen.collect();
+    if chosen.is_empty() {
+        return not_applicable("there is no parameter with another value to set");
+    }
+    let n = p.steps();
+    p.affordable((2 * chosen.len() + 1) * n)?;
+    let mut instance = p.ready()?;
+    let expected = p.run(&mut instance, 0, n)?;
+    instance.free();
+    let (mut problems, mut any) = (Vec::new(), false);
+    for (v, value) in &chosen {
+        let _venture = super::super::host::venture();
+        let run = |early: bool| -> Result<(Value, Vec<Snapshot>), HostError> {
+            let mut instance = p.instantiate()?;
+            if early {
+                set(&mut instance, v, value)?;
+            }
+            p.enter(&mut instance)?;
+            if !early {
+                set(&mut instance, v, value)?;
+            }
+            instance.exit_initialization()?;
+            Ok((get(&mut instance, v)?, p.run(&mut instance, 0, n)?))
+        };
+        // What cannot be set at all, or fails with that value, is another rule's.
+        let (before, within) = match (run(true), run(false)) {
+            (Err(HostError::OnlyOnce), _) | (_, Err(HostError::OnlyOnce)) => return Err(HostError::OnlyOnce.into()),
+            (Err(_), _) => continue,
+            (Ok(before), within) => (before, within),
+        };
+        any = true;
+        let (name, value) = (&v.name, show(value));
+        let own = [v.value_reference];
+        match within {
+            Err(error) => problems.push(format!(
+                "the parameter \"{name}\" can be set to {value} before initialisation, and not in initialisation mode: {error}"
+            )),
+            Ok(within) if !same(&within.0, &before.0) => problems.push(format!(
+                "the parameter \"{name}\" was set to {value} in initialisation mode and reads {} after it; set before it, it reads {}",
+                show(&within.0),
+                show(&before.0)
+            )),
+            Ok(within) if p.answers(&expected, &before.1, &own) && !p.answers(&expected, &within.1, &own) => problems
+                .push(format!(
+                    "the parameter \"{name}\" set to {value} in initialisation mode changes nothing; set before it, it does"
+                )),
+            Ok(_) => {}
+        }
+    }
+    if any { Ok(problems) } else { not_tested("the FMU does not run with other parameters than its own") }
 }
 
 /// "In this state, the solution at the final time can be retrieved" (terminated, section 4.2.4).

@@ -26,6 +26,8 @@ pub struct Learned {
     pub observe_all: bool,
     /// Variables that differ between equal runs, by type and value reference: compared no more.
     pub masked: Vec<(u8, u32)>,
+    /// References of Strings that are no texts, which is told once: to the other rules they are of variables of the FMU's own.
+    pub no_texts: Vec<u32>,
     /// Communication steps that fit into a comparison of a slow FMU, or one that ends early; 0 is not known.
     pub steps: usize,
     /// Wall time of a step, in s.
@@ -125,12 +127,18 @@ impl Probe {
     }
 
     pub(super) fn with(
-        d: Description,
+        mut d: Description,
         folder: PathBuf,
         binary_path: PathBuf,
         binary: Arc<Binary>,
         learned: Learned,
     ) -> Self {
+        for v in &mut d.variables {
+            if v.base() == BaseType::String && learned.no_texts.contains(&v.value_reference) {
+                (v.causality, v.variability) = (Causality::Local, Variability::Discrete);
+                (v.declared_initial, v.start) = (None, None);
+            }
+        }
         let e = d.default_experiment.unwrap_or_default();
         let start = e.start_time.unwrap_or(0.0);
         let stop = e.stop_time.filter(|&stop| stop > start);
@@ -160,7 +168,8 @@ impl Probe {
     }
 
     fn choose_observed(&mut self) {
-        let masked: HashSet<(u8, u32)> = self.learned.masked.iter().copied().collect();
+        let no_texts = self.learned.no_texts.iter().map(|&r| (type_index(BaseType::String) as u8, r));
+        let masked: HashSet<(u8, u32)> = self.learned.masked.iter().copied().chain(no_texts).collect();
         let mut seen = HashSet::new();
         let mut chosen: [Vec<Observed>; 4] = Default::default();
         for outputs in [true, false] {

@@ -73,7 +73,8 @@ pub(in super::super) fn empty(p: &Probe) -> Tested {
     Ok(failed.map(|(name, status)| format!("{name} of no variables at all returned {status}")).collect())
 }
 
-pub(in super::super) fn string_values(p: &Probe) -> Tested {
+/// Texts are texts, and stay what they are until the FMU is called again. Other rules leave alone those that are not.
+pub(in super::super) fn string_values(p: &mut Probe) -> Tested {
     let strings: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::String).collect();
     if strings.is_empty() {
         return not_applicable("there is no String variable");
@@ -82,13 +83,17 @@ pub(in super::super) fn string_values(p: &Probe) -> Tested {
     p.run(&mut instance, 0, 3)?;
     let references: Vec<u32> = strings.iter().map(|v| v.value_reference).collect();
     let values = instance.get_string_raw(&references)?;
-    let wrong = strings.iter().zip(values).filter_map(|(v, value)| Some((v, value.err()?)));
-    Ok(wrong.map(|(v, what)| format!("\"{}\" is {what}", v.name)).collect())
+    let wrong: Vec<_> = strings.iter().zip(values).filter_map(|(v, value)| Some((v, value.err()?))).collect();
+    let problems = wrong.iter().map(|(v, what)| format!("\"{}\" is {what}", v.name)).collect();
+    let no_texts = wrong.iter().map(|(v, _)| v.value_reference).collect();
+    p.learned.no_texts = no_texts;
+    Ok(problems)
 }
 
 /// Texts read together are those read one by one.
 pub(in super::super) fn string_buffers(p: &Probe) -> Tested {
-    let strings: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::String).take(50).collect();
+    let text = |v: &&Variable| v.base() == BaseType::String && !p.learned.no_texts.contains(&v.value_reference);
+    let strings: Vec<&Variable> = p.d.variables.iter().filter(text).take(50).collect();
     if strings.len() < 2 {
         return not_applicable("there are no two String variables");
     }

@@ -52,6 +52,23 @@ pub(in super::super) fn resources(setup: &Setup) -> Tested {
         .collect())
 }
 
+/// "Mandatory: file with absolute path (either including or omitting the authority component)" (section 2.1.5): the
+/// resources as file:/path, which is how Java writes the URI that others write as file:///path.
+pub(in super::super) fn short_uri(setup: &Setup) -> Tested {
+    let p = setup.probe()?;
+    if p.interface().only_once {
+        return super::probe::not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
+    }
+    let uri = resource_location(&p.folder, p.d.fmi);
+    let expected = run(&p, uri.clone())?;
+    let what = match run(&p, uri.replacen("file:///", "file:/", 1)) {
+        Ok(found) => p.difference_beyond_tolerance(&expected, &found, 0),
+        Err(error) => Some(error.to_string()),
+    };
+    std::mem::forget(p);
+    Ok(what.map(|what| format!("with resources at file:/... instead of file:///..., {what}")).into_iter().collect())
+}
+
 /// A locale of numbers as the GNU C library stores one: a decimal comma, no grouping. (glibc, locale/loadlocale.c and
 /// locale/categories.def: magic 0x20031115 XOR the category, number of fields, offsets, fields.)
 fn comma() -> Vec<u8> {

@@ -37,7 +37,8 @@ pub(super) fn show(value: &Value) -> String {
     }
 }
 
-fn same(a: &Value, b: &Value) -> bool {
+/// Whether two values are the same but for what printing takes off them.
+pub(super) fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Real(x), Value::Real(y)) => {
             // What is next to nothing beside 1 may print as 0.

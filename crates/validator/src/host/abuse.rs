@@ -100,6 +100,42 @@ pub(crate) fn null_component(binary: &Binary, fmi: Fmi) {
     );
 }
 
+/// Uses stack and heap as a host may between two calls: what an FMU has freed, or left on the stack, is gone then.
+#[inline(never)]
+fn use_memory() {
+    /// Nothing that a text begins with, and an end every so often.
+    const RUBBISH: [u8; 16] = *b"\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\0";
+    let stack = std::hint::black_box([RUBBISH; 1024]);
+    let blocks: Vec<Vec<[u8; 16]>> = (1..=64).flat_map(|size| std::iter::repeat_n(vec![RUBBISH; size], 8)).collect();
+    std::hint::black_box((&stack, &blocks));
+}
+
+/// The bytes of texts that the FMU gave; none of a null pointer.
+#[inline(never)]
+fn bytes_of(texts: &[*const c_char]) -> Vec<Option<Vec<u8>>> {
+    let bytes = |text: &*const c_char| {
+        // SAFETY: not null, and a C string by the standard's contract, until the FMU is called again.
+        (!text.is_null()).then(|| unsafe { std::ffi::CStr::from_ptr(*text) }.to_bytes().to_vec())
+    };
+    texts.iter().map(bytes).collect()
+}
+
+/// Texts that the FMU gave, each with a check: `Err` says what is wrong with it. A part of its caller, so that the stack is
+/// used from where the FMU used it.
+#[inline(always)]
+pub(super) fn steady(texts: &[*const c_char]) -> Vec<Result<String, &'static str>> {
+    let first = bytes_of(texts);
+    use_memory();
+    let check = |(first, second): (Option<Vec<u8>>, Option<Vec<u8>>)| {
+        let (Some(first), Some(second)) = (first, second) else { return Err("a null pointer") };
+        if first != second {
+            return Err("in memory that is not the FMU's any more: freed, or on the stack");
+        }
+        String::from_utf8(first).map_err(|_| "no valid UTF-8")
+    };
+    first.into_iter().zip(bytes_of(texts)).map(check).collect()
+}
+
 impl Instance {
     /// Whatever the FMU needs after instantiation it must have copied: overwrites the callbacks structure with
     /// functions that count their calls, and the three texts with rubbish.
@@ -137,7 +173,7 @@ impl Instance {
         references: &[u32],
     ) -> Result<Vec<Result<String, &'static str>>, HostError> {
         if self.three.is_some() {
-            return self.get_text3(references);
+            return self.get_text3(references, true);
         }
         let mut values = vec![std::ptr::null::<c_char>(); references.len()];
         let function = self.binary.functions.get_string.ok_or(HostError::Missing("fmi2GetString"))?;
@@ -145,15 +181,7 @@ impl Instance {
         // SAFETY: the pointers are valid for the length.
         let status = unsafe { function(self.component, references.as_ptr(), references.len(), values.as_mut_ptr()) };
         ok(Call::get_string, status)?;
-        let check = |text: &*const c_char| {
-            if text.is_null() {
-                return Err("a null pointer");
-            }
-            // SAFETY: the FMU gave a C string.
-            let bytes = unsafe { std::ffi::CStr::from_ptr(*text) }.to_bytes();
-            std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "no valid UTF-8")
-        };
-        let texts = values.iter().map(check).collect();
+        let texts = steady(&values);
         note(Call::None);
         Ok(texts)
     }

@@ -147,16 +147,11 @@ impl Instance {
         self.set_within(boolean, flags.0, flags.1);
     }
 
-    /// `fmi2SetString` with a text that lives as long as the process, or `overwritten` when the call has come back.
+    /// `fmi2SetString` with a text that the host overwrites when the call has come back.
     ///
     /// # Errors
     /// See [`Instance::set_debug_logging`].
-    pub(crate) fn set_string_of_host(
-        &mut self,
-        reference: u32,
-        text: &str,
-        overwritten: bool,
-    ) -> Result<(), HostError> {
+    pub(crate) fn set_string_overwritten(&mut self, reference: u32, text: &str) -> Result<(), HostError> {
         let function = self.binary.functions.set_string.ok_or(HostError::Missing("fmi2SetString"))?;
         let mut bytes = super::instance::c_string(text)?.into_bytes_with_nul();
         let pointer = bytes.as_ptr().cast();
@@ -165,9 +160,7 @@ impl Instance {
         let status = Status::from(unsafe { function(self.component, &raw const reference, 1, &raw const pointer) });
         note(Call::None);
         let end = bytes.len() - 1;
-        if overwritten {
-            bytes[..end].fill(b'#');
-        }
+        bytes[..end].fill(b'#');
         // Kept, as an importer's memory may be: an FMU that goes on reading it reads the new text.
         std::mem::forget(bytes);
         if status.is_ok() { Ok(()) } else { Err(HostError::Status { function: "fmi2SetString", status }) }

@@ -1,5 +1,6 @@
 //! One instance of an FMU.
 
+use std::collections::HashMap;
 use std::ffi::{CString, c_void};
 use std::sync::Arc;
 use std::sync::PoisonError;
@@ -65,6 +66,9 @@ pub struct Instance {
     pub(crate) may_go_back: bool,
     // Kept for FMUs that go on using the pointers handed to them.
     pub(super) texts: [Vec<u8>; 3],
+    /// The text set last under each reference, for FMUs that keep its pointer: that they do is found by one rule, and
+    /// is not to spoil what others read.
+    kept: HashMap<u32, CString>,
     _folder: Option<Arc<TempDir>>,
 }
 
@@ -222,8 +226,18 @@ impl Instance {
             }
         };
         let function = if three.is_some() { "fmi3InstantiateCoSimulation" } else { "fmi2Instantiate" };
-        let instance =
-            Self { component, callbacks, binary, three, log, freed: false, may_go_back: false, texts, _folder: folder };
+        let instance = Self {
+            component,
+            callbacks,
+            binary,
+            three,
+            log,
+            freed: false,
+            may_go_back: false,
+            texts,
+            kept: HashMap::new(),
+            _folder: folder,
+        };
         if component.is_null() {
             let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
             return Err(HostError::Refused { function, said: said.join("; ") });

@@ -30,6 +30,9 @@ mod unix {
     use super::super::page::{Mapped, Page};
     use super::super::sandbox;
 
+    /// Exit code of a child whose own code fails: that of a panic.
+    const FAULT: i32 = 101;
+
     /// What a child does that was started with `--child`.
     #[must_use]
     pub fn child() -> ExitCode {
@@ -50,6 +53,7 @@ mod unix {
         unsafe { libc::setsid() };
         limit(&order);
         let page = Mapped::open(&order.page)?.publish();
+        tell_faults(page, order.nonce);
         if let Some(fence) = &order.fence {
             let strength = sandbox::raise(fence, &page.refused);
             page.strength.store(strength as u32, Ordering::Relaxed);
@@ -65,6 +69,19 @@ mod unix {
         line.answer(&answer, record.as_ref(), &order.nonce, page)?;
         leave(at_once);
         Ok(())
+    }
+
+    /// Lets a panic of this program's own code, in any thread, be told as one: else the parent sees no more than an exit
+    /// code, and takes it for the FMU's. An FMU in Rust has a standard library of its own, and panics past this.
+    fn tell_faults(page: &'static Page, nonce: Nonce) {
+        std::panic::set_hook(Box::new(move |panic| {
+            let answer = Answer { fault: Some(panic.to_string().replace('\n', " ")), ..Answer::default() };
+            if let Ok(bytes) = answer.encode(&nonce, 0) {
+                page.put(&bytes);
+            }
+            // SAFETY: ends the process. Unwinding would call into the FMU, whose fault a crash there would seem.
+            unsafe { libc::_exit(FAULT) };
+        }));
     }
 
     /// The socket to the parent, where nobody looks for it.

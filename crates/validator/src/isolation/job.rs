@@ -70,6 +70,16 @@ pub(crate) struct Answer {
     pub error: Option<String>,
     /// A simulation's record, without its numbers.
     pub record: Option<Head>,
+    /// A panic of this program's own code in the child, as text: nothing is known of the FMU then.
+    pub fault: Option<String>,
+}
+
+impl Answer {
+    /// The fault as a sentence; `None` where the child's own code did what it should.
+    pub fn internal_error(&self) -> Option<String> {
+        let fault = self.fault.as_ref()?;
+        Some(format!("internal error of eixo {}, not of the FMU: {fault}; please report it", env!("CARGO_PKG_VERSION")))
+    }
 }
 
 /// A record without its numbers.

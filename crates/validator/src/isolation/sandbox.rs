@@ -89,7 +89,7 @@ pub(crate) fn wanted(call: u32) -> &'static str {
     #[cfg(target_os = "linux")]
     {
         let call = i64::from(call & !0x4000_0000);
-        if [libc::SYS_socket, libc::SYS_io_uring_setup].contains(&call) {
+        if [libc::SYS_socket, libc::SYS_socketpair, libc::SYS_io_uring_setup].contains(&call) {
             return "the network (a socket)";
         }
         #[cfg(target_arch = "x86_64")]
@@ -99,7 +99,7 @@ pub(crate) fn wanted(call: u32) -> &'static str {
         if [libc::SYS_clone, libc::SYS_execve, libc::SYS_execveat].contains(&call) {
             return "another process";
         }
-        if [libc::SYS_kill, libc::SYS_tkill, libc::SYS_tgkill, libc::SYS_pidfd_open].contains(&call) {
+        if [libc::SYS_kill, libc::SYS_tkill, libc::SYS_tgkill, libc::SYS_pidfd_open, libc::SYS_fcntl].contains(&call) {
             return "to signal another process";
         }
     }
@@ -196,16 +196,15 @@ mod linux {
     /// Whether system calls are filtered.
     fn calls(refused: &'static AtomicU32) -> bool {
         let Ok(arch) = std::env::consts::ARCH.try_into() else { return false };
-        let (Ok(trapped), Ok(absent)) = (trapped(), absent()) else { return false };
+        let (Ok(trapped), Ok(quiet)) = (trapped(), quiet()) else { return false };
         // What an FMU asked for in vain is told, where the registers of a signal frame are known.
         let action = if watch(refused) { SeccompAction::Trap } else { SeccompAction::Errno(libc::EPERM as u32) };
         let filter = |rules, action| {
             let filter = SeccompFilter::new(rules, SeccompAction::Allow, action, arch).ok()?;
             BpfProgram::try_from(filter).ok()
         };
-        let quiet = quiet().into_iter().map(|call| (call, vec![])).collect();
         let programs = [
-            filter(absent, SeccompAction::Errno(libc::ENOSYS as u32)),
+            filter(absent(), SeccompAction::Errno(libc::ENOSYS as u32)),
             filter(quiet, SeccompAction::Errno(libc::EPERM as u32)),
             filter(trapped, action),
         ];
@@ -214,16 +213,50 @@ mod linux {
 
     type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
+    // Linux, include/uapi/asm-generic/fcntl.h, sockios.h and ioctls.h; not in the C library's bindings everywhere.
+    const F_SETOWN_EX: u64 = 15;
+    const FIOSETOWN: u64 = 0x8901;
+    const SIOCSPGRP: u64 = 0x8902;
+    /// Types into the terminal.
+    const TIOCSTI: u64 = 0x5412;
+
     /// Calls that look as if the kernel had not got them; the C library has another way.
-    fn absent() -> seccompiler::Result<Rules> {
-        Ok([libc::SYS_clone3, libc::SYS_memfd_create, libc::SYS_io_uring_setup]
-            .into_iter()
-            .map(|c| (c, vec![]))
-            .collect())
+    fn absent() -> Rules {
+        with_twins(always(&[libc::SYS_clone3, libc::SYS_memfd_create, libc::SYS_io_uring_setup]))
     }
 
-    /// Calls that change rights or leave things behind in the kernel; libraries make them in passing and live with a no.
-    fn quiet() -> Vec<i64> {
+    /// Calls whatever their arguments.
+    fn always(calls: &[i64]) -> Rules {
+        calls.iter().map(|call| (*call, vec![])).collect()
+    }
+
+    /// When all of these hold of the arguments.
+    fn when(conditions: &[(u8, Op, u64)]) -> seccompiler::Result<SeccompRule> {
+        let conditions = conditions
+            .iter()
+            .map(|(argument, op, value)| SeccompCondition::new(*argument, Len::Dword, op.clone(), *value))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(SeccompRule::new(conditions)?)
+    }
+
+    /// That an argument is the number of another process.
+    fn others(argument: u8) -> [(u8, Op, u64); 2] {
+        [(argument, Op::Ne, u64::from(std::process::id())), (argument, Op::Ne, 0)]
+    }
+
+    /// Adds the 32-bit pointers' twin of each call on x86-64 (x32), which has the same number with this bit.
+    fn with_twins(mut rules: Rules) -> Rules {
+        #[cfg(target_arch = "x86_64")]
+        for call in rules.keys().copied().collect::<Vec<_>>() {
+            rules.insert(call | 0x4000_0000, vec![]);
+        }
+        rules
+    }
+
+    /// Calls that change rights, look at or leave things behind in the kernel, or slow others down; libraries make them in
+    /// passing and live with a no. Which processors another process runs on stays open: a thread of this one is bound by the
+    /// same call, under a number that cannot be told from others'.
+    fn quiet() -> seccompiler::Result<Rules> {
         let mut all = vec![
             libc::SYS_fchmod,
             libc::SYS_fchmodat,
@@ -237,9 +270,21 @@ mod linux {
             libc::SYS_lremovexattr,
             libc::SYS_fremovexattr,
             libc::SYS_shmget,
+            libc::SYS_shmat,
+            libc::SYS_shmctl,
             libc::SYS_semget,
+            libc::SYS_semctl,
+            libc::SYS_semop,
+            libc::SYS_semtimedop,
             libc::SYS_msgget,
+            libc::SYS_msgctl,
+            libc::SYS_msgsnd,
+            libc::SYS_msgrcv,
             libc::SYS_mq_open,
+            libc::SYS_mq_unlink,
+            // What happens in a folder is told without a right to read it.
+            libc::SYS_inotify_add_watch,
+            libc::SYS_fanotify_init,
             // fchmodat2, which the C library's bindings do not name everywhere.
             452,
         ];
@@ -247,12 +292,19 @@ mod linux {
         all.extend([libc::SYS_chmod, libc::SYS_chown, libc::SYS_lchown, libc::SYS_utime, libc::SYS_utimes]);
         #[cfg(target_arch = "x86_64")]
         all.extend([libc::SYS_futimesat]);
-        all
+        let mut rules = always(&all);
+        for (call, of_the_user) in [(libc::SYS_setpriority, 2), (libc::SYS_ioprio_set, 3)] {
+            rules.insert(call, vec![when(&others(1))?, when(&[(0, Op::Eq, of_the_user)])?]);
+        }
+        for call in [libc::SYS_migrate_pages, libc::SYS_move_pages] {
+            rules.insert(call, vec![when(&others(0))?]);
+        }
+        Ok(with_twins(rules))
     }
 
     /// Calls that are refused, and told.
     fn trapped() -> seccompiler::Result<Rules> {
-        let mut rules: Rules = [
+        let mut rules = always(&[
             libc::SYS_socket,
             libc::SYS_execve,
             libc::SYS_execveat,
@@ -267,6 +319,13 @@ mod linux {
             libc::SYS_setrlimit,
             libc::SYS_mount,
             libc::SYS_umount2,
+            libc::SYS_open_tree,
+            libc::SYS_move_mount,
+            libc::SYS_fsopen,
+            libc::SYS_fsconfig,
+            libc::SYS_fsmount,
+            libc::SYS_fspick,
+            libc::SYS_mount_setattr,
             libc::SYS_pivot_root,
             libc::SYS_chroot,
             libc::SYS_unshare,
@@ -277,6 +336,7 @@ mod linux {
             libc::SYS_userfaultfd,
             libc::SYS_reboot,
             libc::SYS_kexec_load,
+            libc::SYS_kexec_file_load,
             libc::SYS_init_module,
             libc::SYS_finit_module,
             libc::SYS_delete_module,
@@ -294,37 +354,34 @@ mod linux {
             libc::SYS_request_key,
             libc::SYS_keyctl,
             libc::SYS_syslog,
-        ]
-        .into_iter()
-        .map(|call| (call, vec![]))
-        .collect();
+        ]);
         #[cfg(target_arch = "x86_64")]
         for call in [libc::SYS_fork, libc::SYS_vfork, libc::SYS_ioperm, libc::SYS_iopl] {
             rules.insert(call, vec![]);
         }
-        let when = |conditions: &[(u8, Op, u64)]| -> seccompiler::Result<Vec<SeccompRule>> {
-            let conditions = conditions
-                .iter()
-                .map(|(argument, op, value)| SeccompCondition::new(*argument, Len::Dword, op.clone(), *value))
-                .collect::<Result<Vec<_>, _>>()?;
-            Ok(vec![SeccompRule::new(conditions)?])
-        };
         // Threads are clones that share the thread group; all else is a process.
-        rules.insert(libc::SYS_clone, when(&[(0, Op::MaskedEq(libc::CLONE_THREAD as u64), 0)])?);
-        let own = u64::from(std::process::id());
-        let others = |argument| [(argument, Op::Ne, own), (argument, Op::Ne, 0)];
+        rules.insert(libc::SYS_clone, vec![when(&[(0, Op::MaskedEq(libc::CLONE_THREAD as u64), 0)])?]);
         for call in [libc::SYS_kill, libc::SYS_tgkill, libc::SYS_rt_sigqueueinfo, libc::SYS_rt_tgsigqueueinfo] {
-            rules.insert(call, when(&others(0))?);
+            rules.insert(call, vec![when(&others(0))?]);
         }
         // The order to die with the parent stays, and so do the limits.
-        rules.insert(libc::SYS_prctl, when(&[(0, Op::Eq, libc::PR_SET_PDEATHSIG as u64)])?);
-        rules.insert(libc::SYS_prlimit64, when(&[(2, Op::Ne, 0)])?);
-        // The 32-bit pointers' twin of each call on x86-64 (x32) has the same number with this bit.
-        #[cfg(target_arch = "x86_64")]
-        for call in rules.keys().copied().collect::<Vec<_>>() {
-            rules.insert(call | 0x4000_0000, vec![]);
-        }
-        Ok(rules)
+        rules.insert(libc::SYS_prctl, vec![when(&[(0, Op::Eq, libc::PR_SET_PDEATHSIG as u64)])?]);
+        rules.insert(libc::SYS_prlimit64, vec![when(&[(2, Op::Ne, 0)])?]);
+        // A pair of sockets is a pipe, but where an end can send to others: only of local ones, streams and packets in order
+        // cannot.
+        let pair = [
+            when(&[(0, Op::Ne, libc::AF_UNIX as u64)])?,
+            when(&[(1, Op::MaskedEq(0xf), libc::SOCK_DGRAM as u64)])?,
+            // Which the kernel makes a datagram socket of.
+            when(&[(1, Op::MaskedEq(0xf), libc::SOCK_RAW as u64)])?,
+        ];
+        rules.insert(libc::SYS_socketpair, pair.into());
+        // The owner of a file is sent its signals, any that is chosen: no other process is to be one.
+        let owner = [(1, Op::Eq, libc::F_SETOWN as u64)].into_iter().chain(others(2)).collect::<Vec<_>>();
+        rules.insert(libc::SYS_fcntl, vec![when(&owner)?, when(&[(1, Op::Eq, F_SETOWN_EX)])?]);
+        let control = [FIOSETOWN, SIOCSPGRP, TIOCSTI].map(|what| when(&[(1, Op::Eq, what)]));
+        rules.insert(libc::SYS_ioctl, control.into_iter().collect::<seccompiler::Result<_>>()?);
+        Ok(with_twins(rules))
     }
 
     static REFUSED: AtomicPtr<AtomicU32> = AtomicPtr::new(std::ptr::null_mut());

@@ -2,11 +2,11 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::Once;
+use std::sync::{Once, OnceLock};
 
 use tempfile::TempDir;
 
-/// What begins the name of every temporary folder; the process' number follows.
+/// What begins the name of every temporary folder; whose process numbers are meant and the process' number follow.
 const PREFIX: &str = "eixo-fmu-";
 /// A folder this old belongs to nobody, whatever process has its number now, s.
 const ABANDONED: u64 = 24 * 3600;
@@ -19,18 +19,32 @@ pub fn folder() -> io::Result<TempDir> {
     static SWEPT: Once = Once::new();
     let root = std::env::temp_dir();
     SWEPT.call_once(|| sweep(&root));
-    tempfile::Builder::new().prefix(&format!("{PREFIX}{}-", std::process::id())).tempdir_in(root)
+    tempfile::Builder::new().prefix(&format!("{PREFIX}{}-{}-", processes(), std::process::id())).tempdir_in(root)
+}
+
+/// Where no list of processes is known.
+const UNKNOWN: &str = "0";
+
+/// Whose process numbers these are: of which start of the machine, and of which container on it. Containers and machines may
+/// share a folder for temporary files, and each has a process 1.
+fn processes() -> &'static str {
+    static OWN: OnceLock<String> = OnceLock::new();
+    OWN.get_or_init(|| {
+        let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
+        let space = std::fs::read_link("/proc/self/ns/pid").ok();
+        let (Some(boot), Some(space)) = (boot, space) else { return UNKNOWN.to_owned() };
+        let space = space.to_string_lossy();
+        boot.chars().take(8).chain(space.chars().filter(char::is_ascii_digit)).collect()
+    })
 }
 
 fn sweep(root: &Path) {
-    if !Path::new("/proc/self").exists() {
-        return;
-    }
     for entry in std::fs::read_dir(root).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let number = name.to_str().and_then(|n| n.strip_prefix(PREFIX)?.split_once('-')?.0.parse::<u32>().ok());
-        let Some(number) = number else { continue };
-        let ended = number != std::process::id() && !Path::new("/proc").join(number.to_string()).exists();
+        let mut parts = name.to_str().and_then(|n| n.strip_prefix(PREFIX)).into_iter().flat_map(|n| n.splitn(3, '-'));
+        let (Some(of), Some(number), Some(_)) = (parts.next(), parts.next(), parts.next()) else { continue };
+        let Ok(number) = number.parse::<u32>() else { continue };
+        let ended = of == processes() && of != UNKNOWN && !Path::new("/proc").join(number.to_string()).exists();
         let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
         // A symbolic link of that name is another's.
         let is_folder = entry.file_type().is_ok_and(|t| t.is_dir()) && own(&entry);
@@ -81,7 +95,7 @@ mod tests {
 
     #[test]
     fn what_a_killed_process_left_goes_and_what_a_running_one_has_stays() {
-        if !Path::new("/proc/self").exists() {
+        if processes() == UNKNOWN {
             return crate::skip::skipped(crate::skip::Lack::Processes, "no list of processes here");
         }
         let root = tempfile::tempdir().unwrap();
@@ -92,9 +106,15 @@ mod tests {
             std::fs::create_dir_all(path.join("binaries")).unwrap();
             path
         };
-        let gone = make(format!("{PREFIX}{}-abc", ended.id()));
-        let kept =
-            [make(format!("{PREFIX}{}-abc", std::process::id())), make("eixo-fmu-other".into()), make("x".into())];
+        let own = processes();
+        let gone = make(format!("{PREFIX}{own}-{}-abc", ended.id()));
+        let kept = [
+            make(format!("{PREFIX}{own}-{}-abc", std::process::id())),
+            // Of another container, which shares the folder.
+            make(format!("{PREFIX}{own}1-{}-abc", ended.id())),
+            make("eixo-fmu-other".into()),
+            make("x".into()),
+        ];
         sweep(root.path());
         assert!(!gone.exists());
         assert!(kept.iter().all(|path| path.exists()));

@@ -252,6 +252,8 @@ rules! { static {
         "A resources folder that is not there is survived", "Return null from fmi2Instantiate, with a message, when a resource cannot be read.";
     RESOURCES_PATH = "resources-path" Warning Conformance "2.1.5" "2.3.1" Raw(surroundings::resources);
         "Resources are found in a folder with blanks and umlauts", "fmuResourceLocation is a URI (RFC 3986): decode %20 and the like before opening files.";
+    "resources-uri" Warning Conformance "2.1.5" "-" Raw(surroundings::short_uri);
+        "Resources are found by a URI without an authority, file:/path", "Take both file:/path and file:///path for fmuResourceLocation: the standard asks for both, and importers in Java write the first.";
     START_TIME = "start-time" Error Conformance "2.1.6" "2.3.2" Loaded(experiment::start_time);
         "The start time is where the run begins", "Take startTime of fmi2SetupExperiment for the initial time.";
     "stop-time" Note Conformance "2.1.6" "2.3.2" Loaded(experiment::stop_time);
@@ -264,10 +266,12 @@ rules! { static {
         "Outputs can be read in initialisation mode", "Accept fmi2GetXXX of outputs between fmi2EnterInitializationMode and fmi2ExitInitializationMode; importers solve loops over several FMUs there.";
     "inputs-initial" Error Conformance "4.2.4" "2.3.3" Loaded(experiment::inputs_initial);
         "Inputs set before and during initialisation are there after it", "Do not set inputs back to their start values in fmi2EnterInitializationMode or fmi2ExitInitializationMode.";
+    "parameters-initial" Error Conformance "4.2.4" "2.3.3" Indirect(experiment::parameters_initial);
+        "Parameters set in initialisation mode are there after it, and act", "Accept fmi2SetXXX of variables with initial exact until fmi2ExitInitializationMode, and compute there what follows from them.";
     "set-get" Error Conformance "2.1.7" "2.2.6.2" Loaded(values::set_get);
         "Parameters and inputs read as they were set", "Store each value under its own reference.";
     "set-get-other" Error Conformance "2.1.7" "-" Indirect(settings::others);
-        "Integer, Boolean and String parameters read as they were set", "Store each value under its own reference, whole, and keep it during initialisation.";
+        "Integer, Boolean and String parameters read as they were set", "Store each value under its own reference, and keep it during initialisation; store a text whole, however long it is, or return fmi2Error.";
     "set-together" Error Conformance "2.1.7" "-" Indirect(settings::together);
         "Values set in one call, or in another order, are those set one by one", "Take value[i] for the reference vr[i], and let no setter change another variable; compute what follows in fmi2ExitInitializationMode.";
     "set-twice" Error Conformance "2.1.7" "-" Indirect(settings::twice);
@@ -280,8 +284,8 @@ rules! { static {
         "Reading changes nothing, and values do not depend on how they are read", "Compute outputs without side effects on the state.";
     BOOLEAN_VALUES = "boolean-values" Error Conformance "2.1.2" "2.2.6.2" Loaded(values::boolean_values);
         "Booleans are fmi2False (0) or fmi2True (1)", "Normalise with !!value.";
-    "string-values" Error Conformance "2.1.7" "2.2.6.2" Loaded(references::string_values);
-        "Strings are not null, and UTF-8", "Return an empty string for no text, and convert from other encodings.";
+    STRING_VALUES = "string-values" Error Conformance "2.1.7" "2.2.6.2" Learning(references::string_values);
+        "Strings are not null, UTF-8, and there until the next call", "Return an empty string for no text, convert from other encodings, and keep the memory until fmi2GetString or fmi2FreeInstance is called next.";
     "string-buffers" Error Conformance "2.1.7" "2.2.6.2" Loaded(references::string_buffers);
         "Strings read together are those read one by one", "Give each String variable a buffer of its own.";
     "unchanging" Error Conformance "2.2.7" "2.4.7" Loaded(values::unchanging);
@@ -388,6 +392,8 @@ rules! { static {
         "Failing memory callbacks are survived", "Check what allocateMemory returns, and return null from fmi2Instantiate.";
     "debug-logging" Error Conformance "2.1.5" "2.3.1" Loaded(effects::debug_logging);
         "Declared log categories can be switched on and off", "Accept every category of LogCategories in fmi2SetDebugLogging.";
+    "logging-off" Warning Conformance "2.1.5" "2.3.1" Loaded(effects::logging_off);
+        "Nothing is logged with fmi2OK where debug logging is off", "Look at loggingOn, of fmi2Instantiate and of each fmi2SetDebugLogging, before calling the logger with fmi2OK; what goes with fmi2Warning and worse is due all the same.";
     "log-categories" Warning Quality "2.2.4" "2.4.5" Loaded(effects::log_categories);
         "Log messages are of declared categories", "Declare the category in LogCategories, so that users can choose it.";
     SIDE_DIRECTORY = "side-directory" Error Robustness "2.3" "2.5.1" Raw(effects::directory);

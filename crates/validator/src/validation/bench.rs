@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::super::behaviour::probe::Learned;
-use super::super::description::{Description, Fmi};
+use super::super::description::{BaseType, Description, Fmi};
 use super::super::host;
 use super::super::isolation::{
     self, Answer, Bounds, Ended, Fence, Job, Outcome, Place, Strength, Task, sandbox, temporary,
@@ -16,7 +16,7 @@ use super::super::rules::{self, Finding, Id, Rule, Verdict, id};
 use super::{Options, ValidationError};
 
 /// Rules that must pass before the others make sense, in order.
-const GATES: [Id; 12] = [
+const GATES: [Id; 13] = [
     id::BINARY_LOAD,
     id::BINARY_SYMBOLS,
     id::INSTANTIATE,
@@ -28,8 +28,11 @@ const GATES: [Id; 12] = [
     id::STEP_STATUS,
     id::INSTANCES_REPEATED,
     id::TERMINATE,
+    id::STRING_VALUES,
     id::DETERMINISM,
 ];
+/// Those of them that the others make sense without: what fails is compared no more, but what else the FMU does is tested.
+const OPEN: [Id; 2] = [id::STRING_VALUES, id::DETERMINISM];
 
 /// Rules whose failure may be the sandbox's doing.
 pub(super) const NEEDY: [Id; 5] =
@@ -56,6 +59,8 @@ pub(super) struct Bench<'a> {
     progress: &'a (dyn Fn(&str, usize) + Sync),
     fmi: Fmi,
     total: usize,
+    /// References of all Strings.
+    strings: Vec<u32>,
     /// Whether the FMU says that it needs its tool to run.
     needs_tool: bool,
     begin: Instant,
@@ -63,6 +68,8 @@ pub(super) struct Bench<'a> {
     longest: Mutex<(Duration, bool)>,
     /// The weakest sandbox of all children.
     strength: Mutex<Option<Strength>>,
+    /// Panics of the validator's own code, each with its rule.
+    faults: Mutex<Vec<String>>,
 }
 
 impl<'a> Bench<'a> {
@@ -82,16 +89,28 @@ impl<'a> Bench<'a> {
             progress,
             fmi: description.fmi,
             total: rules::of(description.fmi).filter(|r| !r.is_static()).count(),
+            strings: description
+                .variables
+                .iter()
+                .filter(|v| v.base() == BaseType::String)
+                .map(|v| v.value_reference)
+                .collect(),
             needs_tool: interface.needs_execution_tool,
             begin: Instant::now(),
             longest: Mutex::new((Duration::ZERO, false)),
             strength: Mutex::new(None),
+            faults: Mutex::default(),
         })
     }
 
     /// What is to be said of the sandbox.
     pub fn gap(&self) -> Option<&'static str> {
         self.strength.lock().unwrap_or_else(PoisonError::into_inner).filter(|_| self.options.sandbox)?.gap()
+    }
+
+    /// Which rules the validator's own code failed in.
+    pub fn faults(&self) -> Vec<String> {
+        self.faults.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     pub fn run(&self) -> Result<Vec<Tested>, ValidationError> {
@@ -105,8 +124,13 @@ impl<'a> Bench<'a> {
                 continue;
             }
             let (mut result, more) = self.test(rule, &learned)?;
-            if let Some(more) = more {
-                learned = more;
+            match more {
+                Some(more) => learned = more,
+                // The process ended over a text: which one is not known.
+                None if rule.is(id::STRING_VALUES) && result.1 == Verdict::Failed => {
+                    learned.no_texts.clone_from(&self.strings);
+                }
+                None => {}
             }
             if self.needs_tool && result.1 == Verdict::Failed && is_one_of(rule, &[id::BINARY_LOAD, id::INSTANTIATE]) {
                 // The tool may not be here, which is no fault of the FMU.
@@ -115,9 +139,9 @@ impl<'a> Bench<'a> {
                 result = (rule, Verdict::NotTested(why.clone()), vec![]);
             }
             match &result.1 {
-                // A run that differs from its like is compared no more, but what else it does is tested.
-                Verdict::Failed if !rule.is(id::DETERMINISM) => blocked = Some(format!("{} must pass first", rule.id)),
-                Verdict::NotTested(why) if !rule.is(id::DETERMINISM) => blocked = Some(why.clone()),
+                _ if is_one_of(rule, &OPEN) => {}
+                Verdict::Failed => blocked = Some(format!("{} must pass first", rule.id)),
+                Verdict::NotTested(why) => blocked = Some(why.clone()),
                 _ => {}
             }
             tested.push(result);
@@ -233,6 +257,10 @@ impl<'a> Bench<'a> {
             last => format!(", after {last}"),
         };
         let answer = outcome.answer.as_deref().and_then(Answer::decode).map(|(answer, _)| answer);
+        if let Some(internal) = answer.as_ref().and_then(Answer::internal_error) {
+            self.faults.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{}: {internal}", rule.id));
+            return (Verdict::NotTested(internal), vec![], None);
+        }
         // Before the library is loaded, nothing of the FMU has run.
         let idle = outcome.last == none && outcome.answer.is_none();
         let died = match &outcome.ended {
@@ -320,5 +348,60 @@ impl<'a> Bench<'a> {
             }
             None => (Verdict::Failed, findings, learned),
         }
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    const NAME: &str = "validation::bench::tests::a_child";
+
+    fn described(interface: &str) -> String {
+        format!(
+            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"m\" guid=\"g\"><{interface} modelIdentifier=\"m\"/>\
+             <ModelVariables/><ModelStructure/></fmiModelDescription>"
+        )
+    }
+
+    /// The child of the test below: this test's program, started again.
+    #[test]
+    #[ignore = "is the child process of another test"]
+    fn a_child() {
+        let _ = isolation::child();
+    }
+
+    #[test]
+    fn a_panic_of_the_validator_is_told_as_its_own_and_not_as_the_fmus() {
+        let folder = tempfile::tempdir().unwrap();
+        // Any library that can be loaded: the C library, which this process has already.
+        let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
+        let library =
+            maps.lines().filter_map(|line| line.split_whitespace().nth(5)).find(|path| path.contains("libc."));
+        let binaries = folder.path().join("binaries/linux64");
+        std::fs::create_dir_all(&binaries).unwrap();
+        std::fs::copy(library.unwrap(), binaries.join("m.so")).unwrap();
+        let description = Description::parse(described("CoSimulation").as_bytes()).unwrap();
+        // The child finds another description than the parent: one that no rule is ever run on.
+        std::fs::write(folder.path().join("modelDescription.xml"), described("ModelExchange")).unwrap();
+
+        // `sh validate --child` in the child's working directory starts this test's program again.
+        let options = Options { sandbox: false, ..Options::new("/bin/sh".into()) };
+        let bench = Bench::new(&description, folder.path(), &options, &|_, _| {}).unwrap();
+        let workplace = bench.scratch.path().join(id::BINARY_SYMBOLS.text()).join("workplace");
+        std::fs::create_dir_all(&workplace).unwrap();
+        let program = std::env::current_exe().unwrap();
+        let script = format!("exec '{}' --exact {NAME} --ignored --nocapture\n", program.display());
+        std::fs::write(workplace.join("validate"), script).unwrap();
+
+        let rule = rules::rule(id::BINARY_SYMBOLS.text()).unwrap();
+        let ((_, verdict, findings), _) = bench.test(rule, &Learned::default()).unwrap();
+        assert!(findings.is_empty(), "{findings:?}");
+        let Verdict::NotTested(why) = verdict else { panic!("{verdict:?}") };
+        for part in ["internal error of eixo", "not of the FMU", "only co-simulation FMUs are probed", "probe.rs"] {
+            assert!(why.contains(part), "{part}: {why}");
+        }
+        assert_eq!(bench.faults(), [format!("{}: {why}", rule.id)]);
     }
 }

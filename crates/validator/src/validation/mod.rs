@@ -120,6 +120,7 @@ pub fn validate(
                 verdicts.insert(rule.id, verdict);
                 findings.extend(found);
             }
+            remarks.extend(bench.faults());
             remarks.extend(bench.gap().map(str::to_owned));
             remarks.extend(untested(&description));
             if options.sandbox && bench::NEEDY.iter().any(|id| verdicts.get(id.text()) == Some(&Verdict::Failed)) {

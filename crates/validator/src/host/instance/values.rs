@@ -62,7 +62,7 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn get_string(&mut self, references: &[u32]) -> Result<Vec<String>, HostError> {
         if self.three.is_some() {
-            return Ok(self.get_text3(references)?.into_iter().map(Result::unwrap_or_default).collect());
+            return Ok(self.get_text3(references, false)?.into_iter().map(Result::unwrap_or_default).collect());
         }
         let mut values = vec![std::ptr::null(); references.len()];
         checked!(self, get_string(references.as_ptr(), references.len(), values.as_mut_ptr()))?;
@@ -120,7 +120,9 @@ impl Instance {
         }
         let texts = values.iter().map(|c| c_string(c)).collect::<Result<Vec<_>, _>>()?;
         let pointers: Vec<Text> = texts.iter().map(|t| t.as_ptr()).collect();
-        checked!(self, set_string(references.as_ptr(), references.len(), pointers.as_ptr()))
+        checked!(self, set_string(references.as_ptr(), references.len(), pointers.as_ptr()))?;
+        self.kept.extend(references.iter().copied().zip(texts));
+        Ok(())
     }
 
     /// `fmi2SetRealInputDerivatives`: one order (1 or more) a reference.

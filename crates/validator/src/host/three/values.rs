@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::super::abi::{self, Call, Text};
 use super::super::instance::Instance;
-use super::super::{HostError, note};
+use super::super::{HostError, abuse, note};
 use super::layout::{Run, runs};
 use super::{check, status_of};
 use crate::description::{Kind, Value};
@@ -77,7 +77,8 @@ impl Instance {
         Ok(get!(self, run, get3_boolean, u8, |x| x))
     }
 
-    fn texts(&self, run: &Run) -> Result<Vec<Result<String, &'static str>>, HostError> {
+    /// Strings and binaries; `checked`, whether they stay what they are while the FMU is not called.
+    fn texts(&self, run: &Run, checked: bool) -> Result<Vec<Result<String, &'static str>>, HostError> {
         let (references, count) = (run.references.as_ptr(), run.references.len());
         if run.kind == Kind::Binary {
             let mut sizes = vec![0_usize; run.total];
@@ -96,6 +97,9 @@ impl Instance {
         }
         let mut values = vec![std::ptr::null(); run.total];
         call!(self, get3_string(references, count, values.as_mut_ptr(), values.len()))?;
+        if checked {
+            return Ok(abuse::steady(&values));
+        }
         let check = |text: &Text| {
             if text.is_null() {
                 return Err("a null pointer");
@@ -147,10 +151,11 @@ impl Instance {
     pub(in super::super) fn get_text3(
         &mut self,
         handles: &[u32],
+        checked: bool,
     ) -> Result<Vec<Result<String, &'static str>>, HostError> {
         let mut out = Vec::with_capacity(handles.len());
         for run in self.runs3(handles, Kind::String).iter() {
-            let values = self.texts(run)?;
+            let values = self.texts(run, checked)?;
             out.extend(run.places.iter().map(|&place| values[place].clone()));
         }
         Ok(out)
@@ -272,7 +277,7 @@ impl Instance {
         for run in runs(&layout, handles, Kind::String) {
             let of = |v: &Value| if let Value::String(x) = v { Some(x.clone()) } else { None };
             let read = |instance: &Self, run: &Run| {
-                Ok(instance.texts(run)?.into_iter().map(Result::unwrap_or_default).collect::<Vec<String>>())
+                Ok(instance.texts(run, false)?.into_iter().map(Result::unwrap_or_default).collect::<Vec<String>>())
             };
             let mut all = self.before(&run, read, of)?;
             run.places.iter().zip(&mut values).for_each(|(&place, value)| all[place] = (*value).to_owned());
