@@ -73,7 +73,9 @@ impl Record {
     pub fn speeds(&self) -> [f64; 2] {
         let peak = |sum: f64, n: usize| (2.0 * sum / n.max(1) as f64).sqrt();
         let of = |side: usize| {
-            let steps = |y: &Vec<f64>| peak(y.windows(2).map(|w| ((w[1] - w[0]) / self.dt).powi(2)).sum(), y.len().saturating_sub(1));
+            let steps = |y: &Vec<f64>| {
+                peak(y.windows(2).map(|w| ((w[1] - w[0]) / self.dt).powi(2)).sum(), y.len().saturating_sub(1))
+            };
             let speeds = |v: &Vec<f64>| peak(v.iter().map(|v| v * v).sum(), v.len());
             self.channels[2 * side].as_ref().map(steps).or_else(|| self.channels[2 * side + 1].as_ref().map(speeds))
         };

@@ -213,7 +213,7 @@ impl Problem<'_> {
         // A coupling with play does not pull by its twist alone.
         let linear = !has(|e| e.info().place == Place::Coupling);
         // What a third inertia began with is taken out of what any change lacks, too.
-        let settles = self.band.sides().len() == 1 && has(|e| e.is_mode());
+        let settles = has(|e| e.is_mode());
         let motion = self.motion.as_ref().filter(|_| !settles);
         (0..coordinates.len())
             .into_par_iter()

@@ -90,10 +90,6 @@ pub fn settle(band: &Band, model: &Model, motion: &[[f64; 4]], rows: &mut [Vec<C
     if let Some(hidden) = Hidden::across(model, band.sides()) {
         take_vibration(band, &hidden, f64::INFINITY, rows, planner);
     }
-    // Where each side has an encoder the two tell a sine from what swings.
-    if band.sides().len() > 1 {
-        return;
-    }
     for hidden in Hidden::modes(model, band.sides()) {
         let along: Vec<f64> = motion.iter().map(|m| m[2 * hidden.side]).collect();
         let most = largest(&hidden.pull(&along, band.dt));
