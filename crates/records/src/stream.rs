@@ -32,6 +32,9 @@ struct Rows {
     head: Table,
 }
 
+/// What takes rows, and of each column the first cell that is no number.
+type Take<'a> = dyn FnMut(Piece, &[Option<Fault>]) -> Result<(), TraceError> + 'a;
+
 impl Rows {
     fn open(path: &Path) -> Result<Self, TraceError> {
         let file = path.display().to_string();
@@ -96,11 +99,7 @@ impl Rows {
         Ok(said)
     }
 
-    fn each_block(
-        &self,
-        wanted: &[usize],
-        take: &mut dyn FnMut(Piece, &[Option<Fault>]) -> Result<(), TraceError>,
-    ) -> Result<Option<String>, TraceError> {
+    fn each_block(&self, wanted: &[usize], take: &mut Take<'_>) -> Result<Option<String>, TraceError> {
         let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
         let name = &self.head.file;
         let mut file = File::open(&self.path).map_err(failed)?;
