@@ -241,7 +241,7 @@ fn a_torque_that_the_log_clipped_is_refused_and_one_that_the_drive_limited_is_no
                 }
             }
             // The drive's own limit: the axis felt what was logged.
-            let mut settings = settings.clone();
+            let mut settings = settings;
             let saturation = Effect::from_id("saturation").unwrap();
             settings.of_mut(saturation)[saturation.parameter("limit").unwrap()] = limit;
             let mut limited = axis(Kind::RandomPhase, 4096, 2, &settings, 2e-6);
