@@ -256,7 +256,10 @@ fn bad_traces_are_refused_with_file_row_column_and_the_way_out() {
     refused(&("t,torque\n".to_owned() + &rows(40, |k| format!("{k},1"))), &["no column has a signal's name", "torque"]);
     refused(&("n,T,theta1,theta2\n".to_owned() + &rows(40, good)), &["no column \"time\"", "[signals]"]);
     refused(&(head.to_owned() + &rows(5, good)), &["5 samples", "record longer"]);
-    refused(&(head.to_owned() + &rows(40, good) + "0.04,1\n"), &["row 42", "2 fields where the header has 4"]);
+    refused(
+        &(head.to_owned() + &rows(40, good) + "0.04,1\n" + &good(41)),
+        &["row 42", "2 fields where the header has 4"],
+    );
     refused(&rows(40, good), &["header row"]);
     refused("", &["empty"]);
 }

@@ -49,6 +49,7 @@ fn prepare(folder: &Path) {
     write("commas.csv", &("time,T,theta1\n".to_owned() + &rows(40, |k| format!("0,{k:03},1,5,2,5"))));
     write("bare.csv", &rows(40, plain));
     write("cut.csv", &(head.to_owned() + &rows(40, plain) + "0.04,1\n"));
+    write("short.csv", &(head.to_owned() + &rows(40, |k| if k == 20 { "0.02,1".to_owned() } else { plain(k) })));
     write("text.csv", &(head.to_owned() + &rows(40, |k| if k == 9 { "0.009,on,1,1".to_owned() } else { plain(k) })));
     write("words.csv", &("time,phase\n".to_owned() + &rows(40, |k| format!("{},on", k as f64 * 1e-3))));
     write("gap.csv", &(head.to_owned() + &rows(40, |k| plain(if k < 20 { k } else { k + 5 }))));
@@ -65,7 +66,7 @@ fn prepare(folder: &Path) {
     std::fs::create_dir(folder.join("logs")).unwrap();
 }
 
-const MISTAKES: [Mistake; 31] = [
+const MISTAKES: [Mistake; 32] = [
     Mistake {
         what: "a file that is not there",
         typed: &["identify", "lgo.csv"],
@@ -107,8 +108,14 @@ const MISTAKES: [Mistake; 31] = [
     Mistake {
         what: "the last row cut off",
         typed: &["inspect", "cut.csv"],
+        code: 1,
+        says: &["row 42, the last, is cut off", "left out"],
+    },
+    Mistake {
+        what: "a row cut off among others",
+        typed: &["inspect", "short.csv"],
         code: 2,
-        says: &["row 42", "complete or delete"],
+        says: &["row 22", "complete or delete"],
     },
     Mistake {
         what: "a word among numbers",

@@ -59,6 +59,22 @@ impl Log {
         self.0[column][range].fill(value);
     }
 
+    /// Loses every so many-th row; the stamps go on evenly.
+    fn lose(&mut self, every: usize) {
+        for column in &mut self.0[1..] {
+            let kept: Vec<f64> = column.iter().enumerate().filter(|(k, _)| k % every != 50).map(|(_, v)| *v).collect();
+            *column = kept;
+        }
+        let rows = self.0[1].len();
+        self.0[0].truncate(rows);
+    }
+
+    /// Keeps the torque between shares of its largest value.
+    fn clip(&mut self, low: f64, high: f64) {
+        let largest = self.0[1].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        self.0[1].iter_mut().for_each(|v| *v = v.clamp(low * largest, high * largest));
+    }
+
     /// Writes the columns that `keep` names.
     fn write(&self, path: &Path, keep: &[usize]) {
         let mut text = keep.iter().map(|c| NAMES[*c]).collect::<Vec<_>>().join(",");
@@ -78,7 +94,7 @@ const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 type Case = (&'static str, &'static [usize], fn(&mut Log, &Log));
 
 /// What a machine, a cable, a logger or a hurried person does to a record. The second log is another one of the same axis.
-const CASES: [Case; 46] = [
+const CASES: [Case; 50] = [
     ("dead torque", ALL, |l, _| l.0[1].fill(0.0)),
     ("dead theta1", ALL, |l, _| l.0[2].fill(0.3)),
     ("dead omega1", ALL, |l, _| l.0[3].fill(0.0)),
@@ -128,6 +144,10 @@ const CASES: [Case; 46] = [
     ("torque of another record, positions alone", POSITIONS, |l, o| l.0[1].clone_from(&o.0[1])),
     ("angles in degrees, positions alone", POSITIONS, |l, _| l.scale(&[2, 4], DEGREES)),
     ("torque in mN.m, positions alone", POSITIONS, |l, _| l.scale(&[1], 1e3)),
+    ("rows lost and numbered through", ALL, |l, _| l.lose(97)),
+    ("rows lost and numbered through, positions alone", POSITIONS, |l, _| l.lose(97)),
+    ("torque clipped by the log", ALL, |l, _| l.clip(-0.6, 0.6)),
+    ("torque clipped by the log on one side, positions alone", POSITIONS, |l, _| l.clip(-1.0, 0.5)),
 ];
 
 #[test]
@@ -165,6 +185,23 @@ fn no_broken_record_is_identified_or_given_a_cause() {
         }
     }
     assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), CASES.len());
+}
+
+#[test]
+fn a_torque_that_was_logged_early_identifies_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("axis.toml"), AXIS).unwrap();
+    let mut log = Log::with_friction(1, 0.0);
+    log.0[1].rotate_left(4);
+    log.write(&at("log.csv"), POSITIONS);
+    for extra in [&["--method", "oe"][..], &["--stream", "--method", "ls"]] {
+        let done = run::eixo_in(folder.path(), &[&["identify", "log.csv", "--axis", "axis.toml"], extra].concat());
+        let said = String::from_utf8_lossy(&done.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(done.status.code(), Some(1), "{extra:?}: {said} {}", String::from_utf8_lossy(&done.stderr));
+        assert!(!said.contains("identifies the axis"), "{extra:?}: {said}");
+        assert!(said.contains("4 samples") && said.contains("behind its torque"), "{extra:?}: {said}");
+    }
 }
 
 #[test]

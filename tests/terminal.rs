@@ -25,10 +25,45 @@ fn prepare(folder: &Path) {
         let done = eixo_in(folder, &arguments.split(' ').collect::<Vec<_>>());
         assert!(done.status.success(), "{arguments}: {}", String::from_utf8_lossy(&done.stderr));
     };
+    set("export axis.fmu --quiet");
+    set("export axis3.fmu --fmi 3 --quiet");
     set("excite -o u.csv --samples 1024 --quiet");
     set(
         "simulate axis.toml -i u.csv -o trace.csv --start-value coulomb_motor.level=0.002 --noise theta1=1e-4,theta2=1e-4 --outputs theta1,theta2",
     );
+}
+
+#[test]
+fn a_current_is_told_in_amperes_and_a_linear_axis_has_no_torque() {
+    let folder = tempfile::tempdir().unwrap();
+    prepare(folder.path());
+    let log = std::fs::read_to_string(folder.path().join("trace.csv")).unwrap();
+    std::fs::write(folder.path().join("amperes.csv"), log.replacen("T [N.m]", "T [A]", 1)).unwrap();
+    let linear = log.replacen("N.m", "N", 1).replacen("[rad]", "[m]", 2);
+    std::fs::write(folder.path().join("linear.csv"), linear).unwrap();
+    std::fs::write(folder.path().join("linear.toml"), format!("{AXIS}[units]\nmotion = \"linear\"\n")).unwrap();
+    for command in ["identify", "diagnose", "inspect"] {
+        for (log, axis, never) in [
+            ("amperes.csv", "axis.toml", ["N.m", "N·m", "kg"]),
+            ("linear.csv", "linear.toml", [" torque", "N.m", "kg.m2"]),
+        ] {
+            let typed = [command, log, "--axis", axis, "--report", "page.html"];
+            let done = wide(folder.path(), 200, &typed);
+            let said = format!("{}{}", String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
+            assert!(matches!(done.status.code(), Some(0 | 1)), "{typed:?}: {said}");
+            let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+            // What is seen of the page: neither its style nor its script.
+            let seen = page.split("</style>").nth(1).unwrap().split("<script").next().unwrap();
+            for text in [&said, seen] {
+                for word in never {
+                    let at = text.find(word);
+                    let around = at.map(|at| text.get(at.saturating_sub(80)..(at + 80).min(text.len())));
+                    assert_eq!(around, None, "{typed:?}: {word:?}");
+                }
+            }
+            assert!(axis == "linear.toml" || said.contains("A.s2/rad") || command == "inspect", "{typed:?}: {said}");
+        }
+    }
 }
 
 #[test]
@@ -43,6 +78,8 @@ fn tables_fit_every_width_from_60_to_200() {
             &["inspect", "trace.csv"],
             &["circle", "axis.toml"],
             &["init", "trace.csv", "--yes", "--force", "-o", "made.toml"],
+            &["info", "axis.fmu"],
+            &["info", "axis3.fmu"],
         ] {
             let done = wide(folder.path(), columns, arguments);
             assert!(

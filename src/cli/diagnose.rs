@@ -21,6 +21,7 @@ use crate::fmu::contained::{Host, simulate};
 use crate::fmu::package::Package;
 use crate::fmu::simulate::{Inputs, Options, Setting};
 use crate::report::diagnose::{Findings, json as contract, report, short, warnings};
+use crate::report::driven::Driven;
 use crate::report::format::{Medium, number, percent, printable};
 use crate::report::{Block, html, terminal};
 use crate::trace::{Machine, Signal, Trace, nearest, write_text};
@@ -83,6 +84,7 @@ struct Diagnosed {
     /// What was diagnosed: file, samples, rate.
     described: String,
     warnings: Vec<String>,
+    driven: Driven,
 }
 
 impl Diagnosed {
@@ -107,7 +109,8 @@ fn examine(
     progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
     let machine = Machine::read(axis)?;
-    let Recorded { record: train, noise, mut warnings, reference, command } = record(trace, &machine, believed)?;
+    let Recorded { record: train, noise, mut warnings, reference, command, driven } =
+        record(trace, &machine, believed)?;
     warnings.extend(noise.jitter.map(|samples| {
         format!(
             "{}: the noise of the position grows with its speed, as if the encoder were read {} s ({} of a sample) early or late. No \
@@ -158,7 +161,7 @@ fn examine(
         number(1.0 / train.dt, 4, Medium::Page),
         holdout.as_ref().map_or_else(String::new, |(_, p)| format!("; held out: {}", p.display()))
     );
-    Ok(Diagnosed { machine, outcome, described, warnings })
+    Ok(Diagnosed { machine, outcome, described, warnings, driven })
 }
 
 /// Runs the command.
@@ -188,17 +191,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let steps = args.progress.steps();
     let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| steps.step(what))?;
     steps.end();
-    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
+    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(&diagnosed.driven.words(w))));
     let findings = diagnosed.findings();
     let outcome = &diagnosed.outcome;
-    out!("{}", terminal::blocks(&short(&findings), layout(WIDTH)))?;
+    out!("{}", terminal::blocks(&diagnosed.driven.blocks(short(&findings)), layout(WIDTH)))?;
     if let Some(path) = &args.json {
         let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis, &diagnosed.warnings))?;
         text.push('\n');
         write_text(path, text.as_bytes())?;
     }
     if let Some(path) = &args.report {
-        write_text(path, html::page(&report(&findings)).as_bytes())?;
+        write_text(path, html::page(&diagnosed.driven.report(report(&findings))).as_bytes())?;
     }
     if let Some(path) = &args.fmu {
         let improved = Machine {
@@ -247,7 +250,7 @@ fn found(diagnosed: &Diagnosed) -> Found {
             .chain(warnings(d, Some(diagnosed.machine.signals.motion)))
             .collect(),
         result: contract::value(d, &diagnosed.warnings),
-        report: report(&diagnosed.findings()),
+        report: diagnosed.driven.report(report(&diagnosed.findings())),
     }
 }
 
@@ -304,6 +307,8 @@ pub(super) struct Recorded {
     pub reference: Option<Vec<f64>>,
     /// Its command, where that is another than the torque.
     pub command: Option<Vec<f64>>,
+    /// What drives the axis.
+    pub driven: Driven,
 }
 
 /// Samples that a diagnosis needs: a third of them is held out, and what is left must give a speed and its noise.
@@ -311,7 +316,7 @@ const SHORTEST: usize = 64;
 
 /// Reads a trace as the diagnosis needs it.
 pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyhow::Result<Recorded> {
-    let Examined { trace, idle, mut warnings } = examined(path, machine, true, believed)?;
+    let Examined { trace, idle, mut warnings, driven, .. } = examined(path, machine, true, believed)?;
     let trace = &trace;
     let torque = trace.require(Signal::T).with_context(|| path.display().to_string())?.to_vec();
     let mut channels =
@@ -353,5 +358,5 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
         idle,
     };
     let [reference, command] = [Signal::Reference, Signal::Command].map(|s| trace.get(s).map(<[f64]>::to_vec));
-    Ok(Recorded { record, noise, warnings, reference, command })
+    Ok(Recorded { record, noise, warnings, reference, command, driven })
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::examine::{Examination, Input, Severity, examine};
 use crate::report::Block;
+use crate::report::driven::Driven;
 use crate::report::examine::{findings, verdict};
 use crate::trace::{Loaded, LoadedPieces, Machine, Mapping, Signal, Trace, load};
 
@@ -61,6 +62,10 @@ pub struct Examined {
     pub idle: Vec<Range<usize>>,
     /// What the user should know: of the reading, and of the record.
     pub warnings: Vec<String>,
+    /// Why no model without a delay is the axis, each a sentence.
+    pub doubts: Vec<String>,
+    /// What drives the axis.
+    pub driven: Driven,
 }
 
 /// A record that cannot carry a verdict.
@@ -71,6 +76,8 @@ pub struct Refused {
     pub file: String,
     /// What was found.
     pub examination: Examination,
+    /// What drives the axis.
+    pub driven: Driven,
 }
 
 fn words(examination: &Examination) -> String {
@@ -88,7 +95,7 @@ impl Refused {
              the record.",
             self.file
         )));
-        blocks
+        self.driven.blocks(blocks)
     }
 
     /// The same for programs.
@@ -127,10 +134,11 @@ pub fn examined_log(
     trust: bool,
     extent: Extent,
 ) -> anyhow::Result<Examined> {
-    let Loaded { trace, stamps, mut warnings } = loaded;
+    let Loaded { trace, stamps, mut warnings, drive } = loaded;
+    let driven = Driven { motion: machine.signals.motion, unit: drive };
     let Seen { trace, examination } = seen(trace, stamps.as_deref(), machine, known)?;
     if examination.refuses() && !trust {
-        return Err(Refused { file: path.display().to_string(), examination }.into());
+        return Err(Refused { file: path.display().to_string(), examination, driven }.into());
     }
     warnings.extend(told(&examination));
     let usable = &examination.usable;
@@ -154,7 +162,20 @@ pub fn examined_log(
         ));
         trace = trace.slice(piece);
     }
-    Ok(Examined { trace, idle, warnings })
+    let doubts = doubts(&examination, trust);
+    Ok(Examined { trace, idle, warnings, doubts, driven })
+}
+
+/// The pieces of a record that were examined.
+pub struct ExaminedPieces {
+    /// What is usable, to be used together.
+    pub pieces: Vec<Trace>,
+    /// What the user should know: of the reading, and of the record.
+    pub warnings: Vec<String>,
+    /// Why no model without a delay is the axis, each a sentence.
+    pub doubts: Vec<String>,
+    /// What drives the axis.
+    pub driven: Driven,
 }
 
 /// Least samples of a piece that is used beside others.
@@ -172,14 +193,16 @@ pub fn examined_pieces(
     machine: &Machine,
     known: bool,
     trust: bool,
-) -> anyhow::Result<(Vec<Trace>, Vec<String>)> {
-    let LoadedPieces { longest: Loaded { trace, stamps, mut warnings }, others } = loaded;
+) -> anyhow::Result<ExaminedPieces> {
+    let LoadedPieces { longest: Loaded { trace, stamps, mut warnings, drive }, others } = loaded;
+    let driven = Driven { motion: machine.signals.motion, unit: drive };
     let file = path.display();
     let first = seen(trace, stamps.as_deref(), machine, known)?;
     if first.examination.refuses() && !trust {
-        return Err(Refused { file: file.to_string(), examination: first.examination }.into());
+        return Err(Refused { file: file.to_string(), examination: first.examination, driven }.into());
     }
     warnings.extend(told(&first.examination));
+    let doubts = doubts(&first.examination, trust);
     let mut total = 0;
     let mut pieces = Vec::new();
     let mut take = |seen: &Seen| {
@@ -194,10 +217,9 @@ pub fn examined_pieces(
         let (start, end) = (trace.start, trace.time(trace.len() - 1));
         let other = seen(trace, stamps.as_deref(), machine, known)?;
         if other.examination.refuses() && !trust {
-            let refused = Refused { file: file.to_string(), examination: other.examination };
             warnings.push(format!(
                 "{file}: the piece from {start:.6} s to {end:.6} s is left out: {}",
-                words(&refused.examination)
+                words(&other.examination)
             ));
             continue;
         }
@@ -231,7 +253,7 @@ pub fn examined_pieces(
             spans(many)
         )),
     }
-    Ok((pieces, warnings))
+    Ok(ExaminedPieces { pieces, warnings, doubts, driven })
 }
 
 /// When the pieces are, in words; of many the first ones.
@@ -267,6 +289,13 @@ fn seen(mut trace: Trace, stamps: Option<&[f64]>, machine: &Machine, known: bool
     table_as_angle(&mut trace, machine)?;
     let examination = examine(&Input::of(&trace, stamps).against(machine, known));
     Ok(Seen { trace, examination })
+}
+
+/// What no estimate of a model without a delay gets over.
+fn doubts(examination: &Examination, trust: bool) -> Vec<String> {
+    let apart = examination.find("misaligned").filter(|_| !trust);
+    let word = "Inertia, damping and stiffness would make up for that: their errors do not tell by how much.";
+    apart.map(|found| format!("{} {word}", found.seen)).into_iter().collect()
 }
 
 /// What is said of a record that is used.

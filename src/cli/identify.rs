@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::FINDINGS;
-use super::examined::{Believed, Extent, Refused, examined_log, examined_pieces};
+use super::examined::{Believed, ExaminedPieces, Extent, Refused, examined_log, examined_pieces};
 use super::many::Many;
 use super::outputs;
 use super::stdout::out;
@@ -22,6 +22,7 @@ use crate::identify::joined::Joined;
 use crate::identify::result::{Estimate, Identification};
 use crate::identify::run::{Method, Request, identify_joined};
 use crate::identify::stream;
+use crate::report::driven::Driven;
 use crate::report::{Block, Cell, Table, terminal};
 use crate::trace::stream::Stream;
 use crate::trace::{Hold, Loaded, Machine, Signal, Trace, load_pieces, write_text};
@@ -147,8 +148,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         // All that bears on the result, in words.
         let settings = format!("{:?} {:?} {:?} {}", request(&args, true), args.hold, args.believed, args.stream);
         return args.many.run("identify", &FACTS, settings, &args.traces, args.axis.as_deref(), &|item| {
-            let (_, result, record) = examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
-            found(&result, Joined::of(&record).ok().as_ref())
+            let Identified { result, record, driven, .. } =
+                examine(&item.path, item.axis.as_deref(), &args, &mut |_| ())?;
+            found(&result, Joined::of(&record).ok().as_ref(), &driven)
         });
     }
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref());
@@ -162,26 +164,33 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     {
         write_text(path, &serde_json::to_vec_pretty(&refused.json())?)?;
     }
-    let (machine, result, record) = done?;
+    let Identified { machine, result, record, driven } = done?;
     let mut said = blocks(&result);
     if machine.controller.is_some() && result.recommended.is_some() {
         said.extend(super::controlled::identified(path, args.believed.part, &machine, &improved(&machine, &result)?)?);
     }
+    let said = driven.blocks(said);
     out!("{}", terminal::blocks(&said, super::stdout::layout(super::stdout::WIDTH)))?;
     if let Some(path) = &args.json {
         write_text(path, &serde_json::to_vec_pretty(&result)?)?;
     }
     if let Some(path) = &args.report {
-        write_text(
-            path,
-            crate::report::html::page(&crate::report::identify::report(&result, Joined::of(&record).ok().as_ref()))
-                .as_bytes(),
-        )?;
+        let report = crate::report::identify::report(&result, Joined::of(&record).ok().as_ref());
+        write_text(path, crate::report::html::page(&driven.report(report)).as_bytes())?;
     }
     if let Some(path) = &args.axis_out {
         write_text(path, improved(&machine, &result)?.to_toml().as_bytes())?;
     }
     Ok(if result.identifiability.identified { ExitCode::SUCCESS } else { ExitCode::from(FINDINGS) })
+}
+
+/// One trace identified.
+struct Identified {
+    machine: Machine,
+    result: Identification,
+    /// The pieces that it was identified from; none of a streamed record.
+    record: Vec<Trace>,
+    driven: Driven,
 }
 
 /// Identifies one trace.
@@ -190,7 +199,7 @@ fn examine(
     axis: Option<&Path>,
     args: &Args,
     progress: &mut dyn FnMut(&str),
-) -> anyhow::Result<(Machine, Identification, Vec<Trace>)> {
+) -> anyhow::Result<Identified> {
     let mut machine = match axis {
         Some(axis) => Machine::read(axis)?,
         None => Machine { name: "axis".to_owned(), ..Machine::default() },
@@ -209,14 +218,17 @@ fn examine(
         );
         let stream = Stream::open(path, &machine.signals)?;
         // The head of the record stands for it: a defect of a sensor or a unit shows there as well.
-        let head = Loaded { trace: stream.head(EXAMINED)?, stamps: None, warnings: Vec::new() };
+        let head =
+            Loaded { trace: stream.head(EXAMINED)?, stamps: None, warnings: Vec::new(), drive: stream.drive.clone() };
         let seen = examined_log(head, path, &machine, axis.is_some(), args.believed.trust, Extent::Longest)?;
         let mut request = request(args, axis.is_some());
         request.methods.retain(|m| stream::METHODS.contains(m));
         anyhow::ensure!(!request.methods.is_empty(), "--stream: only --method ls and rls are computed piece by piece");
         let mut result = stream::identify(&stream, &machine, &request, &file, progress).context(file)?;
         result.warnings.splice(0..0, seen.warnings);
-        return Ok((machine, result, Vec::new()));
+        result.identifiability.identified &= seen.doubts.is_empty();
+        result.identifiability.doubts.extend(seen.doubts);
+        return Ok(Identified { machine, result, record: Vec::new(), driven: seen.driven });
     }
     let loaded = load_pieces(path, &args.believed.part.of(machine.signals.clone()))?;
     // What is not there is said before what is there is examined.
@@ -226,7 +238,8 @@ fn examine(
         needed.push(Signal::Theta2);
     }
     needed.into_iter().try_for_each(|s| there.require(s).map(|_| ())).context(file.clone())?;
-    let (mut pieces, warnings) = examined_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
+    let ExaminedPieces { mut pieces, warnings, doubts, driven } =
+        examined_pieces(loaded, path, &machine, axis.is_some(), args.believed.trust)?;
     let joined = Joined::of(&pieces)?;
     let request = request(args, axis.is_some());
     let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file.clone())?;
@@ -236,7 +249,9 @@ fn examine(
         machine.signals.hold = Hold::Linear;
     }
     result.warnings.splice(0..0, warnings);
-    Ok((machine, result, pieces))
+    result.identifiability.identified &= doubts.is_empty();
+    result.identifiability.doubts.extend(doubts);
+    Ok(Identified { machine, result, record: pieces, driven })
 }
 
 fn request(args: &Args, reference: bool) -> Request {
@@ -256,7 +271,7 @@ fn request(args: &Args, reference: bool) -> Request {
 }
 
 /// An identification as a row of the summary: the method to trust.
-fn found(result: &Identification, record: Option<&Joined>) -> anyhow::Result<Found> {
+fn found(result: &Identification, record: Option<&Joined>, driven: &Driven) -> anyhow::Result<Found> {
     let best = result.recommended.as_ref().context("no method gives an estimate to trust")?;
     let method = &result.methods[best.method];
     let fit = method.outputs.iter().map(|o| o.fit_percent / 100.0).reduce(f64::min);
@@ -276,7 +291,7 @@ fn found(result: &Identification, record: Option<&Joined>) -> anyhow::Result<Fou
         parameters: method.parameters.iter().map(tracked).collect(),
         warnings: result.warnings.clone(),
         result: json!(result),
-        report: crate::report::identify::report(result, record),
+        report: driven.report(crate::report::identify::report(result, record)),
     })
 }
 

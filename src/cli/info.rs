@@ -8,10 +8,11 @@ use anyhow::Context;
 use serde_json::{Value as Json, json};
 
 use super::info3;
-use super::stdout::out;
+use super::stdout::{layout, out};
 use crate::fmu::archive::Archive;
 use crate::fmu::description::{Causality, Description, Interface, SI_BASE, Unit, Value, Variable};
 use crate::fmu::xml::Document;
+use crate::report::terminal::wrapped;
 
 /// Arguments of `eixo info`.
 #[derive(Debug, clap::Args)]
@@ -42,6 +43,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut archive = Archive::open(&args.fmu)?;
     let xml = archive.read("modelDescription.xml").with_context(|| args.fmu.display().to_string())?;
     let name = || args.fmu.display().to_string();
+    // One variable a line where no terminal says how long a line is: for other programs.
+    let width = layout(u16::MAX).width;
     let document = Document::parse(&xml).with_context(name)?;
     if document.root.name == "fmiModelDescription"
         && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3."))
@@ -51,7 +54,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         if args.json {
             out!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
         } else {
-            out!("{}", info3::as_text(&document.root, &platforms, &words))?;
+            out!("{}", info3::as_text(&document.root, &platforms, &words, width))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -59,8 +62,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let shown: Vec<&Variable> =
         d.variables.iter().filter(|v| args.causality.is_empty() || args.causality.contains(&v.causality)).collect();
     let platforms = platforms(&archive);
-    let text =
-        if args.json { format!("{:#}\n", as_json(&d, &platforms, &shown)) } else { as_text(&d, &platforms, &shown) };
+    let text = if args.json {
+        format!("{:#}\n", as_json(&d, &platforms, &shown))
+    } else {
+        as_text(&d, &platforms, &shown, width)
+    };
     out!("{text}")?;
     Ok(ExitCode::SUCCESS)
 }
@@ -142,11 +148,11 @@ pub(super) fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &[&Variable]) -> String {
+fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &[&Variable], width: u16) -> String {
     let mut out = String::new();
     let mut line = |name: &str, value: Option<String>| {
         if let Some(value) = value.filter(|v| !v.is_empty()) {
-            let _ = writeln!(out, "{name:<12} {}", plain(&value));
+            out.push_str(&fact(name, &plain(&value), width));
         }
     };
     line("model", Some(d.model_name.clone()));
@@ -191,34 +197,73 @@ fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
         line(if at == 0 { "units" } else { "" }, Some(format!("{} = {}{display}", unit.name, in_base_units(unit))));
     }
     let _ = writeln!(out, "\n{} of {} variables", shown.len(), d.variables.len());
-    let rows: Vec<[String; 6]> = shown
-        .iter()
-        .map(|v| {
-            [
-                plain(&v.name),
-                v.base().to_string(),
-                v.causality.to_string(),
-                v.variability.to_string(),
-                v.start.as_ref().map_or(String::new(), |s| plain(&show(s))),
-                plain(&d.resolved(v).unit.unwrap_or_default()),
-            ]
-        })
+    let rows = shown.iter().map(|v| {
+        [
+            plain(&v.name),
+            v.base().to_string(),
+            v.causality.to_string(),
+            v.variability.to_string(),
+            v.start.as_ref().map_or(String::new(), |s| plain(&show(s))),
+            plain(&d.resolved(v).unit.unwrap_or_default()),
+            plain(v.description.as_deref().unwrap_or("")),
+        ]
+    });
+    out + &variables(&rows.collect::<Vec<_>>(), width)
+}
+
+/// A name and what it is, within a width.
+pub(super) fn fact(name: &str, value: &str, width: u16) -> String {
+    const NAME: usize = 13;
+    let value = wrapped(value, width.saturating_sub(NAME as u16), "");
+    let lines: Vec<String> = value
+        .lines()
+        .enumerate()
+        .map(|(k, line)| format!("{:<NAME$}{line}", if k == 0 { name } else { "" }).trim_end().to_owned())
         .collect();
-    let head = ["name", "type", "causality", "variability", "start", "unit"];
-    let mut widths = head.map(str::len);
-    for row in &rows {
-        for (width, cell) in widths.iter_mut().zip(row) {
-            *width = (*width).max(cell.chars().count()).min(50);
+    lines.join("\n") + "\n"
+}
+
+/// Least characters that a description is wrapped to beside its variable.
+const BESIDE: usize = 24;
+
+/// The variables: name, type, causality, variability, start, unit, description. One a line where there is room for that; else the
+/// description goes on below itself, and in a narrow terminal all but name and start below these.
+pub(super) fn variables(rows: &[[String; 7]], width: u16) -> String {
+    const HEAD: [&str; 7] = ["name", "type", "causality", "variability", "start", "unit", "description"];
+    let longest =
+        |at: usize| rows.iter().map(|r| r[at].chars().count()).chain([HEAD[at].len()]).max().unwrap_or(0).min(50);
+    let widths: Vec<usize> = (0..6).map(longest).collect();
+    let before: usize = widths.iter().map(|w| w + 2).sum();
+    let width = usize::from(width);
+    let mut out = String::new();
+    if before + BESIDE > width {
+        for [name, of_type, causality, variability, start, unit, description] in rows {
+            let value = if start.is_empty() { String::new() } else { format!(" = {start}") };
+            let unit = if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
+            let _ = writeln!(out, "{}", wrapped(&format!("{name}{value}{unit}"), width as u16 - 4, "    "));
+            let what = format!(
+                "{of_type}, {causality}, {variability}{}{description}",
+                if description.is_empty() { "" } else { ": " }
+            );
+            for line in wrapped(&what, width as u16 - 4, "").lines() {
+                let _ = writeln!(out, "    {line}");
+            }
         }
+        return out;
     }
-    let mut write_row = |row: [&str; 6], description: &str| {
-        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
-        let _ = writeln!(out, "{}", format!("{}  {description}", cells.join("  ")).trim_end());
+    let mut write_row = |row: [&str; 7]| {
+        let cells: Vec<String> = row.iter().zip(&widths).map(|(cell, width)| format!("{cell:<width$}  ")).collect();
+        let room = u16::try_from(width - before).unwrap_or(u16::MAX);
+        let description = wrapped(row[6], room, "");
+        let mut lines = description.lines();
+        let first = format!("{}{}", cells.concat(), lines.next().unwrap_or(""));
+        let _ = writeln!(out, "{}", first.trim_end());
+        lines.for_each(|line| {
+            let _ = writeln!(out, "{:before$}{line}", "");
+        });
     };
-    write_row(head, "description");
-    for (row, v) in rows.iter().zip(shown) {
-        write_row(row.each_ref().map(String::as_str), &plain(v.description.as_deref().unwrap_or("")));
-    }
+    write_row(HEAD);
+    rows.iter().for_each(|row| write_row(row.each_ref().map(String::as_str)));
     out
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Value as Json, json};
 
-use super::info::{Platforms, plain};
+use super::info::{self, Platforms, fact, plain};
 use crate::fmu::xml::Element;
 
 /// The interfaces of FMI 3.0 (section 2.4.1).
@@ -66,11 +66,11 @@ fn flags(interface: &Element) -> Vec<String> {
 }
 
 /// For a person.
-pub(super) fn as_text(root: &Element, platforms: &Platforms, causality: &[String]) -> String {
+pub(super) fn as_text(root: &Element, platforms: &Platforms, causality: &[String], width: u16) -> String {
     let mut out = String::new();
     let mut line = |name: &str, value: Option<&str>| {
         if let Some(value) = value.filter(|v| !v.is_empty()) {
-            let _ = writeln!(out, "{name:<12} {}", plain(value));
+            out.push_str(&fact(name, &plain(value), width));
         }
     };
     line("model", root.get("modelName"));
@@ -99,21 +99,13 @@ pub(super) fn as_text(root: &Element, platforms: &Platforms, causality: &[String
     }
     let (shown, all) = variables(root, causality);
     let _ = writeln!(out, "\n{} of {} variables", shown.len(), all.len());
-    let mut rows =
-        vec![["name", "type", "causality", "variability", "start", "unit", "description"].map(str::to_owned)];
-    rows.extend(shown.iter().map(|v| {
+    let rows = shown.iter().map(|v| {
         let (causality, variability) = kinds(v);
         let type_ = format!("{}{}", v.name, dimensions(v, all));
         let [name, unit, description] = ["name", "unit", "description"].map(|a| v.get(a).unwrap_or(""));
         [name, &type_, causality, variability, &start(v), unit, description].map(plain)
-    }));
-    let width = |at: usize| rows.iter().map(|r| r[at].chars().count()).max().unwrap_or(0).min(50);
-    let widths: Vec<usize> = (0..6).map(width).collect();
-    for row in &rows {
-        let cells: Vec<String> = row.iter().zip(&widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
-        let _ = writeln!(out, "{}", format!("{}  {}", cells.join("  "), row[6]).trim_end());
-    }
-    out
+    });
+    out + &info::variables(&rows.collect::<Vec<_>>(), width)
 }
 
 /// For programs: the attributes as they stand.

@@ -14,6 +14,7 @@ use super::stdout::{WIDTH, layout, out, out_line};
 use crate::axis::Structure;
 use crate::examine::{Examination, Input, examine};
 use crate::identify::run::{Request, identify};
+use crate::report::driven::Driven;
 use crate::report::examine::{Inspected, findings, report, verdict};
 use crate::report::{Block, Cell, Table as Shown, html, terminal};
 use crate::trace::guess::{Guess, Role, SURE, guess};
@@ -119,8 +120,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         motion: machine.signals.motion,
         warnings: &loaded.warnings,
     };
+    let driven = Driven { motion: machine.signals.motion, unit: loaded.drive.clone() };
+    // The page is the larger: where there is no room for it, no axis file stands in the way of the next try.
+    write_text(&page, html::page(&driven.report(report(&seen))).as_bytes())?;
     write_text(&axis, text.as_bytes())?;
-    write_text(&page, html::page(&report(&seen)).as_bytes())?;
 
     let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Verdict(verdict(&examination))];
     if let (Some(dt), None) = (made.dt, args.dt) {
@@ -131,7 +134,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     blocks.extend(loaded.warnings.iter().cloned().map(Block::Warning));
     blocks.extend(findings(&examination).into_iter().filter(|b| !matches!(b, Block::Table(_))));
-    out!("{}", terminal::blocks(&blocks, layout(WIDTH)))?;
+    out!("{}", terminal::blocks(&driven.blocks(blocks), layout(WIDTH)))?;
     out_line!("\n{}: the axis file; look at [signals] and [parameters]", axis.display())?;
     out_line!("{}: the log, drawn", page.display())?;
     let what = format!("{} --axis {}", quoted(&file), quoted(&axis.display().to_string()));

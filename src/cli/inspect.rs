@@ -8,6 +8,7 @@ use super::examined::Part;
 use super::outputs;
 use super::stdout::{WIDTH, layout, out};
 use crate::examine::{Input, examine};
+use crate::report::driven::Driven;
 use crate::report::examine::{Inspected, report, short};
 use crate::report::{html, terminal};
 use crate::trace::{Machine, load, write_text};
@@ -56,6 +57,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         motion: machine.signals.motion,
         warnings: &loaded.warnings,
     };
+    let driven = Driven { motion: machine.signals.motion, unit: loaded.drive.clone() };
     if let Some(path) = &args.json {
         let found = serde_json::json!({
             "schema": "eixo.examination/1",
@@ -69,8 +71,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_vec_pretty(&found)?)?;
     }
     if let Some(path) = &args.report {
-        write_text(path, html::page(&report(&seen)).as_bytes())?;
+        write_text(path, html::page(&driven.report(report(&seen))).as_bytes())?;
     }
-    out!("{}", terminal::blocks(&short(&seen), layout(WIDTH)))?;
+    out!("{}", terminal::blocks(&driven.blocks(short(&seen)), layout(WIDTH)))?;
     Ok(if examination.refuses() { ExitCode::from(FINDINGS) } else { ExitCode::SUCCESS })
 }

@@ -1,7 +1,7 @@
 //! Writing to standard output, which a reader such as `head` may close before the end: what a command was asked to do goes
 //! on, its files are written, its exit code stays.
 
-use std::io::{ErrorKind, IsTerminal, Result, Write};
+use std::io::{Error, ErrorKind, IsTerminal, Result, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::report::terminal::Layout;
@@ -53,7 +53,7 @@ pub fn write(text: std::fmt::Arguments<'_>) -> Result<()> {
     };
     match written {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        other => other,
+        written => written.map_err(|e| Error::new(e.kind(), format!("standard output: cannot write: {e}"))),
     }
 }
 

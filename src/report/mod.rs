@@ -10,6 +10,7 @@ pub mod chart;
 pub mod circle;
 pub mod demo;
 pub mod diagnose;
+pub mod driven;
 pub mod examine;
 pub mod format;
 pub mod html;

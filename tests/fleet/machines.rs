@@ -54,7 +54,7 @@ pub fn machines(root: &Path) -> PathBuf {
         log(&folder.join("press").join(&date), k * (1.0 - 0.02 * f64::from(day)), 0.0, 1 + u64::from(day));
         log(&folder.join("mill").join(&date), k, 0.004, 11 + u64::from(day));
     }
-    std::fs::write(folder.join("mill/2026-03-12.csv"), "time,T,theta1\n0,1,2\n0.1,x\n").expect("the file");
+    std::fs::write(folder.join("mill/2026-03-12.csv"), "time,T,theta1\n0,1,2\n0.1,x\n0.2,1,2\n").expect("the file");
     let unknown =
         format!("time,<img src=x onerror=alert(1)>\n{}", (0..20).map(|k| format!("{k},1\n")).collect::<String>());
     std::fs::write(folder.join("press/2026-03-12 <b>&.csv"), unknown).expect("the file");

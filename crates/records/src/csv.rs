@@ -5,6 +5,7 @@
 //! cell that is no finite number is remembered and only an error when its column is used, so that a log may carry
 //! text beside its signals.
 
+pub(super) mod cut;
 mod preamble;
 mod stamp;
 
@@ -31,11 +32,13 @@ const CHUNK: usize = 1 << 18;
 pub(super) fn parse(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let bytes = unmarked(bytes);
     let head = Head::find(bytes, file)?;
-    let body = without_end_mark(&bytes[head.body..]);
+    let body = &bytes[head.body..];
     let format = Format::of(&head, body);
-    let rows = rows(body, &format, 0, head.lines + 1).map_err(|r| r.named(file, &format))?;
+    let (end, cut) = cut::whole(body, &format, true);
+    let rows = rows(&body[..end], &format, 0, head.lines + 1).map_err(|r| r.named(file, &format))?;
     Ok(Table {
         mended: Vec::new(),
+        cut: cut.map(|text| cut::word(file, head.lines + rows.passed + 1, &text)),
         file: file.to_owned(),
         headers: head.headers,
         columns: rows.columns,
@@ -178,11 +181,6 @@ fn distinct(headers: &[Header], file: &str) -> Result<(), TraceError> {
         }
     }
     Ok(())
-}
-
-/// A body without the line `EOF` that some exports end in.
-fn without_end_mark(body: &[u8]) -> &[u8] {
-    body.trim_ascii_end().strip_suffix(b"EOF").filter(|b| b.is_empty() || b.ends_with(b"\n")).unwrap_or(body)
 }
 
 /// Whether a cell is a number.
@@ -537,15 +535,41 @@ mod tests {
     #[test]
     fn a_row_with_missing_or_extra_fields_is_named_by_its_line() {
         for (text, line, found) in [
-            ("time,T\n0,1\n1\n", 3, 1),
+            ("time,T\n0,1\n1\n2,1\n", 3, 1),
+            ("time,T\n0\n", 2, 1),
             ("time,T\n0,1\n1,2,3,4\n", 3, 4),
-            ("time,T\n0,1\n1,2\n2,", 4, 2),
-            ("time,T,U\n0,1,2\n1,2,3\n2,0.", 4, 2),
+            ("time,T,U\n0,1,2\n1,2\n2,0.\n3", 3, 2),
         ] {
             match parse(text) {
                 Err(TraceError::Ragged { line: l, found: f, .. }) => assert_eq!((l, f), (line, found), "{text:?}"),
-                Ok(table) if line == 4 && found == 2 => assert!(table.column(1).is_err(), "{text:?}"),
                 other => panic!("{text:?}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_last_row_that_is_cut_is_left_out_with_a_word() {
+        let fixed: String = (0..20).map(|k| format!("{k},{k}.250\n")).collect();
+        for (text, rows, line) in [
+            ("time,T\n0,1\n1,2\n2".to_owned(), 2, Some(4)),
+            ("time,T\n0,1\n# stopped\n1,2\n2\n\n".to_owned(), 2, Some(5)),
+            ("time,T\n0,1\n1,2\n2,".to_owned(), 2, Some(4)),
+            ("time,T\n0,1\n1,2\n2,-".to_owned(), 2, Some(4)),
+            ("time\tT\n0\t1\n1\t2\n2\t".to_owned(), 2, Some(4)),
+            ("time,T,\n0,1,\n1,25,\n2,2".to_owned(), 2, Some(4)),
+            (format!("time,T\n{fixed}20,20.2"), 20, Some(22)),
+            // Whole as far as can be told: a line end is not needed, and a cell that has none has a value missing.
+            (format!("time,T\n{fixed}20,20.250"), 21, None),
+            (format!("time,T\n{fixed}20,20.2\n"), 21, None),
+            ("time,T\n0,1\n1,2\n2,5".to_owned(), 3, None),
+            ("time,T\n0,1\n1,2\n2,\n".to_owned(), 3, None),
+            ("time,T\n0,1\n1,2\nEOF\n".to_owned(), 2, None),
+        ] {
+            let table = parse(&text).unwrap_or_else(|e| panic!("{text:?}: {e}"));
+            assert_eq!((table.rows(), table.cut.is_some()), (rows, line.is_some()), "{text:?}: {:?}", table.cut);
+            if let Some(line) = line {
+                let said = table.cut.unwrap();
+                assert!(said.contains(&format!("a.csv: row {line}, the last, is cut off")), "{said}");
             }
         }
     }

@@ -169,6 +169,7 @@ impl Filled {
             faults: self.faults,
             lines: vec![(0, first_line)],
             mended: Vec::new(),
+            cut: None,
         }
     }
 }
@@ -177,6 +178,7 @@ impl Filled {
 fn json(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
     let mut filled = Filled::default();
+    let mut cut = None;
     let row = |filled: &mut Filled, value: &Value, line: usize| -> Result<(), TraceError> {
         let Value::Object(object) = value else {
             return Err(wrong(format!("row {line}: not an object such as {{\"time\": 0.0, \"T\": 0.1}}")));
@@ -212,21 +214,30 @@ fn json(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
             }
         }
         _ => {
+            let last = bytes.trim_ascii_end().split(|b| *b == b'\n').count();
             for (k, line) in bytes.split(|b| *b == b'\n').enumerate() {
                 let line = line.trim_ascii();
                 if line.is_empty() {
                     continue;
                 }
-                let value = serde_json::from_slice(line)
-                    .map_err(|e| wrong(format!("row {}: not JSON ({e}); a record is one object a line", k + 1)))?;
-                row(&mut filled, &value, k + 1)?;
+                match serde_json::from_slice(line) {
+                    Ok(value) => row(&mut filled, &value, k + 1)?,
+                    // An object that ends before it is closed, behind whole ones.
+                    Err(e) if e.is_eof() && k + 1 == last && filled.rows > 0 => {
+                        let text: String = String::from_utf8_lossy(line).chars().take(40).collect();
+                        cut = Some(super::csv::cut::word(file, last, &text));
+                    }
+                    Err(e) => {
+                        return Err(wrong(format!("row {}: not JSON ({e}); a record is one object a line", k + 1)));
+                    }
+                }
             }
         }
     }
     if filled.headers.is_empty() {
         return Err(wrong("the file holds no columns; a record is one object of numbers a line".to_owned()));
     }
-    Ok(filled.table(file, 1))
+    Ok(Table { cut, ..filled.table(file, 1) })
 }
 
 /// Whether a value is an array of objects.
@@ -349,8 +360,12 @@ mod tests {
         }
         let table = table(b"{\"time\": 0, \"T\": 1}\n{\"time\": 1}\n");
         assert!(table.column(table.position("T").unwrap()).unwrap_err().to_string().contains("row 2"));
-        let error = Table::parse(b"{\"time\": 0}\n{\"time\": \n", "log").unwrap_err().to_string();
+        let error = Table::parse(b"{\"time\": 0}\n{\"time\": \n{\"time\": 2}\n", "log").unwrap_err().to_string();
         assert!(error.contains("row 2") && error.contains("not JSON"), "{error}");
+        // The last object was never closed: the logger was stopped.
+        let table = Table::parse(b"{\"time\": 0}\n{\"time\": 1}\n{\"time\": ", "log").unwrap();
+        assert_eq!(table.rows(), 2);
+        assert!(table.cut.unwrap().contains("log: row 3, the last, is cut off"));
     }
 
     #[test]

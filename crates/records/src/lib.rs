@@ -22,6 +22,7 @@ mod load;
 mod lost;
 pub mod machine;
 mod mat;
+mod missing;
 mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;

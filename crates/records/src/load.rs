@@ -85,6 +85,8 @@ pub struct Loaded {
     pub stamps: Option<Vec<f64>>,
     /// Each a sentence that says what to do.
     pub warnings: Vec<String>,
+    /// Unit of a current, a voltage or a percentage that stands for the torque one to one.
+    pub drive: Option<String>,
 }
 
 /// A record as its gaps have left it.
@@ -122,7 +124,7 @@ pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError
 
 /// Makes the traces of a table: the longest piece, and the others where they are `wanted`.
 fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPieces, TraceError> {
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = table.cut.iter().cloned().collect();
     let wanted = wanted(table, mapping, &mut warnings)?;
     if table.rows() < SHORTEST {
         return Err(TraceError::TooShort { file: table.file.clone(), found: table.rows(), needed: SHORTEST });
@@ -151,7 +153,8 @@ fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPiec
             gaps
         });
     }
-    let longest = Loaded { trace: longest, stamps: clock.stamps, warnings };
+    let drive = wanted.iter().find_map(|(signal, column)| in_drive_units(table, column, *signal));
+    let longest = Loaded { trace: longest, stamps: clock.stamps, warnings, drive };
     Ok(LoadedPieces { longest, others })
 }
 
@@ -191,21 +194,29 @@ fn trace(
     Ok(trace)
 }
 
-/// That a current, a voltage or a percentage stands for the torque one to one: then no unit of the results is what it is called.
-fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: Motion) -> Option<String> {
-    let header = &table.headers[table.position(&column.column)?];
-    let written = header.unit.as_deref().or(column.unit.as_deref())?;
-    let unit = Unit::parse(written)?;
+/// The unit of a current, a voltage or a percentage that stands for the torque one to one; it may be all that the column's name ends in.
+pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> Option<String> {
+    let index = table.position(&column.column)?;
+    let header = &table.headers[index];
+    let given = header.unit.as_deref().or(column.unit.as_deref()).and_then(Unit::parse);
+    // The unit that a mapped column's name ends in is told, but not converted from.
+    let converted = given.is_some() || table.own(signal) == Some(index);
+    let unit = given.or_else(|| guess::suffix(&header.name).map(|(_, unit)| unit))?;
     #[allow(clippy::float_cmp, reason = "the scale that nobody gave")]
     let plain = column.scale == 1.0;
-    (signal == Signal::T && unit.quantity == Quantity::Drive && plain).then(|| {
-        let (torque, inertia) = (motion.unit("N.m"), motion.unit("kg.m2"));
-        format!(
-            "{}: column {} is in {written}, and no torque constant is given: one A, V or % counts as one {torque}, and every {torque} and \
-             {inertia} that is said of this record is off by the torque constant; give it as scale of T in [signals]",
-            table.file, column.column,
-        )
-    })
+    let base = if converted { unit.symbol.trim_start_matches('m') } else { unit.symbol };
+    (signal == Signal::T && unit.quantity == Quantity::Drive && plain).then(|| base.to_owned())
+}
+
+/// That no torque constant is given: then no unit of the results is what it is called.
+pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: Motion) -> Option<String> {
+    let written = in_drive_units(table, column, signal)?;
+    let turn = motion.unit("rad");
+    Some(format!(
+        "{}: column {} is in {written}, and no torque constant is given: {written} stands for the torque, and inertia comes out in \
+         {written}.s2/{turn}, stiffness in {written}/{turn}; give the constant as scale of T in [signals] to have SI units",
+        table.file, column.column,
+    ))
 }
 
 /// The signals that the file has, and where.

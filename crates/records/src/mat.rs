@@ -155,7 +155,7 @@ pub(super) fn table(vectors: Vec<Vector>, file: &str) -> Result<Table, TraceErro
             v.values
         })
         .collect();
-    Ok(Table { file: file.to_owned(), headers, columns, faults, lines: Vec::new(), mended: Vec::new() })
+    Ok(Table { file: file.to_owned(), headers, columns, faults, lines: Vec::new(), mended: Vec::new(), cut: None })
 }
 
 struct Reader {

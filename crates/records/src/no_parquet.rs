@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::WITHOUT_PARQUET;
 use super::error::TraceError;
-use super::table::{Header, Table};
+use super::table::{Fault, Header, Table};
 
 /// An open file: there is none.
 pub(super) struct Source {
@@ -25,7 +25,7 @@ impl Source {
     pub fn batches(
         &self,
         _wanted: &[usize],
-        _take: impl FnMut(usize, &[Vec<f64>]) -> Result<(), TraceError>,
+        _take: impl FnMut(usize, Vec<Vec<f64>>, &[Option<Fault>]) -> Result<(), TraceError>,
     ) -> Result<(), TraceError> {
         match self.none {}
     }

@@ -46,6 +46,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         faults: Vec::new(),
         lines: Vec::new(),
         mended: Vec::new(),
+        cut: None,
     };
     for name in names.iter().filter(|n| n.ends_with(".npy")) {
         let mut array = Vec::new();

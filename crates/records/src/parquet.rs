@@ -74,7 +74,7 @@ pub(super) struct Source {
 /// The numbers of one column of one batch.
 struct Batch {
     values: Vec<f64>,
-    /// The first null or number that is not finite: its row in the batch and what stands there.
+    /// The first number without bound, else the first null or NaN: its row in the batch and what stands there.
     fault: Option<(usize, String)>,
 }
 
@@ -108,27 +108,15 @@ impl Source {
         Ok(Self { file: file.to_owned(), reader, headers, meanings, rows })
     }
 
-    /// Reads these columns from the first row to the last, some thousand rows at a time: `take(first row, columns)`.
+    /// Reads these columns from the first row to the last, some thousand rows at a time: `take(first row, columns, the first cell of each
+    /// that is no finite number)`.
     ///
     /// # Errors
-    /// When a cell of them is no finite number, or the file is damaged.
+    /// When the file is damaged.
     pub fn batches(
         &self,
         wanted: &[usize],
-        take: impl FnMut(usize, &[Vec<f64>]) -> Result<(), TraceError>,
-    ) -> Result<(), TraceError> {
-        let strict = |column: usize, row: usize, text: String| {
-            Err(Fault { line: row + 1, text }.named(&self.file, &self.headers[column].name))
-        };
-        self.each(wanted, strict, take)
-    }
-
-    /// As [`Source::batches`]; `fault(column, row, text)` decides of each batch's first cell that is no finite number.
-    fn each(
-        &self,
-        wanted: &[usize],
-        mut fault: impl FnMut(usize, usize, String) -> Result<(), TraceError>,
-        mut take: impl FnMut(usize, &[Vec<f64>]) -> Result<(), TraceError>,
+        mut take: impl FnMut(usize, Vec<Vec<f64>>, &[Option<Fault>]) -> Result<(), TraceError>,
     ) -> Result<(), TraceError> {
         let damaged = |what: String| TraceError::Format { file: self.file.clone(), what };
         let mut row = 0;
@@ -142,6 +130,7 @@ impl Source {
             let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
             while left > 0 {
                 let mut columns = Vec::with_capacity(wanted.len());
+                let mut faults = Vec::with_capacity(wanted.len());
                 for ((&column, reader), origin) in wanted.iter().zip(&mut readers).zip(&mut origins) {
                     let count = left.min(BATCH);
                     let meaning = self.meanings[column];
@@ -154,12 +143,10 @@ impl Source {
                             row + 1
                         )));
                     }
-                    if let Some((at, text)) = batch.fault {
-                        fault(column, row + at, text)?;
-                    }
+                    faults.push(batch.fault.map(|(at, text)| Fault { line: row + at + 1, text }));
                     columns.push(batch.values);
                 }
-                take(row, &columns)?;
+                take(row, columns, &faults)?;
                 let count = left.min(BATCH);
                 row += count;
                 left -= count;
@@ -197,20 +184,24 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
         .iter()
         .map(|m| (*m == Meaning::Other).then(|| Fault { line: 1, text: "text or a list".to_owned() }))
         .collect();
-    source.each(
-        &wanted,
-        |column, row, text| {
-            Fault { line: row + 1, text }.into_first(&mut faults[column]);
-            Ok(())
-        },
-        |_, batch| {
-            for (&column, values) in wanted.iter().zip(batch) {
-                columns[column].extend_from_slice(values);
+    source.batches(&wanted, |_, batch, found| {
+        for ((&column, values), fault) in wanted.iter().zip(batch).zip(found) {
+            columns[column].extend_from_slice(&values);
+            if let Some(fault) = fault {
+                fault.clone().into_first(&mut faults[column]);
             }
-            Ok(())
-        },
-    )?;
-    Ok(Table { file: file.to_owned(), headers: source.headers, columns, faults, lines: Vec::new(), mended: Vec::new() })
+        }
+        Ok(())
+    })?;
+    Ok(Table {
+        file: file.to_owned(),
+        headers: source.headers,
+        columns,
+        faults,
+        lines: Vec::new(),
+        mended: Vec::new(),
+        cut: None,
+    })
 }
 
 /// Runs the library on a file that may be damaged in any way: an error or a panic of it is an error of the file.
@@ -257,7 +248,7 @@ fn numbers<T: DataType>(
     let (mut levels, mut present) = (Vec::new(), Vec::with_capacity(count));
     let (records, ..) = reader.read_records(count, Some(&mut levels), None, &mut present)?;
     let mut values = Vec::with_capacity(records);
-    let mut fault = None;
+    let mut null = None;
     if present.len() == records {
         values.extend(present.iter().map(&mut number));
     } else {
@@ -266,15 +257,15 @@ fn numbers<T: DataType>(
         let mut next = present.iter();
         for (row, level) in levels.iter().enumerate() {
             let value = if *level == highest && !present.is_empty() { next.next() } else { None };
-            if value.is_none() && fault.is_none() {
-                fault = Some((row, "null".to_owned()));
+            if value.is_none() && null.is_none() {
+                null = Some((row, "null".to_owned()));
             }
             values.push(value.map_or(f64::NAN, &mut number));
         }
     }
-    if fault.is_none() {
-        fault = values.iter().position(|v| !v.is_finite()).map(|row| (row, values[row].to_string()));
-    }
+    // A number without bound is worse than none: it is no missing value.
+    let of = |bad: fn(&f64) -> bool| values.iter().position(bad).map(|row| (row, values[row].to_string()));
+    let fault = of(|v| v.is_infinite()).or(null).or_else(|| of(|v| v.is_nan()));
     Ok(Batch { values, fault })
 }
 /// Columns of numbers as a file, one row group, shorter columns ending in nulls.

@@ -1,7 +1,7 @@
 //! Traces larger than memory: the rows of a CSV or Parquet file, some thousand at a time, as often as they are asked for.
 //!
-//! What a whole table is checked for ([`super::load()`]) is checked here in one pass when the trace is opened and again as it
-//! is read; what needs all of a record at once, resampling, is refused with the way out.
+//! What a whole table is checked and mended for ([`super::load()`]) is checked here in one pass when the trace is opened and mended again as
+//! it is read; what needs all of a record at once, resampling, is refused with the way out.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -11,9 +11,12 @@ use memchr::memrchr;
 
 use super::error::TraceError;
 use super::forms::{self, Form};
-use super::load::{Mapping, SHORTEST, no_signal, scale, scaled, time_column, wanted};
+use super::load::{
+    Mapping, SHORTEST, in_drive_units, no_signal, no_torque_constant, scale, scaled, time_column, wanted,
+};
+use super::missing::{Bridges, Piece};
 use super::sampling::{Decimals, Sampling};
-use super::table::{Kind, Table};
+use super::table::{Fault, Kind, Table};
 use super::{Quantity, Signal, Trace, csv, parquet};
 
 /// Bytes of a CSV file that are read at a time: whatever the file, no more than this, and the numbers in it, is in memory.
@@ -29,23 +32,8 @@ struct Rows {
     head: Table,
 }
 
-/// Some rows, one slice a column asked for.
-struct Piece<'a> {
-    /// Row of the first, from 0.
-    first: usize,
-    columns: &'a [Vec<f64>],
-    /// (row, line) as in [`Table`].
-    lines: &'a [(usize, usize)],
-}
-
-impl Piece<'_> {
-    /// Line in the file of the piece's row `k`.
-    fn line(&self, k: usize) -> usize {
-        let row = self.first + k;
-        let last = self.lines.partition_point(|(first, _)| *first <= row);
-        last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
-    }
-}
+/// What takes rows, and of each column the first cell that is no number.
+type Take<'a> = dyn FnMut(Piece, &[Option<Fault>]) -> Result<(), TraceError> + 'a;
 
 impl Rows {
     fn open(path: &Path) -> Result<Self, TraceError> {
@@ -78,30 +66,44 @@ impl Rows {
         Ok(Self {
             path: path.to_owned(),
             kind,
-            head: Table { file, headers, columns, faults, lines: Vec::new(), mended: Vec::new() },
+            head: Table { file, headers, columns, faults, lines: Vec::new(), mended: Vec::new(), cut: None },
         })
     }
 
-    /// Reads these columns from the first row to the last.
-    fn each(&self, wanted: &[usize], take: &mut dyn FnMut(&Piece) -> Result<(), TraceError>) -> Result<(), TraceError> {
-        match self.kind {
-            Kind::Csv => self.each_block(wanted, take),
-            _ => {
-                let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
-                let source = parquet::Source::open(File::open(&self.path).map_err(failed)?, &self.head.file)?;
-                source.batches(wanted, |first, columns| take(&Piece { first, columns, lines: &[] }))
-            }
-        }
-    }
-
-    fn each_block(
+    /// Reads these columns from the first row to the last, with straight lines across cells that are missing; gives what is to be said of
+    /// the file.
+    fn each(
         &self,
         wanted: &[usize],
         take: &mut dyn FnMut(&Piece) -> Result<(), TraceError>,
-    ) -> Result<(), TraceError> {
+    ) -> Result<Vec<String>, TraceError> {
+        let file = &self.head.file;
+        let name = |k: usize| self.head.headers[wanted[k]].name.clone();
+        let mut bridges = Bridges::new(wanted.len());
+        let mut bridged = |piece: Piece, faults: &[Option<Fault>]| {
+            let passed = bridges.take(piece, faults).map_err(|(k, fault)| fault.named(file, &name(k)))?;
+            passed.map_or(Ok(()), |piece| take(&piece))
+        };
+        let mut said = Vec::new();
+        match self.kind {
+            Kind::Csv => said.extend(self.each_block(wanted, &mut bridged)?),
+            _ => {
+                let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
+                let source = parquet::Source::open(File::open(&self.path).map_err(failed)?, file)?;
+                source.batches(wanted, |first, columns, faults| {
+                    bridged(Piece { first, columns, lines: Vec::new() }, faults)
+                })?;
+            }
+        }
+        said.extend(bridges.ended(file, name)?);
+        Ok(said)
+    }
+
+    fn each_block(&self, wanted: &[usize], take: &mut Take<'_>) -> Result<Option<String>, TraceError> {
         let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
         let name = &self.head.file;
         let mut file = File::open(&self.path).map_err(failed)?;
+        let size = file.metadata().map_err(failed)?.len();
         let mut bytes = Vec::with_capacity(BLOCK);
         (&mut file).take(BLOCK as u64).read_to_end(&mut bytes).map_err(failed)?;
         let start = bytes.len() - csv::unmarked(&bytes).len();
@@ -112,9 +114,13 @@ impl Rows {
         loop {
             let before = bytes.len();
             (&mut file).take(BLOCK.saturating_sub(before) as u64).read_to_end(&mut bytes).map_err(failed)?;
-            let ended = bytes.len() < BLOCK;
+            let ended = bytes.len() < BLOCK || file.stream_position().map_err(failed)? >= size;
+            let (mut end, mut cut) = (bytes.len(), None);
+            if ended {
+                (end, cut) = csv::cut::whole(&bytes, &format, row == 0);
+            }
             let end = match memrchr(b'\n', &bytes) {
-                _ if ended => bytes.len(),
+                _ if ended => end,
                 Some(at) => at + 1,
                 None => {
                     let what = format!("line {line} is longer than {BLOCK} bytes: this is no table of numbers");
@@ -126,22 +132,20 @@ impl Rows {
             let mut columns = Vec::with_capacity(wanted.len());
             let mut all: Vec<Option<Vec<f64>>> = rows.columns.into_iter().map(Some).collect();
             for (k, &column) in wanted.iter().enumerate() {
-                if let Some(fault) = &rows.faults[column] {
-                    return Err(fault.named(name, &self.head.headers[column].name));
-                }
                 // The same column may serve two signals.
                 let twin = wanted[..k].iter().position(|c| *c == column);
                 let values = twin.map_or_else(|| all[column].take(), |at: usize| columns.get(at).cloned());
                 columns.push(values.unwrap_or_default());
             }
             if count > 0 {
-                take(&Piece { first: row, columns: &columns, lines: &rows.lines })?;
+                let faults: Vec<Option<Fault>> = wanted.iter().map(|c| rows.faults[*c].clone()).collect();
+                take(Piece { first: row, columns, lines: rows.lines }, &faults)?;
             }
             row += count;
             line += rows.passed;
             bytes.drain(..end);
             if ended {
-                return Ok(());
+                return Ok(cut.map(|text| csv::cut::word(name, line, &text)));
             }
         }
     }
@@ -167,6 +171,8 @@ pub struct Stream {
     length: usize,
     /// Each a sentence that says what to do.
     pub warnings: Vec<String>,
+    /// As in [`super::Loaded`].
+    pub drive: Option<String>,
 }
 
 impl Stream {
@@ -178,8 +184,11 @@ impl Stream {
         let rows = Rows::open(path)?;
         let mut warnings = Vec::new();
         let mut signals = Vec::new();
+        let mut drive = None;
         for (signal, column) in wanted(&rows.head, mapping, &mut warnings)? {
             let (index, scale) = scale(&rows.head, &column, signal.name(), signal.quantity(mapping.motion))?;
+            drive = drive.or_else(|| in_drive_units(&rows.head, &column, signal));
+            warnings.extend(no_torque_constant(&rows.head, &column, signal, mapping.motion));
             signals.push((signal, Source { column: index, scale, offset: column.offset }));
         }
         if signals.is_empty() {
@@ -193,15 +202,16 @@ impl Stream {
             }
         };
         let mut clock = Clock::new(rows.head.file.clone());
-        let columns: Vec<usize> = time.iter().map(|t| t.column).collect();
-        let first = signals[0].1.column;
-        rows.each(if columns.is_empty() { std::slice::from_ref(&first) } else { &columns }, &mut |piece| match time {
+        // All that will be used is read, so that what has to be said of it is said before the work.
+        let columns: Vec<usize> = time.iter().chain(signals.iter().map(|(_, s)| s)).map(|s| s.column).collect();
+        let said = rows.each(&columns, &mut |piece| match time {
             Some(t) => clock.take(&scaled(&piece.columns[0], t.scale, t.offset), piece),
             None => {
                 clock.count += piece.columns[0].len();
                 Ok(())
             }
         })?;
+        warnings.extend(said);
         clock.finish()?;
         if clock.count < SHORTEST {
             return Err(TraceError::TooShort { file: rows.head.file, found: clock.count, needed: SHORTEST });
@@ -219,6 +229,7 @@ impl Stream {
             tolerance,
             length: clock.count,
             warnings,
+            drive,
         })
     }
 
@@ -286,7 +297,7 @@ impl Stream {
             self.time.iter().chain(self.signals.iter().map(|(_, s)| s)).map(|s| s.column).collect();
         let file = &self.rows.head.file;
         self.rows.each(&columns, &mut |piece| {
-            let mut own = piece.columns;
+            let mut own = piece.columns.as_slice();
             if let Some(t) = self.time {
                 for (k, stamp) in scaled(&own[0], t.scale, t.offset).into_iter().enumerate() {
                     let off = (stamp - self.empty.time(piece.first + k)).abs();
@@ -297,7 +308,7 @@ impl Stream {
                                 "row {}: the time stamp is {:.1} % of a sample off uniform sampling at dt = {:.9e} s, and a \
                                  streamed trace is not resampled; give dt in [signals] and name no time column there, or \
                                  cut the record into parts",
-                                piece.line(k),
+                                piece.line(piece.first + k),
                                 100.0 * off / self.empty.dt,
                                 self.empty.dt
                             ),
@@ -311,7 +322,8 @@ impl Stream {
                 trace.set(*signal, scaled(values, source.scale, source.offset))?;
             }
             take(piece.first, trace)
-        })
+        })?;
+        Ok(())
     }
 }
 
@@ -339,7 +351,7 @@ impl Clock {
                 self.first = stamp;
             } else {
                 let step = stamp - self.last;
-                let line = piece.line(k);
+                let line = piece.line(piece.first + k);
                 if step <= 0.0 {
                     let (file, before) = (self.file.clone(), self.last);
                     return Err(TraceError::NotIncreasing { file, line, before, after: stamp });
@@ -447,7 +459,7 @@ mod tests {
             }
         };
         let line = format!("row {}", at + 1);
-        let error = replaced("300000,x,none,1.25");
+        let error = replaced("300000,x,overrun,1.25");
         assert!(error.contains(&format!("{line}, column T")), "{error}");
         let error = replaced("300000,x,1");
         assert!(error.contains(&line) && error.contains("3 fields"), "{error}");
@@ -457,5 +469,87 @@ mod tests {
         assert!(error.contains(&line) && error.contains("must increase"), "{error}");
         let error = replaced("# nothing");
         assert!(error.contains(&format!("row {}", at + 2)) && error.contains("gap"), "{error}");
+    }
+
+    #[test]
+    fn missing_cells_are_bridged_across_the_ends_of_blocks_as_in_the_whole_file_and_said_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.csv");
+        long(&path);
+        let text = std::fs::read_to_string(&path).unwrap();
+        // Where the second block begins: rows on either side of it lose their torque, one its angle and one its stamp.
+        let body = text.find('\n').unwrap() + 1;
+        let border = text[..body + BLOCK].matches('\n').count();
+        let row = |k: usize, line: &str| -> String {
+            let fields: Vec<&str> = line.split(',').collect();
+            match (k + 3).checked_sub(border) {
+                Some(2..=4) => format!("{},x,,{}", fields[0], fields[3]),
+                Some(5) => format!("{},x,{},nan", fields[0], fields[2]),
+                Some(9) => format!("-,x,{},{}", fields[2], fields[3]),
+                _ => line.to_owned(),
+            }
+        };
+        let mut lines: Vec<String> = text.lines().enumerate().map(|(k, line)| row(k, line)).collect();
+        lines.push("350000,x,1".to_owned());
+        std::fs::write(&path, lines.join("\n")).unwrap();
+        let whole = load(&path, &Mapping::default()).unwrap();
+        let stream = Stream::open(&path, &Mapping::default()).unwrap();
+        for expected in [
+            "column time has no number in 1 of",
+            "column T has no number in 3 of",
+            "column theta1 has no",
+            "is cut off",
+        ] {
+            for said in [&whole.warnings, &stream.warnings] {
+                assert_eq!(said.iter().filter(|w| w.contains(expected)).count(), 1, "{expected}: {said:?}");
+            }
+        }
+        let mut seen = 0;
+        stream
+            .each(|first, piece| {
+                assert_eq!(first, seen);
+                for signal in [Signal::T, Signal::Theta1] {
+                    assert_eq!(
+                        piece.get(signal).unwrap(),
+                        &whole.trace.get(signal).unwrap()[first..first + piece.len()]
+                    );
+                }
+                seen += piece.len();
+                Ok(())
+            })
+            .unwrap();
+        assert_eq!(seen, whole.trace.len());
+        // Four in a row, a text, the first cell: no line is drawn across them, and the stream says what the whole file says.
+        for (at, count, cell) in [(4000, 4, ""), (4000, 1, "overflow"), (1, 1, "")] {
+            let mut broken: Vec<String> = text.lines().map(str::to_owned).collect();
+            for line in &mut broken[at..at + count] {
+                let fields: Vec<&str> = line.split(',').collect();
+                *line = format!("{},x,{cell},{}", fields[0], fields[3]);
+            }
+            std::fs::write(&path, broken.join("\n")).unwrap();
+            let whole = load(&path, &Mapping::default()).unwrap_err().to_string();
+            assert!(whole.contains(&format!("row {}, column T", at + 1)), "{whole}");
+            assert_eq!(Stream::open(&path, &Mapping::default()).err().unwrap().to_string(), whole);
+        }
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn nulls_of_a_parquet_file_are_bridged_and_numbers_without_bound_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.parquet");
+        let time: Vec<f64> = (0..1000).map(|k| 1e-3 * f64::from(k)).collect();
+        let with =
+            |value: f64| -> Vec<f64> { (0..1000).map(|k| if k == 500 { value } else { f64::from(k) }).collect() };
+        let opened = |value: f64| {
+            std::fs::write(&path, parquet::pack(&[("time", &time), ("T", &with(value))], &path).unwrap()).unwrap();
+            Stream::open(&path, &Mapping::default())
+        };
+        let stream = opened(f64::NAN).unwrap();
+        assert!(stream.warnings.iter().any(|w| w.contains("column T has no number in 1 of 1000 rows")));
+        let read = stream.head(1000).unwrap();
+        assert_eq!(read.get(Signal::T).unwrap(), with(500.0));
+        let error = opened(f64::INFINITY).err().unwrap().to_string();
+        assert!(error.contains("row 501, column T: \"inf\""), "{error}");
     }
 }

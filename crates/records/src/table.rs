@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::error::TraceError;
 use super::forms::Form;
+use super::missing::{self, Missing};
 use super::signal::Signal;
 use super::units::Unit;
 use super::{csv, forms, guess, hdf5, mat, packed, parquet};
@@ -145,48 +146,25 @@ pub struct Table {
     pub(super) lines: Vec<(usize, usize)>,
     /// Of columns whose missing values were bridged: the column, and what is to be said of it.
     pub(super) mended: Vec<(usize, String)>,
+    /// What is to be said of a last row that was left out.
+    pub(super) cut: Option<String>,
 }
-
-/// Share of a column's cells that may be missing for them to be bridged.
-const MISSING: f64 = 0.01;
-/// Most cells in a row that are bridged.
-const IN_A_ROW: usize = 3;
 
 impl Table {
     /// Bridges cells without a number by straight lines where they are few and stand alone; of such a column it is said when it is used.
     fn bridged(mut self) -> Self {
         let rows = self.rows();
         for index in 0..self.columns.len() {
-            let Some(fault) = self.faults[index].as_ref().filter(|f| f.missing()) else { continue };
-            let values = &self.columns[index];
-            let (mut count, mut run, mut longest) = (0, 0, 0);
-            for v in values {
-                run = if v.is_finite() { 0 } else { run + 1 };
-                count += usize::from(run > 0);
-                longest = longest.max(run);
-            }
-            let ends = [values.first(), values.last()].into_iter().flatten().all(|v| v.is_finite());
-            if !ends || longest > IN_A_ROW || count as f64 > MISSING * rows as f64 || values.len() < rows {
+            if self.faults[index].is_none() || self.columns[index].len() < rows {
                 continue;
             }
-            let word = format!(
-                "{}: column {} has no number in {count} of {rows} rows, the first row {} ({:?}); they were bridged by straight lines",
-                self.file, self.headers[index].name, fault.line, fault.text
-            );
-            let mut last = 0;
-            for k in 1..values.len() {
-                let values = &mut self.columns[index];
-                if !values[k].is_finite() {
-                    continue;
-                }
-                for j in last + 1..k {
-                    let share = (j - last) as f64 / (k - last) as f64;
-                    values[j] = values[last] + share * (values[k] - values[last]);
-                }
-                last = k;
+            let mut missing = Missing::default();
+            missing.take(&self.columns[index], self.faults[index].as_ref());
+            if let Ok(Some(word)) = missing.ended(&self.file, &self.headers[index].name) {
+                missing::bridge(&mut self.columns[index]);
+                self.faults[index] = None;
+                self.mended.push((index, word));
             }
-            self.faults[index] = None;
-            self.mended.push((index, word));
         }
         self
     }

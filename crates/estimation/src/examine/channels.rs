@@ -1,9 +1,11 @@
 //! Each channel by itself, and what the others do meanwhile: constant, stuck, clipped, jumps, spikes, held samples, counters
 //! that wrapped.
 
+use std::fmt::Write;
 use std::ops::Range;
 
-use super::finding::{Finding, Severity, runs};
+use super::ceiling::{self, Felt};
+use super::finding::{Finding, Severity};
 use super::robust::{self, quantile, span, step};
 use super::{Channel, Input};
 use crate::numerics::level::{deviation, rms};
@@ -301,25 +303,33 @@ fn held(channel: Channel<'_>, findings: &mut Vec<Finding>) {
 /// Channels that end at one value time and again.
 fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) {
     let x = channel.values;
-    let n = x.len();
     if !(channel.name == "T" || channel.name.starts_with("omega")) {
         return;
     }
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    let at_end: Vec<Range<usize>> =
-        [low, high].into_iter().flat_map(|end| runs(n, |k| x[k] == end)).filter(|r| r.len() >= 3).collect();
-    let count: usize = at_end.iter().map(Range::len).sum();
-    let levels = x.windows(2).filter(|w| w[0] != w[1]).count();
-    // A channel of a few levels (a torque of steps) ends at one by nature.
-    if at_end.len() < 3 || count * 200 < n || levels * 2 < n {
+    let mut at_end = ceiling::stands(x);
+    if at_end.is_empty() {
         return;
     }
+    let count: usize = at_end.iter().map(Range::len).sum();
+    let mut seen = format!("{} stands at its largest or smallest value for {count} samples.", channel.name);
+    let limit = "A model of the machine needs that limit: see `eixo effects saturation`.";
     let (severity, means, remedy) = if channel.name == "T" {
-        (
-            Severity::Note,
-            "The drive's limit is reached.",
-            "A model of the machine needs that limit: see `eixo effects saturation`.",
-        )
+        match ceiling::felt(input, x) {
+            Felt::More(share) => {
+                let _ = write!(seen, " The axis moves there as under {:.1} % more.", 100.0 * share);
+                (
+                    Severity::Refuse,
+                    "The log holds no more than that, the drive gave more: its column or converter is at the end of its range.",
+                    "Widen the range of the column in the logger, or record a motion that needs less torque.",
+                )
+            }
+            Felt::This => (Severity::Note, "The drive's limit is reached.", limit),
+            Felt::Untold => (
+                Severity::Note,
+                "The drive's limit is reached, or that of the log: which of the two, this record does not tell.",
+                limit,
+            ),
+        }
     } else {
         (
             Severity::Warn,
@@ -327,17 +337,6 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
             "Widen its range, or leave the column out of [signals].",
         )
     };
-    let mut at_end = at_end;
     at_end.sort_by_key(|r| r.start);
-    findings.push(
-        Finding::new(
-            "clipped",
-            severity,
-            channel.name,
-            format!("{} stands at its largest or smallest value for {count} samples.", channel.name),
-            means,
-            remedy,
-        )
-        .at(input, at_end),
-    );
+    findings.push(Finding::new("clipped", severity, channel.name, seen, means, remedy).at(input, at_end));
 }

@@ -12,6 +12,7 @@
 //!
 //! A finding of severity [`Severity::Refuse`] says that a verdict from this record would be about its defect.
 
+mod ceiling;
 mod channels;
 mod copies;
 mod encoders;
@@ -22,6 +23,7 @@ mod nominal;
 mod pairs;
 mod rigid;
 mod robust;
+mod slips;
 mod spectra;
 mod stamps;
 mod usable;
@@ -253,6 +255,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
     let input = &cut(input, n);
     let bad = channels::examine(input, &mut findings);
     copies::examine(input, &mut findings);
+    slips::examine(input, &mut findings);
     sizes(input, &mut findings);
     let usable = usable::examine(input, &bad, &mut findings);
     // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.

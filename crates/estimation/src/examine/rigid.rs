@@ -35,9 +35,9 @@ pub(super) const WORSE: f64 = 2.0;
 /// Equations left over from which chance adds nothing to that: of fewer the ratio of two remainders spreads as their square.
 const ENOUGH: f64 = 8.0;
 /// Share of the torque's power that may be left beside an inertia that is read from a record.
-const MOST_LEFT: f64 = 0.25;
+pub(super) const MOST_LEFT: f64 = 0.25;
 /// Samples below which there is nothing to transform.
-const SHORTEST: usize = 64;
+pub(super) const SHORTEST: usize = 64;
 /// Most samples of one segment.
 const LONGEST: usize = 65_536;
 
@@ -111,7 +111,7 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
 }
 
 /// A mean over `2*width + 1` samples, twice; the ends are left out.
-fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
+pub(super) fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
     let once = |v: &[f64]| -> Vec<f64> {
         let length = 2 * width + 1;
         let middle = v[v.len() / 2];
@@ -131,7 +131,7 @@ fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
 const HINGE: f64 = 0.3;
 const TURNS: f64 = 1e4;
 /// Most samples that one solution looks at.
-const SAMPLES: usize = 20_000;
+pub(super) const SAMPLES: usize = 20_000;
 
 /// Share of the torque's power that is left, the inertia and its standard error, by a smoothing of a width.
 fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option<(f64, f64, f64)> {

@@ -181,6 +181,80 @@ fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
     assert!(found.find("drive_off").is_none() && found.find("standing").is_some(), "{:#?}", found.findings);
 }
 
+#[test]
+fn samples_that_are_missing_under_even_stamps_are_found_where_the_axis_moves_and_a_jump_of_one_encoder_is_none() {
+    let whole = plain();
+    let speed = |k: usize| (whole.v[3][k] - whole.v[3][k - 1]).abs();
+    let fast = robust::quantile((1..8192).map(speed), 0.9);
+    // Rows in fast motion, far from each other, with so many missing before them.
+    let mut lost: Vec<(usize, usize)> = Vec::new();
+    for missing in [1, 1, 2, 1, 4] {
+        let from = lost.last().map_or(200, |(k, _)| k + 900);
+        lost.push(((from..8192).find(|k| speed(*k) > fast && speed(*k + missing) > fast).unwrap(), missing));
+    }
+    let without = |lost: &[(usize, usize)]| {
+        let mut c = whole.clone();
+        let there = |k: &usize| !lost.iter().any(|(first, count)| (*first..first + count).contains(k));
+        for (column, all) in c.v.iter_mut().zip(&whole.v) {
+            *column = (0..all.len()).filter(there).map(|k| all[k]).collect();
+        }
+        c
+    };
+    let broken = without(&lost);
+    for input in [broken.positions(), broken.motor_only(), Input { theta1: None, ..broken.positions() }] {
+        let found = examine(&input);
+        let slips = found.find("lost_samples").expect("they are found");
+        assert_eq!((slips.severity, slips.stretches.len()), (Severity::Refuse, 5), "{slips:?}");
+        assert!(slips.seen.starts_with("9 samples are missing"), "{}", slips.seen);
+        let mut before = 0;
+        for ((first, missing), at) in lost.iter().zip(&slips.stretches) {
+            assert!(at.start.abs_diff(first - before) <= 2, "{first} - {before}: {at:?}");
+            before += missing;
+        }
+    }
+    sound(&whole.positions(), "nothing is missing");
+    // Counts that one encoder lost are as much as a sample of the motion now and then; the other has not moved.
+    let mut jumped = whole.clone();
+    let (k, _) = lost[0];
+    let size = jumped.v[1][k] - jumped.v[1][k - 1];
+    jumped.v[1][k..].iter_mut().for_each(|v| *v += size);
+    assert!(examine(&jumped.positions()).find("lost_samples").is_none());
+}
+
+#[test]
+fn a_torque_that_the_log_clipped_is_refused_and_one_that_the_drive_limited_is_not() {
+    let coulomb = effect("coulomb_motor", &[("level", 0.002)]);
+    for settings in [Settings::default(), coulomb] {
+        let free = axis(Kind::RandomPhase, 4096, 2, &settings, 2e-6);
+        let largest = free.v[0].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for share in [0.5, 0.7] {
+            let limit = share * largest;
+            let mut clipped = free.clone();
+            clipped.v[0].iter_mut().for_each(|t| *t = t.clamp(-limit, limit));
+            let mut below = free.clone();
+            below.v[0].iter_mut().for_each(|t| *t = t.min(limit));
+            for record in [&clipped, &below] {
+                for input in [record.positions(), record.motor_only()] {
+                    let found = examine(&input);
+                    let seen = found.find("clipped").expect("it stands at its ends");
+                    assert_eq!(seen.severity, Severity::Refuse, "{share}: {seen:?}");
+                }
+            }
+            // The drive's own limit: the axis felt what was logged.
+            let mut settings = settings;
+            let saturation = Effect::from_id("saturation").unwrap();
+            settings.of_mut(saturation)[saturation.parameter("limit").unwrap()] = limit;
+            let mut limited = axis(Kind::RandomPhase, 4096, 2, &settings, 2e-6);
+            limited.v[0].iter_mut().for_each(|t| *t = t.clamp(-limit, limit));
+            for input in [limited.positions(), limited.motor_only()] {
+                let found = examine(&input);
+                assert!(!found.refuses(), "{share}: {:#?}", found.findings);
+                assert_eq!(found.find("clipped").map(|f| f.severity), Some(Severity::Note), "{share}");
+            }
+        }
+    }
+}
+
 /// Slow triangles under control, with an encoder whose noise from sample to sample is as large as the motion.
 #[test]
 fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_no_foreign_one() {

@@ -1,0 +1,181 @@
+//! Samples that a log lost without a word: its stamps are even, and the motion goes on some samples further at once.
+//!
+//! A position is a cubic over a few samples on either side of a row (see [`crate::trace::bridge`]). Where `m` samples are missing before it,
+//! one cubic fits both sides with the later ones `m` samples later, and none fits them as they stand: the axis is not somewhere else, it is
+//! the same motion with a piece left out. A blow gives the speed a kink and a count that was lost puts the position elsewhere; neither is
+//! `m` samples of this motion, and not for both encoders at once.
+
+use std::ops::Range;
+
+use super::Input;
+use super::finding::{Finding, Severity};
+use super::robust::{quantile, step};
+
+/// Samples on either side of a row: few for a fast motion, many for one that hardly stands out of the noise.
+const SIDES: [usize; 2] = [3, 6];
+/// Most samples lost in a row that a cubic over so few still reaches across.
+const LOST: usize = 5;
+/// Error of the cubic, in what it usually is about there, from which a row does not belong behind the one before: as of a lost sample.
+const FAR: f64 = 6.0;
+/// The same up to which samples belong together, with those between them missing.
+const AGREE: f64 = 2.5;
+/// Samples in which an error is a usual one; every so many-th of them is asked, in no step with samples that are held in twos or fours.
+const BLOCK: usize = 256;
+const EVERY: usize = 7;
+/// Sizes of a third difference, over its median, from which a row is looked at: a step beyond [`FAR`] makes one of eight.
+const STANDS: f64 = 6.0;
+
+/// An orthonormal basis of the cubics at `2*side` times, the later half `missing` samples later: four vectors.
+fn cubics(side: usize, missing: usize) -> Vec<Vec<f64>> {
+    let middle = side as f64 - 0.5 + 0.5 * missing as f64;
+    let times: Vec<f64> = (0..2 * side)
+        .map(|k| (k as f64 + if k < side { 0.0 } else { missing as f64 } - middle) / (side + missing) as f64)
+        .collect();
+    let mut basis: Vec<Vec<f64>> = Vec::with_capacity(4);
+    for power in 0..4 {
+        let mut v: Vec<f64> = times.iter().map(|t| t.powi(power)).collect();
+        for b in &basis {
+            let along: f64 = v.iter().zip(b).map(|(v, b)| v * b).sum();
+            v.iter_mut().zip(b).for_each(|(v, b)| *v -= along * b);
+        }
+        let size = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        v.iter_mut().for_each(|v| *v /= size);
+        basis.push(v);
+    }
+    basis
+}
+
+/// Mean square of what the cubics leave of some samples.
+fn left(part: &[f64], basis: &[Vec<f64>]) -> f64 {
+    let zero = part[part.len() / 2];
+    let total: f64 = part.iter().map(|x| (x - zero).powi(2)).sum();
+    let explained: f64 =
+        basis.iter().map(|b| part.iter().zip(b).map(|(x, b)| (x - zero) * b).sum::<f64>().powi(2)).sum();
+    (total - explained).max(0.0) / (part.len() - 4) as f64
+}
+
+/// The cubics of one side's length: by how many samples are missing.
+struct Fits {
+    side: usize,
+    basis: Vec<Vec<Vec<f64>>>,
+}
+
+/// A position, and the mean square of its rounding: nothing is told more closely.
+struct Position<'a> {
+    values: &'a [f64],
+    rounding: f64,
+}
+
+impl Fits {
+    fn new(side: usize) -> Self {
+        Self { side, basis: (0..=LOST).map(|missing| cubics(side, missing)).collect() }
+    }
+
+    /// What the cubic leaves about row `k` with so many samples missing before it.
+    fn left(&self, x: &[f64], k: usize, missing: usize) -> f64 {
+        left(&x[k - self.side..k + self.side], &self.basis[missing])
+    }
+
+    /// What it usually leaves among some rows.
+    fn usual(&self, x: &Position<'_>, rows: Range<usize>) -> f64 {
+        let asked: Vec<f64> = rows.step_by(EVERY).map(|k| self.left(x.values, k, 0)).collect();
+        quantile(asked.into_iter(), 0.5).max(x.rounding)
+    }
+
+    /// The rows among some before which samples are missing, and how many.
+    fn slips(&self, x: &Position<'_>, rows: Range<usize>, candidates: &[usize]) -> Vec<(usize, usize)> {
+        let usual = self.usual(x, rows);
+        let slip = |k: &usize| {
+            if self.left(x.values, *k, 0) <= FAR * FAR * usual {
+                return None;
+            }
+            let best = (1..=LOST).map(|m| (m, self.left(x.values, *k, m))).min_by(|a, b| a.1.total_cmp(&b.1));
+            best.filter(|(_, left)| *left <= AGREE * AGREE * usual).map(|(missing, _)| (*k, missing))
+        };
+        candidates.iter().filter_map(slip).collect()
+    }
+
+    /// Whether a position has nothing against so many samples that are missing before a row.
+    fn agrees(&self, x: &Position<'_>, (k, missing): (usize, usize)) -> bool {
+        let from = (k / BLOCK * BLOCK).max(self.side);
+        let rows = from..(from + BLOCK).min(x.values.len() - self.side);
+        self.left(x.values, k, missing) <= AGREE * AGREE * self.usual(x, rows)
+    }
+}
+
+/// Rows before which samples are missing, and how many, as the positions say with one voice.
+fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
+    let margin = SIDES[1];
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    let fits = SIDES.map(Fits::new);
+    for (c, position) in positions.iter().enumerate() {
+        let x = position.values;
+        let n = x.len();
+        let third = |k: usize| x[k + 1] - 3.0 * x[k] + 3.0 * x[k - 1] - x[k - 2];
+        let mut start = margin;
+        while start + margin < n {
+            let rows = start..((start / BLOCK + 1) * BLOCK).min(n - margin);
+            start = rows.end;
+            let usual = quantile(rows.clone().map(third), 0.5);
+            // A sample that repeats the one before it is held, or the motion stands: what follows makes up for it.
+            let moves = |k: &usize| x[k - SIDES[0]..k + SIDES[0]].windows(2).all(|w| w[0] != w[1]);
+            let stands = |k: &usize| third(*k).abs() > STANDS * usual;
+            let candidates: Vec<usize> = rows.clone().filter(stands).filter(moves).collect();
+            if candidates.is_empty() {
+                continue;
+            }
+            for fit in &fits {
+                let others = |slip: &(usize, usize)| {
+                    positions.iter().enumerate().all(|(o, other)| o == c || fit.agrees(other, *slip))
+                };
+                found.extend(fit.slips(position, rows.clone(), &candidates).into_iter().filter(others));
+            }
+        }
+    }
+    // One is seen by both encoders, with both lengths, and from the rows beside it.
+    found.sort_unstable();
+    found.dedup_by(|next, first| next.0 - first.0 <= SIDES[0]);
+    found
+}
+
+/// Looks for samples that are missing under even stamps.
+pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
+    // A value that is rounded to steps of q is off by q/sqrt(12) rms.
+    let positions: Vec<Position<'_>> = input
+        .channels()
+        .filter(|c| c.name.starts_with("theta"))
+        .map(|c| Position { values: c.values, rounding: step(c.values).powi(2) / 12.0 })
+        .collect();
+    let n = input.len();
+    // Stamps that are not even are another finding: what they leave of the motion is no cubic.
+    let uneven = findings.iter().any(|f| f.signal == "time");
+    if positions.is_empty() || n < BLOCK || uneven {
+        return;
+    }
+    let found = slips(&positions);
+    let Some(first) = found.first() else { return };
+    let missing: usize = found.iter().map(|(_, m)| m).sum();
+    let ends = std::iter::once(0).chain(found.iter().map(|s| s.0)).chain([n]);
+    let whole = ends.clone().zip(ends.skip(1)).max_by_key(|(a, b)| b - a).unwrap_or((0, n));
+    let places = if found.len() == 1 { "1 place".to_owned() } else { format!("{} places", found.len()) };
+    findings.push(
+        Finding::new(
+            "lost_samples",
+            Severity::Refuse,
+            "time",
+            format!(
+                "{missing} samples are missing under even time stamps, at {places}, the first at {:.6} s: the motion goes on there as if \
+                 they had been left out.",
+                input.time(first.0)
+            ),
+            "The logger dropped rows and numbered the others through. Where the axis moves slowly more may be missing that do not show.",
+            format!(
+                "Log the drive's own time stamps, over a bus that keeps up; the longest part without a loss that shows is --from {:.6} --to \
+                 {:.6}.",
+                input.time(whole.0),
+                input.time(whole.1 - 1)
+            ),
+        )
+        .at(input, found.iter().map(|(k, _)| *k..*k + 1).collect()),
+    );
+}

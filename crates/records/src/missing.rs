@@ -1,0 +1,159 @@
+//! Cells without a number: few that stand alone are bridged by straight lines, in a whole table and in a stream by the same rule.
+
+use super::error::TraceError;
+use super::table::Fault;
+
+/// Share of a column's cells that may be missing for them to be bridged.
+const MISSING: f64 = 0.01;
+/// Most cells in a row that are bridged.
+const IN_A_ROW: usize = 3;
+
+/// The cells of a column that are missing, counted as they come.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Missing {
+    rows: usize,
+    count: usize,
+    run: usize,
+    longest: usize,
+    /// Whether the first cell is one of them: nothing is before it to draw a line from.
+    leads: bool,
+    /// The first of them.
+    first: Option<Fault>,
+}
+
+impl Missing {
+    /// Counts the next cells; `fault` is the first among them that is no number.
+    pub fn take(&mut self, values: &[f64], fault: Option<&Fault>) {
+        if let Some(fault) = fault {
+            fault.clone().into_first(&mut self.first);
+            self.leads |= self.rows == 0 && !values[0].is_finite();
+            for v in values {
+                self.run = if v.is_finite() { 0 } else { self.run + 1 };
+                self.count += usize::from(self.run > 0);
+                self.longest = self.longest.max(self.run);
+            }
+        } else if !values.is_empty() {
+            self.run = 0;
+        }
+        self.rows += values.len();
+    }
+
+    /// The fault that no line is drawn across, whatever follows: a cell that is something else than missing, the first cell, too many in
+    /// a row.
+    pub fn beyond(&self) -> Option<&Fault> {
+        self.first.as_ref().filter(|f| !f.missing() || self.leads || self.longest > IN_A_ROW)
+    }
+
+    /// Of a column that is at its end: the fault for which it is not bridged, or what is said of it where it is; nothing where no cell
+    /// is missing.
+    pub fn ended(&self, file: &str, column: &str) -> Result<Option<String>, Fault> {
+        let Some(fault) = &self.first else { return Ok(None) };
+        if self.beyond().is_some() || self.run > 0 || self.count as f64 > MISSING * self.rows as f64 {
+            return Err(fault.clone());
+        }
+        Ok(Some(format!(
+            "{file}: column {column} has no number in {} of {} rows, the first row {} ({:?}); they were bridged by straight lines",
+            self.count, self.rows, fault.line, fault.text
+        )))
+    }
+}
+
+/// Straight lines across the cells that are no numbers, between those that are.
+pub(super) fn bridge(values: &mut [f64]) {
+    let mut last = 0;
+    for k in 1..values.len() {
+        if !values[k].is_finite() {
+            continue;
+        }
+        for j in last + 1..k {
+            let share = (j - last) as f64 / (k - last) as f64;
+            values[j] = values[last] + share * (values[k] - values[last]);
+        }
+        last = k;
+    }
+}
+
+/// Rows of a stream, whose columns come piece by piece: a piece that ends in a missing cell waits, from the last row that is whole on,
+/// for the one that follows.
+pub(super) struct Bridges {
+    columns: Vec<Missing>,
+    waiting: Option<Piece>,
+}
+
+/// Rows of some columns.
+pub(super) struct Piece {
+    /// Row of the first, from 0.
+    pub first: usize,
+    /// One a column.
+    pub columns: Vec<Vec<f64>>,
+    /// (row, line) as in a table.
+    pub lines: Vec<(usize, usize)>,
+}
+
+impl Piece {
+    /// Line in the file of a row that is among them, from 1.
+    pub fn line(&self, row: usize) -> usize {
+        let last = self.lines.partition_point(|(first, _)| *first <= row);
+        last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
+    }
+}
+
+impl Bridges {
+    /// For so many columns.
+    pub fn new(columns: usize) -> Self {
+        Self { columns: vec![Missing::default(); columns], waiting: None }
+    }
+
+    /// Takes the next rows, in each column of which the first cell that is no number is told; gives those that can be passed on.
+    ///
+    /// # Errors
+    /// The column, and its cell that is not bridged.
+    pub fn take(&mut self, rows: Piece, faults: &[Option<Fault>]) -> Result<Option<Piece>, (usize, Fault)> {
+        for (k, (missing, fault)) in self.columns.iter_mut().zip(faults).enumerate() {
+            missing.take(&rows.columns[k], fault.as_ref());
+            if let Some(fault) = missing.beyond() {
+                return Err((k, fault.clone()));
+            }
+        }
+        let waited = self.waiting.is_some();
+        let mut rows = match self.waiting.take() {
+            None => rows,
+            Some(mut all) => {
+                for (all, more) in all.columns.iter_mut().zip(rows.columns) {
+                    all.extend_from_slice(&more);
+                }
+                all.lines.extend(rows.lines);
+                all
+            }
+        };
+        let count = rows.columns.first().map_or(0, Vec::len);
+        let mut keep = count;
+        if self.columns.iter().any(|c| c.run > 0) {
+            // What waits begins with a row that has all its cells, as the first row of all has.
+            let whole = |row: &usize| rows.columns.iter().all(|c| c[*row].is_finite());
+            keep = (0..count).rev().find(whole).unwrap_or(0);
+            let line = |row: usize| (row, rows.line(row));
+            let lines = (rows.first + keep..rows.first + count).map(line).collect();
+            let columns = rows.columns.iter_mut().map(|c| c.split_off(keep)).collect();
+            self.waiting = Some(Piece { first: rows.first + keep, columns, lines });
+        }
+        if waited || faults.iter().any(Option::is_some) {
+            rows.columns.iter_mut().for_each(|c| bridge(c));
+        }
+        Ok((keep > 0).then_some(rows))
+    }
+
+    /// After the last rows: what is said of the columns that were bridged, `name(column)` each.
+    ///
+    /// # Errors
+    /// When a column has more missing cells than are bridged, or ends in one.
+    pub fn ended(self, file: &str, name: impl Fn(usize) -> String) -> Result<Vec<String>, TraceError> {
+        let mut words = Vec::new();
+        for (k, missing) in self.columns.iter().enumerate() {
+            let name = name(k);
+            let word = missing.ended(file, &name).map_err(|fault| fault.named(file, &name))?;
+            words.extend(word.filter(|w| !words.contains(w)));
+        }
+        Ok(words)
+    }
+}
