@@ -33,6 +33,8 @@ impl DryFriction for PositionFriction {
         bounds: |p, x| {
             p[0] <= x.torque
                 && p[2] <= 0.25 * x.travel()
+                // Seen by some samples of a crossing.
+                && p[2] >= 2.0 * x.speed * x.dt
                 && p[1] >= x.positions[0]
                 && p[1] <= x.positions[x.positions.len() - 1]
         },

@@ -365,8 +365,7 @@ impl Normal {
         Self { a, g }
     }
 
-    /// The step and the standard errors of its coordinates; what would leave its bounds stays and what would go too far goes as far as it
-    /// may, the others beside it.
+    /// The step and the standard errors of its coordinates; what would leave its bounds stays, others move without it.
     fn solve(
         &self,
         coordinates: &[Coordinate],
@@ -376,43 +375,40 @@ impl Normal {
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let k = coordinates.len();
         let mut fixed = held.to_vec();
-        let mut delta = vec![0.0; k];
-        let mut all: Option<Vec<f64>> = None;
         loop {
             let free: Vec<usize> = (0..k).filter(|i| !fixed[*i]).collect();
+            let mut delta = vec![0.0; k];
             let mut std = vec![f64::INFINITY; k];
             if free.is_empty() {
-                return Some((delta, all.unwrap_or(std)));
+                return Some((delta, std));
             }
             let scale: Vec<f64> = free.iter().map(|&i| self.a[(i, i)].max(1e-300).sqrt()).collect();
             let m = DMatrix::from_fn(free.len(), free.len(), |p, q| {
                 self.a[(free[p], free[q])] / (scale[p] * scale[q]) + if p == q { 1e-10 + damping } else { 0.0 }
             });
-            let r = DVector::from_fn(free.len(), |p, _| {
-                let beside: f64 = (0..k).filter(|i| fixed[*i]).map(|i| self.a[(free[p], i)] * delta[i]).sum();
-                (self.g[free[p]] - beside) / scale[p]
-            });
+            let r = DVector::from_fn(free.len(), |p, _| self.g[free[p]] / scale[p]);
             let inverse = m.cholesky()?.inverse();
             let step = &inverse * r;
-            let (mut again, mut farthest) = (false, (FARTHEST_STEP, None));
+            let mut again = false;
             for (p, &i) in free.iter().enumerate() {
                 delta[i] = step[p] / scale[p];
                 std[i] = inverse[(p, p)].max(0.0).sqrt() / scale[p];
+                if coordinates[i].log && !coordinates[i].is_base() {
+                    delta[i] = delta[i].clamp(-FARTHEST_STEP, FARTHEST_STEP);
+                }
                 let to = x[i] + delta[i];
                 let b = coordinates[i].bounds;
                 if (x[i] <= b[0] + 1e-12 && to < b[0]) || (x[i] >= b[1] - 1e-12 && to > b[1]) {
-                    (fixed[i], delta[i], again) = (true, 0.0, true);
-                } else if coordinates[i].log && delta[i].abs() > farthest.0 {
-                    farthest = (delta[i].abs(), Some(i));
+                    fixed[i] = true;
+                    again = true;
                 }
             }
-            if again {
-                continue;
+            if !again {
+                let farthest = coordinates.iter().zip(&delta).filter(|(c, _)| c.is_base()).map(|(_, d)| d.abs());
+                let shorter = FARTHEST_STEP / farthest.fold(FARTHEST_STEP, f64::max);
+                delta.iter_mut().for_each(|d| *d *= shorter);
+                return Some((delta, std));
             }
-            // How well each is known does not hang on how far a step may go.
-            let known = all.get_or_insert(std);
-            let Some(i) = farthest.1 else { return Some((delta, std::mem::take(known))) };
-            (fixed[i], delta[i]) = (true, FARTHEST_STEP.copysign(delta[i]));
         }
     }
 }
