@@ -179,8 +179,8 @@ def test_a_simulation_is_that_of_fmpy(excitation, tmp_path):
 
 def test_errors_are_the_programs_own_words(record, own_temporary_folder):
     broken = record.copy()
-    broken.loc[99, "theta1"] = np.nan
-    with pytest.raises(eixo.EixoError, match=r"^trace\.csv: row 101, column theta1: \"nan\" is not a finite number") as caught:
+    broken.loc[99, "theta1"] = np.inf
+    with pytest.raises(eixo.EixoError, match=r"^trace\.csv: row 101, column theta1: \"inf\" is not a finite number") as caught:
         eixo.diagnose(broken, AXIS)
     assert caught.value.code == 2
     with pytest.raises(eixo.EixoError, match="^nowhere.csv: cannot "):

@@ -110,30 +110,61 @@ fn use_memory() {
     std::hint::black_box((&stack, &blocks));
 }
 
-/// The bytes of texts that the FMU gave; none of a null pointer.
-#[inline(never)]
-fn bytes_of(texts: &[*const c_char]) -> Vec<Option<Vec<u8>>> {
-    let bytes = |text: &*const c_char| {
-        // SAFETY: not null, and a C string by the standard's contract, until the FMU is called again.
-        (!text.is_null()).then(|| unsafe { std::ffi::CStr::from_ptr(*text) }.to_bytes().to_vec())
-    };
-    texts.iter().map(bytes).collect()
+/// Room for texts, made before the FMU gives them: memory that is asked for behind its call may be what it has freed.
+pub(super) struct Room {
+    bytes: Vec<u8>,
+    /// Where each text ends; none of a null pointer.
+    ends: Vec<Option<usize>>,
+}
+
+/// Bytes of all texts together for which there is room.
+const ROOM: usize = 1 << 16;
+
+impl Room {
+    fn new(texts: usize) -> Self {
+        Self { bytes: Vec::with_capacity(ROOM), ends: Vec::with_capacity(texts) }
+    }
+
+    /// Room to read as many texts twice.
+    pub(super) fn twice(texts: usize) -> [Self; 2] {
+        [Self::new(texts), Self::new(texts)]
+    }
+
+    /// Copies texts that the FMU gave.
+    #[inline(never)]
+    fn read(&mut self, texts: &[*const c_char]) {
+        for text in texts {
+            let end = (!text.is_null()).then(|| {
+                // SAFETY: not null, and a C string by the standard's contract, until the FMU is called again.
+                self.bytes.extend_from_slice(unsafe { std::ffi::CStr::from_ptr(*text) }.to_bytes());
+                self.bytes.len()
+            });
+            self.ends.push(end);
+        }
+    }
+
+    /// Text `k`.
+    fn text(&self, k: usize) -> Option<&[u8]> {
+        let start = self.ends[..k].iter().rev().find_map(|end| *end).unwrap_or_default();
+        Some(&self.bytes[start..self.ends[k]?])
+    }
 }
 
 /// Texts that the FMU gave, each with a check: `Err` says what is wrong with it. A part of its caller, so that the stack is
 /// used from where the FMU used it.
 #[inline(always)]
-pub(super) fn steady(texts: &[*const c_char]) -> Vec<Result<String, &'static str>> {
-    let first = bytes_of(texts);
+pub(super) fn steady(texts: &[*const c_char], [mut first, mut second]: [Room; 2]) -> Vec<Result<String, &'static str>> {
+    first.read(texts);
     use_memory();
-    let check = |(first, second): (Option<Vec<u8>>, Option<Vec<u8>>)| {
-        let (Some(first), Some(second)) = (first, second) else { return Err("a null pointer") };
+    second.read(texts);
+    let check = |k: usize| {
+        let (Some(first), Some(second)) = (first.text(k), second.text(k)) else { return Err("a null pointer") };
         if first != second {
             return Err("in memory that is not the FMU's any more: freed, or on the stack");
         }
-        String::from_utf8(first).map_err(|_| "no valid UTF-8")
+        std::str::from_utf8(first).map(str::to_owned).map_err(|_| "no valid UTF-8")
     };
-    first.into_iter().zip(bytes_of(texts)).map(check).collect()
+    (0..texts.len()).map(check).collect()
 }
 
 impl Instance {
@@ -176,12 +207,13 @@ impl Instance {
             return self.get_text3(references, true);
         }
         let mut values = vec![std::ptr::null::<c_char>(); references.len()];
+        let room = Room::twice(references.len());
         let function = self.binary.functions.get_string.ok_or(HostError::Missing("fmi2GetString"))?;
         note(Call::get_string);
         // SAFETY: the pointers are valid for the length.
         let status = unsafe { function(self.component, references.as_ptr(), references.len(), values.as_mut_ptr()) };
         ok(Call::get_string, status)?;
-        let texts = steady(&values);
+        let texts = steady(&values, room);
         note(Call::None);
         Ok(texts)
     }

@@ -96,9 +96,10 @@ impl Instance {
                 .collect());
         }
         let mut values = vec![std::ptr::null(); run.total];
+        let room = checked.then(|| abuse::Room::twice(run.total));
         call!(self, get3_string(references, count, values.as_mut_ptr(), values.len()))?;
-        if checked {
-            return Ok(abuse::steady(&values));
+        if let Some(room) = room {
+            return Ok(abuse::steady(&values, room));
         }
         let check = |text: &Text| {
             if text.is_null() {
