@@ -100,13 +100,16 @@ pub(crate) fn null_component(binary: &Binary, fmi: Fmi) {
     );
 }
 
-/// Uses stack and heap as a host may between two calls: what an FMU has freed, or left on the stack, is gone then.
+/// Reads texts while stack and heap are in use, as a host may use them between two calls: what an FMU has freed, or left on the
+/// stack, is gone then. Given back, a block may look as it did before.
 #[inline(never)]
-fn use_memory() {
+fn read_in_use(room: &mut Room, texts: &[*const c_char]) {
     /// Nothing that a text begins with, and an end every so often.
     const RUBBISH: [u8; 16] = *b"\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\0";
     let stack = std::hint::black_box([RUBBISH; 1024]);
     let blocks: Vec<Vec<[u8; 16]>> = (1..=64).flat_map(|size| std::iter::repeat_n(vec![RUBBISH; size], 8)).collect();
+    std::hint::black_box((&stack, &blocks));
+    room.read(texts);
     std::hint::black_box((&stack, &blocks));
 }
 
@@ -155,8 +158,7 @@ impl Room {
 #[inline(always)]
 pub(super) fn steady(texts: &[*const c_char], [mut first, mut second]: [Room; 2]) -> Vec<Result<String, &'static str>> {
     first.read(texts);
-    use_memory();
-    second.read(texts);
+    read_in_use(&mut second, texts);
     let check = |k: usize| {
         let (Some(first), Some(second)) = (first.text(k), second.text(k)) else { return Err("a null pointer") };
         if first != second {
