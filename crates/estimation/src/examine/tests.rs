@@ -212,6 +212,11 @@ fn samples_that_are_missing_under_even_stamps_are_found_where_the_axis_moves_and
             before += missing;
         }
     }
+    // One place alone is no logger that drops rows.
+    let one = examine(&without(&lost[..1]).positions());
+    let slip = one.find("lost_samples").expect("it is found");
+    assert_eq!(slip.severity, Severity::Warn, "{slip:?}");
+    assert!(slip.seen.starts_with("1 sample is missing under even time stamps, at 1 place,"), "{}", slip.seen);
     sound(&whole.positions(), "nothing is missing");
     // Counts that one encoder lost are as much as a sample of the motion now and then; the other has not moved.
     let mut jumped = whole.clone();
