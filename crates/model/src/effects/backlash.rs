@@ -29,7 +29,7 @@ impl Force for Backlash {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0] <= 4.0 * x.twist,
+        bounds: |p, x| p[0] <= 4.0 * x.twist && x.closes(p[0]),
         example: &[0.02],
         variants: &[Variant { name: "", free: &[0] }],
     };

@@ -29,7 +29,7 @@ impl Force for Disturbance {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0].abs() <= x.torque && x.holds(std::f64::consts::TAU * p[1]),
+        bounds: |p, x| x.has_amplitude(p[0]) && x.holds(std::f64::consts::TAU * p[1]),
         example: &[1e-3, 7.0, 0.4],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };

@@ -13,6 +13,8 @@ pub struct Extent<'a> {
     pub fastest: f64,
     /// Rms twist, rad.
     pub twist: f64,
+    /// Twist as measured, rad, sorted; empty where not both sides are.
+    pub twists: &'a [f64],
     /// Sampling interval, s.
     pub dt: f64,
     /// Length of the record, s.
@@ -31,8 +33,24 @@ pub struct Extent<'a> {
 
 /// Share of the energy that friction may seem to have taken beyond what there was: torque and way are measured.
 const MEASURED: f64 = 1.5;
+/// Least share of the record over which a coupling with play is in contact: one that never closes couples nothing.
+const CONTACT: f64 = 0.1;
+/// Least amplitude of a torque that repeats, over the largest torque: no drive knows its own better.
+const KNOWN: f64 = 1e-3;
+
+/// Share of sorted values that lie beyond two of them.
+fn share_beyond(sorted: &[f64], lower: f64, upper: f64) -> f64 {
+    let inside = sorted.partition_point(|x| *x <= upper).saturating_sub(sorted.partition_point(|x| *x < lower));
+    1.0 - inside as f64 / sorted.len().max(1) as f64
+}
 
 impl Extent<'_> {
+    /// Whether an amplitude, N.m, is one that a drive's torque can have: no more than the largest, and not lost in what that is true to.
+    #[must_use]
+    pub fn has_amplitude(&self, torque: f64) -> bool {
+        (KNOWN * self.torque..=self.torque).contains(&torque.abs())
+    }
+
     /// Travel of the effect's side, rad.
     #[must_use]
     pub fn travel(&self) -> f64 {
@@ -58,9 +76,13 @@ impl Extent<'_> {
     /// Share of the samples beyond two positions.
     #[must_use]
     pub fn beyond(&self, lower: f64, upper: f64) -> f64 {
-        let x = self.positions;
-        let inside = x.partition_point(|x| *x <= upper).saturating_sub(x.partition_point(|x| *x < lower));
-        1.0 - inside as f64 / x.len().max(1) as f64
+        share_beyond(self.positions, lower, upper)
+    }
+
+    /// Whether a play of twice `half_gap` closes over the record; not known where the twist is not measured.
+    #[must_use]
+    pub fn closes(&self, half_gap: f64) -> bool {
+        self.twists.is_empty() || share_beyond(self.twists, -half_gap, half_gap) >= CONTACT
     }
 
     /// Whether a time is a twentieth of a sample and turns the phase at the band's end by a fiftieth of a radian: less of it, a fiftieth of
@@ -88,21 +110,35 @@ mod tests {
     use super::*;
     use crate::effects::Effect;
 
+    fn resting() -> Extent<'static> {
+        Extent {
+            torque: 1.0,
+            positions: &[0.0, 1.0],
+            speed: 1.0,
+            fastest: 1.0,
+            twist: 0.0,
+            twists: &[],
+            dt: 4e-4,
+            length: 1.0,
+            band: 1000.0,
+            inertia: [1.0; 2],
+            stiffness: 0.0,
+            energy: 1.0,
+            way: (1.0, 0.0),
+        }
+    }
+
     #[test]
     fn friction_takes_no_more_energy_than_the_torque_brings() {
         let extent = Extent {
-            torque: 1.0,
             positions: &[-1.0, 1.0],
-            speed: 1.0,
             fastest: 2.0,
-            twist: 0.0,
             dt: 1e-3,
             length: 10.0,
             band: 100.0,
-            inertia: [1.0; 2],
-            stiffness: 0.0,
             energy: 2.0,
             way: (20.0, 9.0),
+            ..resting()
         };
         let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);
         // Over 20 rad a level of 0.1 N.m takes 2 J; at 2 rad/s so do 0.05 N.m.s/rad and half of that of the square.
@@ -119,21 +155,24 @@ mod tests {
     }
 
     #[test]
+    fn a_play_that_is_never_closed_is_none() {
+        let twists: Vec<f64> = (-50..=50).map(|i| f64::from(i) * 0.01).collect();
+        let extent = |twists| Extent { twist: 0.3, twists, ..resting() };
+        let admits = |twists, half_gap: f64| (Effect::Backlash.info().bounds)(&[half_gap], &extent(twists));
+        assert!(admits(&twists, 0.4) && !admits(&twists, 0.48) && !admits(&twists, 0.51));
+        // Of a twist that is not measured its size alone is known.
+        assert!(admits(&[], 0.51) && !admits(&[], 1.3));
+    }
+
+    #[test]
+    fn a_ripple_of_less_than_a_thousandth_of_the_torque_is_none() {
+        let admits = |amplitude: f64| (Effect::TorqueRipple.info().bounds)(&[amplitude, 10.0, 0.0], &resting());
+        assert!(admits(0.5) && admits(-0.01) && !admits(5e-4) && !admits(1.1));
+    }
+
+    #[test]
     fn a_delay_that_the_band_does_not_turn_by_a_fiftieth_of_a_radian_is_none() {
-        let extent = Extent {
-            torque: 1.0,
-            positions: &[0.0, 1.0],
-            speed: 1.0,
-            fastest: 1.0,
-            twist: 0.0,
-            dt: 4e-4,
-            length: 1.0,
-            band: 1000.0,
-            inertia: [1.0; 2],
-            stiffness: 0.0,
-            energy: 1.0,
-            way: (1.0, 0.0),
-        };
+        let extent = resting();
         let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);
         assert!(!admits(Effect::Latch, &[-9e-6, 0.0]) && admits(Effect::Latch, &[-9e-5, 0.0]));
         assert!(!admits(Effect::Latch, &[0.0, 9e-6]) && admits(Effect::Latch, &[0.0, 9e-4]));

@@ -59,6 +59,8 @@ impl<I: Side> Force for Mode<I> {
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
 
+    const IDENTIFYING: Option<usize> = Some(1);
+
     fn rate(p: &[f64], _inertia: f64) -> f64 {
         if p[0] > 0.0 { (p[1] / p[0]).sqrt() } else { 0.0 }
     }

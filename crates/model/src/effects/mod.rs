@@ -150,6 +150,14 @@ macro_rules! effects {
                 }
             }
 
+            /// The shape without which it is a change of the axis' own parameters: see [`Force::IDENTIFYING`].
+            #[must_use]
+            pub const fn identifying_parameter(self) -> Option<usize> {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law as Force>::IDENTIFYING, None),)*
+                }
+            }
+
             /// The parameter that is half of a play, whose contacts the step locates in time.
             #[must_use]
             pub const fn play_parameter(self) -> Option<usize> {

@@ -43,7 +43,7 @@ impl Force for TorqueRipple {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0].abs() <= x.torque && x.turns(p[1]),
+        bounds: |p, x| x.has_amplitude(p[0]) && x.turns(p[1]),
         example: &[5e-3, 4.0, 0.3],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
@@ -76,7 +76,7 @@ impl Force for Unbalance {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0].abs() <= x.torque && x.turns(1.0),
+        bounds: |p, x| x.has_amplitude(p[0]) && x.turns(1.0),
         example: &[1e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };

@@ -216,6 +216,8 @@ pub trait Force {
     const LENGTH: Option<Length> = None;
     /// The parameter at whose zero the effect is a simpler one of the list.
     const SIMPLER_AT_ZERO: Option<usize> = None;
+    /// The shape without which the effect is a change of the axis' own parameters: a mode of unknown stiffness is an inertia of its place.
+    const IDENTIFYING: Option<usize> = None;
 
     /// Fastest vibration that the effect adds to an inertia of `inertia` kg.m2 at its place, rad/s.
     fn rate(_p: &[f64], _inertia: f64) -> f64 {

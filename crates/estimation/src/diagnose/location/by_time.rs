@@ -1,5 +1,7 @@
 //! The residual in time: a drift, an event, or throughout.
 
+use crate::numerics::level::rms;
+
 /// Slots of a record.
 const SLOTS: usize = 20;
 
@@ -86,11 +88,6 @@ fn rank_correlation(values: &[f64]) -> f64 {
     let d: f64 = order.iter().enumerate().map(|(rank, k)| (rank as f64 - *k as f64).powi(2)).sum();
     let n = n as f64;
     1.0 - 6.0 * d / (n * (n * n - 1.0)).max(1.0)
-}
-
-/// Root mean square.
-pub fn rms(v: &[f64]) -> f64 {
-    (v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ use super::noise::find_period;
 use super::record::Record;
 use crate::axis::{Parameters, Structure};
 use crate::effects::Place;
+use crate::numerics::level::rms;
 
 /// Which of the residual torques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,7 +78,7 @@ pub fn along(record: &Record, residual: &Residual, site: Site) -> Location {
         frequency: appearance::frequency(&by_frequency, Side::Motor),
         spread: by_time::spread(&by_time),
     };
-    Location { site, rms: by_time::rms(r1), looks, by_time, by_frequency, by_state }
+    Location { site, rms: rms(r1), looks, by_time, by_frequency, by_state }
 }
 
 /// The record with the table's angle moved to the motor's, where the two start farther apart than the coupling could

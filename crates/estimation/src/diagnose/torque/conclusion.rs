@@ -21,11 +21,8 @@ const LEFT: f64 = 0.25;
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
-/// Probability from which an effect may be named beside others: as likely as one of two that the record cannot tell, and a remainder
-/// beside them.
-pub const LIKELY: f64 = 0.35;
-/// The same of a cause on its own, with which the verdict stands and falls: more likely than not.
-const ALONE: f64 = 0.5;
+/// Probability from which an effect may be named: more likely than not.
+pub const LIKELY: f64 = 0.5;
 /// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
 /// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
@@ -132,10 +129,9 @@ impl Search<'_> {
         let little = self.leaves_little(&chosen);
         let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
         pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
-        let finished = self.problem.finished(&chosen).unwrap_or_else(|| chosen.clone());
-        // With a cause on its own the verdict stands and falls: below two of its standard errors, everything free, it is none.
-        let alone = chosen.terms.len() == 1;
-        let decisive = |i: usize| match alone && is_undetermined(&finished, chosen.terms[i].0, independent) {
+        let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
+        // What is below two of its standard errors, everything free, is no cause.
+        let decisive = |i: usize| match is_undetermined(&finished, chosen.terms[i].0, independent) {
             true => 0.0,
             false => self.decisive(&chosen, i, &parameters, &pool),
         };
@@ -154,8 +150,7 @@ impl Search<'_> {
                 of * decisive * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
             })
             .collect();
-        let least_likely = if chosen.terms.len() == 1 { ALONE } else { LIKELY };
-        let likely = |p: &f64| *p >= least_likely;
+        let likely = |p: &f64| *p >= LIKELY;
         // One that is not likely explains nothing that needs a cause.
         if let [only] = probabilities[..]
             && !likely(&only)

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
 use super::likelihood::{Band, C, Discrepancy, Lacking, Sight};
+use super::scatter;
 use super::tracking::Bandwidth;
 use crate::axis::Structure;
 
@@ -244,12 +245,26 @@ impl<'a> Descent<'a> {
         Some(normal)
     }
 
-    /// Standard error of each free value, in its unit, everything free at once: what a step took them to be held some shapes.
-    pub fn standard_errors(&mut self) -> Option<Vec<f64>> {
+    /// Standard error of each free value, in its unit, everything free at once: what a step took them to be held some shapes. With a share of
+    /// `independent` values they are as large as the score's scatter over the record asks.
+    pub fn standard_errors(&mut self, independent: f64) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
-        let (_, errors) = self.normal(&x, share)?.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
-        Some(errors.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect())
+        let normal = self.normal(&x, share)?;
+        let (_, errors) = normal.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
+        let scatter = self.scatter(&normal).unwrap_or_else(|| vec![0.0; x.len()]);
+        let of = |i: usize| errors[i].max(scatter[i] * independent.sqrt()) * self.coordinates[i].slope(x[i]);
+        Some((0..x.len()).map(of).collect())
+    }
+
+    /// The same by how the score scatters between stretches of the record.
+    fn scatter(&self, normal: &Normal) -> Option<Vec<f64>> {
+        let in_time = |rows: &[Vec<C>; 2]| {
+            let (band, at) = (self.problem.band, &self.at);
+            band.whitened_in_time(&band.whiten(rows, &at.rows.weights, at.s))
+        };
+        let columns: Vec<scatter::Series> = self.columns.iter().map(in_time).collect();
+        scatter::standard_errors(&columns, &in_time(&self.at.rows.rows), &normal.a)
     }
 
     /// Follows the record at another bandwidth where that is likelier.

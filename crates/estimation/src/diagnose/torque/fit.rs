@@ -324,10 +324,10 @@ impl Problem<'_> {
     /// The fit decided for, along the model's own motion as far as that is likelier, with its standard errors. Below the floor of the noise no
     /// verdict changes by it; the parameters do by many standard errors, where an effect is bent and its torque along the measured motion
     /// leans with the noise.
-    pub fn finished(&self, fit: &Fit) -> Option<Fit> {
+    pub fn finished(&self, fit: &Fit, independent: f64) -> Option<Fit> {
         let mut descent = Descent::resumed(self, fit);
         descent.sharpen(true)?;
-        let std = descent.standard_errors()?;
+        let std = descent.standard_errors(independent)?;
         Some(Fit { std, settled: fit.settled, at_bound: fit.at_bound, ..descent.done() })
     }
 

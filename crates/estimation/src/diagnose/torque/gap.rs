@@ -19,6 +19,7 @@ use super::fit::Fit;
 use super::hidden::settle_all;
 use super::likelihood::Sight;
 use super::tracking::{Resolution, Run, start_states, track};
+use crate::numerics::level::deviation;
 
 /// Samples in a window.
 const WINDOW: usize = 512;
@@ -413,14 +414,7 @@ fn bootstrap(
 }
 
 fn signal_rms(record: &Record, c: usize) -> f64 {
-    record.channels[c].as_deref().map_or(0.0, rms_about_mean)
-}
-
-/// Rms of a series about its mean.
-pub fn rms_about_mean(series: &[f64]) -> f64 {
-    let n = series.len() as f64;
-    let mean = series.iter().sum::<f64>() / n;
-    (series.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    record.channels[c].as_deref().map_or(0.0, deviation)
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ use super::super::record::Record;
 use super::hidden::settle;
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
+use crate::numerics::level::deviation;
 
 /// Decades of variance below the residual's that a discrepancy is looked for in.
 const DECADES: i32 = 12;
@@ -575,22 +576,44 @@ impl Band {
 
     /// Rms in the band of the torque lacking beyond what the noise makes, N.m; of two equations together.
     pub fn torque_rms(&self, s: Discrepancy) -> f64 {
-        let bins: f64 = 2.0 * self.weight.iter().sum::<f64>() / self.n as f64;
-        (s.iter().take(self.equations()).sum::<f64>() * bins).sqrt()
+        (s.iter().take(self.equations()).sum::<f64>() * self.bins()).sqrt()
     }
 
     /// The same over the rms of the torque about its mean.
     pub fn torque_share(&self, s: Discrepancy, record: &Record) -> f64 {
-        let n = record.torque.len() as f64;
-        let mean = record.torque.iter().sum::<f64>() / n;
-        let rms = (record.torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / n).sqrt();
-        self.torque_rms(s) / rms.max(f64::MIN_POSITIVE)
+        self.torque_rms(s) / deviation(&record.torque).max(f64::MIN_POSITIVE)
+    }
+
+    /// Variance of the discrepancy of one equation that is this share of the torque.
+    pub fn of_torque_share(&self, share: f64, record: &Record) -> f64 {
+        (share * deviation(&record.torque)).powi(2) / self.bins()
+    }
+
+    /// Samples of the band in one of the record.
+    fn bins(&self) -> f64 {
+        2.0 * self.weight.iter().sum::<f64>() / self.n as f64
     }
 
     /// Rms in the band of the torque that the noise makes, N.m; of two equations together.
     pub fn noise_rms(&self) -> f64 {
         let noise = [0, 1].map(|i| if i < self.equations() { self.noise_power(i) } else { 0.0 });
         self.torque_rms(noise)
+    }
+
+    /// Whitened rows of each equation as series in time, whose products over the whole record are those of the rows.
+    pub fn whitened_in_time(&self, whitened: &[f64]) -> Vec<Vec<f64>> {
+        let n = 2 * self.omega.len();
+        let equations = self.equations();
+        let series = |i: usize| {
+            let mut z = vec![C::default(); n];
+            for (z, row) in z.iter_mut().zip(whitened.chunks_exact(2 * equations)) {
+                *z = C::new(row[2 * i], row[2 * i + 1]);
+            }
+            FftPlanner::new().plan_fft_inverse(n).process(&mut z);
+            let scale = (n as f64).sqrt();
+            z.iter().flat_map(|v| [v.re / scale, v.im / scale]).collect()
+        };
+        (0..equations).map(series).collect()
     }
 
     /// A spectrum of an equation as a series in time; nothing of an equation that the record has not.

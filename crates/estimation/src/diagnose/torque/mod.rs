@@ -17,6 +17,7 @@ mod likelihood;
 mod pool;
 mod race;
 mod scales;
+mod scatter;
 mod search;
 mod starts;
 #[cfg(test)]
@@ -38,12 +39,13 @@ use super::repair::bridged;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
+use crate::numerics::level::deviation;
 use band::{Rate, Reach};
 use conclusion::LIKELY;
 pub use conclusion::{Confusable, Decision, UNCAUSED, Weighed};
 pub use fit::Fit;
 use fit::{Problem, largest};
-use gap::{Gap, Gaps, rms_about_mean};
+use gap::{Gap, Gaps};
 use likelihood::Band;
 use search::{NEGLIGIBLE, Search, decide};
 use tracking::{Resolution, Tracked, track};
@@ -219,7 +221,7 @@ fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate, peak: f64) 
     let fit = problem.fit(nominal, &[], [f64::MAX; 2], REFERRED);
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
     let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
-    let torque_rms = rms_about_mean(&record.torque);
+    let torque_rms = deviation(&record.torque);
     (Prepared { record, band, rate, limit, torque_rms, peak }, left)
 }
 
@@ -235,7 +237,7 @@ impl Prepared {
         let slow = band::decimate(&whole, self.limit, self.rate);
         let record = slow.part(0..band::smooth(slow.len()));
         let band = Band::new(&record, model, self.limit, &band::mask(&record));
-        let torque_rms = rms_about_mean(&record.torque).max(self.torque_rms);
+        let torque_rms = deviation(&record.torque).max(self.torque_rms);
         Self { record, band, torque_rms, ..*self }
     }
 }

@@ -4,6 +4,7 @@ use super::super::model::Model;
 use super::fit::{Fit, Problem};
 use crate::axis::Structure;
 use crate::effects::{Effect, Extent, Place, Scale};
+use crate::numerics::level::deviation;
 
 #[derive(Clone)]
 pub struct Scales {
@@ -19,6 +20,8 @@ pub struct Scales {
     pub fastest: [f64; 2],
     /// Positions of motor and table, sorted.
     positions: [Vec<f64>; 2],
+    /// Twist as measured, sorted; empty where not both sides are.
+    twists: Vec<f64>,
     /// Work of the torque, and what weights and springs of no more than its peak can have given between the record's ends, J.
     work: f64,
     /// Square of the speed at which the record begins, (rad/s)^2.
@@ -86,9 +89,16 @@ impl Scales {
             let noise = p.record.channels[2 * i].as_ref().map_or(0.0, |_| p.record.noise[2 * i]);
             way(t.motion.iter().map(|m| m[2 * i]), TURN * noise)
         });
-        let mean = torque.iter().sum::<f64>() / n;
+        let sorted = |mut x: Vec<f64>| {
+            x.sort_by(f64::total_cmp);
+            x
+        };
+        let twists = match [0, 2].map(|c: usize| p.record.channels[c].as_ref()) {
+            [Some(motor), Some(table)] => motor.iter().zip(table).map(|(a, b)| a - b).collect(),
+            _ => Vec::new(),
+        };
         Some(Self {
-            torque: (torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / n).sqrt(),
+            torque: deviation(torque),
             peak,
             work: work.max(0.0) + peak * shifted,
             begins: t.motion[0][2 * driven + 1].powi(2),
@@ -101,11 +111,8 @@ impl Scales {
             length: n * p.record.dt,
             top: p.band.omega.last().copied().unwrap_or(1.0),
             fastest: [1, 3].map(|i| t.motion.iter().fold(0.0_f64, |m, s| m.max(s[i].abs()))),
-            positions: [0, 2].map(|i| {
-                let mut x: Vec<f64> = t.motion.iter().map(|m| m[i]).collect();
-                x.sort_by(f64::total_cmp);
-                x
-            }),
+            positions: [0, 2].map(|i: usize| sorted(t.motion.iter().map(|m| m[i]).collect())),
+            twists: sorted(twists),
             structure: p.nominal.structure,
         })
     }
@@ -124,6 +131,7 @@ impl Scales {
                 speed: self.speed[side],
                 fastest: self.fastest[side],
                 twist: self.twist,
+                twists: &self.twists,
                 dt: self.dt,
                 length: self.length,
                 band: self.top,

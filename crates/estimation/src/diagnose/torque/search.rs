@@ -20,6 +20,7 @@ use super::pool::Pool;
 use super::scales::Scales;
 use super::starts::{Look, StartPoint};
 use crate::effects::Effect;
+use crate::numerics::level::{deviation, rms};
 
 /// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
 const MATERIAL: f64 = 0.25;
@@ -85,15 +86,16 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
         search.extended(&parameters, 0, &mut pool);
     }
     let mut chosen = search.climb(known.unwrap_or_else(|| parameters.clone()), &mut pool);
-    // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
-    let decided = chosen.terms.len() == 1 && search.leaves_little(&chosen);
-    if !decided && !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
+    if !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
         // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
+        // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
+        let most = if chosen.terms.len() == 1 { search.longest_beside(&chosen) } else { MOST };
         let textbook = search.textbook(&parameters, &chosen);
         pool.extend(textbook.iter().cloned());
         let share = search.independent(&textbook);
-        if let Some(first) = search.best(&textbook, share).filter(|f| f.terms != chosen.terms).cloned() {
+        let rivals: Vec<Fit> = textbook.into_iter().filter(|f| f.terms.len() <= most).collect();
+        if let Some(first) = search.best(&rivals, share).filter(|f| f.terms != chosen.terms).cloned() {
             let other = search.climb(first, &mut pool);
             if search.is_likelier(&other, &chosen) {
                 chosen = other;
@@ -245,14 +247,18 @@ impl Search<'_> {
         best
     }
 
+    /// Effects that another account may have at most: of those that leave next to nothing the shorter is told.
+    fn longest_beside(&self, chosen: &Fit) -> usize {
+        if self.leaves_little(chosen) { chosen.terms.len() } else { MOST }
+    }
+
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
     fn overlooked(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
         if self.at_floor(chosen) || self.is_negligible(chosen) {
             return None;
         }
         let share = self.independent(std::slice::from_ref(chosen));
-        // Of accounts that leave next to nothing the shorter is told.
-        let most = if self.leaves_little(chosen) { chosen.terms.len() } else { MOST };
+        let most = self.longest_beside(chosen);
         let rivals: Vec<Fit> =
             pool.fits().iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= most).cloned().collect();
         let best = self.best(&rivals, share)?;
@@ -307,7 +313,14 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is less than a log's torque is true to.
     fn is_negligible(&self, fit: &Fit) -> bool {
-        self.left(fit) < if self.band().sight == Sight::Both { NEGLIGIBLE_IN_TWIST } else { NEGLIGIBLE }
+        self.left(fit) < self.negligible()
+    }
+
+    /// Share of the torque's changes below which nothing is a cause: what a drive is true to goes with all of its torque.
+    fn negligible(&self) -> f64 {
+        let torque = &self.problem.record.torque;
+        let share = if self.band().sight == Sight::Both { NEGLIGIBLE_IN_TWIST } else { NEGLIGIBLE };
+        share * rms(torque) / deviation(torque).max(f64::MIN_POSITIVE)
     }
 
     /// Whether what a fit leaves holds no further cause.
@@ -340,12 +353,15 @@ impl Search<'_> {
         held.into_iter().chain(freed).collect()
     }
 
-    /// Whether the richer explains a material part of what the plainer leaves, and of the gap.
+    /// Whether the richer explains a material part of what the plainer leaves, of the gap and of the torque.
     fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
-        (0..self.band().equations())
-            .any(|i| after[i] <= (1.0 - share) * before[i] && before[i] - after[i] >= MINOR * self.gap[i])
+        let least = self.band().of_torque_share(self.negligible(), self.problem.record);
+        (0..self.band().equations()).any(|i| {
+            let explained = before[i] - after[i];
+            after[i] <= (1.0 - share) * before[i] && explained >= least.max(MINOR * self.gap[i])
+        })
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
@@ -511,13 +527,17 @@ fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
     rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|t| is_undetermined(rich, t.0, independent))
 }
 
-/// Whether every size of an effect of a fit is below two of its standard errors, with `independent` of its values so.
+/// Whether every size of an effect of a fit is below two of its standard errors, or what tells it from a change of the axis' own parameters
+/// is, with `independent` of its values so.
 pub fn is_undetermined(fit: &Fit, effect: Effect, independent: f64) -> bool {
-    fit.coordinates
-        .iter()
-        .zip(&fit.std)
-        .filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == effect) && !c.is_shape())
-        .all(|(c, std)| c.value(&fit.model).abs() < 2.0 * std / independent.sqrt())
+    let below = |c: &Coordinate, std: f64| c.value(&fit.model).abs() < 2.0 * std / independent.sqrt();
+    let own =
+        || fit.coordinates.iter().zip(&fit.std).filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == effect));
+    // A shape that was held so far says nothing.
+    let identifying =
+        |c: &Coordinate| effect.identifying_parameter().is_some_and(|i| c.free == Free::Effect(effect, i));
+    own().filter(|(c, _)| !c.is_shape()).all(|(c, std)| below(c, *std))
+        || own().any(|(c, std)| identifying(c) && std.is_finite() && below(c, *std))
 }
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
@@ -567,6 +587,20 @@ mod tests {
         assert!(!is_lost(&plain, &rich, 1.0));
         // A quarter of the values: twice the standard error.
         assert!(is_lost(&plain, &rich, 0.25));
+    }
+
+    #[test]
+    fn a_mode_whose_stiffness_is_not_known_is_none() {
+        let effect = Effect::FlexibleMode;
+        let of = |errors: [f64; 2]| {
+            let mut fit = fit(&[(effect, 0)]);
+            fit.model.effects.of_mut(effect)[..2].copy_from_slice(&[1e-3, 100.0]);
+            fit.coordinates.extend([0, 1].map(|i| Coordinate::new(Free::Effect(effect, i), &fit.model)));
+            fit.std.extend(errors);
+            fit
+        };
+        assert!(!is_undetermined(&of([1e-4, 10.0]), effect, 1.0));
+        assert!(is_undetermined(&of([1e-4, 60.0]), effect, 1.0) && is_undetermined(&of([1e-3, 10.0]), effect, 1.0));
     }
 
     #[test]

@@ -1,0 +1,74 @@
+//! Standard errors by how the score scatters between stretches of the record (White, Econometrica 50, 1982; Newey, West, Econometrica 55,
+//! 1987): what is left may pull a parameter one way in one stretch and another way in the next, whatever its spectrum.
+
+use nalgebra::DMatrix;
+
+/// Stretches that are compared.
+const STRETCHES: usize = 24;
+
+/// A series of each equation.
+pub type Series = Vec<Vec<f64>>;
+
+/// Standard errors of parameters from whitened columns, one for each parameter, the whitened residual, and the information, `J'J` and the
+/// prior's; `None` where the information is singular.
+pub fn standard_errors(columns: &[Series], residual: &Series, information: &DMatrix<f64>) -> Option<Vec<f64>> {
+    let k = columns.len();
+    let pulls: Vec<[f64; STRETCHES]> = columns.iter().map(|column| about_mean(pulls(column, residual))).collect();
+    let freedom = STRETCHES as f64 / (STRETCHES as f64 - 1.0);
+    // In units in which the information has a unit diagonal.
+    let scale: Vec<f64> = (0..k).map(|i| information[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = |p: usize, q: usize, value: f64| value / (scale[p] * scale[q]);
+    let spread = DMatrix::from_fn(k, k, |p, q| {
+        scaled(p, q, freedom * pulls[p].iter().zip(&pulls[q]).map(|(a, b)| a * b).sum::<f64>())
+    });
+    let inverse = DMatrix::from_fn(k, k, |p, q| scaled(p, q, information[(p, q)])).cholesky()?.inverse();
+    let covariance = &inverse * spread * &inverse;
+    Some((0..k).map(|i| covariance[(i, i)].max(0.0).sqrt() / scale[i]).collect())
+}
+
+/// The score's part from each stretch.
+fn pulls(column: &Series, residual: &Series) -> [f64; STRETCHES] {
+    std::array::from_fn(|stretch| {
+        let of_equation = |(c, r): (&Vec<f64>, &Vec<f64>)| -> f64 {
+            let at = |b: usize| b * r.len() / STRETCHES;
+            (at(stretch)..at(stretch + 1)).map(|k| c[k] * r[k]).sum()
+        };
+        column.iter().zip(residual).map(of_equation).sum()
+    })
+}
+
+fn about_mean(values: [f64; STRETCHES]) -> [f64; STRETCHES] {
+    let mean = values.iter().sum::<f64>() / STRETCHES as f64;
+    values.map(|v| v - mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::level::noise;
+
+    /// Standard error of the slope of `e` over `x`, and the one that a noise of variance one everywhere has.
+    fn of(x: Vec<f64>, e: Vec<f64>) -> [f64; 2] {
+        let information = x.iter().map(|x| x * x).sum::<f64>();
+        let errors = standard_errors(&[vec![x]], &vec![e], &DMatrix::from_element(1, 1, information));
+        [errors.expect("regular")[0], information.sqrt().recip()]
+    }
+
+    #[test]
+    fn of_white_noise_they_are_those_of_the_information() {
+        let x: Vec<f64> = (0..24_000).map(|k| f64::from(k).sin()).collect();
+        let [found, white] = of(x, noise(24_000, 1));
+        assert!((found / white - 1.0).abs() < 0.3, "{found} {white}");
+    }
+
+    #[test]
+    fn of_a_residual_that_is_large_where_its_column_is_they_are_larger() {
+        // A column of 3 with a noise of 3 at one sample in six, of 1 with 1 elsewhere: sqrt(sum x^2 s^2)/sum x^2.
+        let high = |k: usize| if k.is_multiple_of(6) { 3.0 } else { 1.0 };
+        let x: Vec<f64> = (0..24_000).map(high).collect();
+        let e: Vec<f64> = noise(24_000, 2).iter().zip(&x).map(|(e, s)| e * s).collect();
+        let [found, white] = of(x, e);
+        let expected = ((81.0 + 5.0) / 6.0_f64).sqrt() / ((9.0 + 5.0) / 6.0_f64).sqrt();
+        assert!((found / white / expected - 1.0).abs() < 0.35, "{} {expected}", found / white);
+    }
+}
