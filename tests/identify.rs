@@ -281,6 +281,26 @@ fn a_record_that_does_not_move_names_what_it_cannot_determine() {
 }
 
 #[test]
+fn a_torque_of_the_log_that_moves_nothing_identifies_nothing_even_where_it_is_trusted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = experiment(folder.path());
+    let mut trace = load(&whole, &Mapping::default()).expect("the trace").trace;
+    trace.remove(Signal::Omega1);
+    trace.remove(Signal::Omega2);
+    let torque = trace.get(Signal::T).expect("T").to_vec();
+    let end = 0.6 * torque.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
+    trace.set(Signal::T, torque.iter().map(|t| t.clamp(-end, end)).collect()).expect("T");
+    let clipped = folder.path().join("clipped.csv");
+    write_csv(&clipped, &trace, Motion::Rotary).expect("the clipped trace");
+    // Output error follows it by the initial state and an inertia that no torque moves.
+    let out = eixo(&["identify", text(&clipped), "--trust"]);
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert_eq!(out.status.code(), Some(1), "{said}");
+    assert!(!said.contains("identifies the axis:"), "{said}");
+    assert!(said.contains("without the torque"), "{said}");
+}
+
+#[test]
 fn an_unreadable_trace_and_an_unwritable_result_end_with_two() {
     let folder = tempfile::tempdir().unwrap();
     let out = eixo(&["identify", text(&folder.path().join("none.csv"))]);

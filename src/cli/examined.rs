@@ -76,6 +76,8 @@ pub struct Refused {
     pub file: String,
     /// What was found.
     pub examination: Examination,
+    /// What was found on reading it.
+    pub warnings: Vec<String>,
     /// What drives the axis.
     pub driven: Driven,
 }
@@ -90,6 +92,7 @@ impl Refused {
     pub fn blocks(&self) -> Vec<Block> {
         let mut blocks = vec![Block::Verdict(verdict(&self.examination))];
         blocks.extend(findings(&self.examination));
+        blocks.extend(self.warnings.iter().cloned().map(Block::Warning));
         blocks.push(Block::Paragraph(format!(
             "No verdict is given on {}. Mend what stands above, or say --trust to have one all the same; `eixo inspect` draws \
              the record.",
@@ -100,7 +103,7 @@ impl Refused {
 
     /// The same for programs.
     pub fn json(&self) -> serde_json::Value {
-        serde_json::json!({ "schema": "eixo.examination/1", "trace": self.file, "examination": self.examination })
+        serde_json::json!({ "schema": "eixo.examination/1", "trace": self.file, "warnings": self.warnings, "examination": self.examination })
     }
 }
 
@@ -138,7 +141,7 @@ pub fn examined_log(
     let driven = Driven { motion: machine.signals.motion, unit: drive };
     let Seen { trace, examination } = seen(trace, stamps.as_deref(), machine, known)?;
     if examination.refuses() && !trust {
-        return Err(Refused { file: path.display().to_string(), examination, driven }.into());
+        return Err(Refused { file: path.display().to_string(), examination, warnings, driven }.into());
     }
     warnings.extend(told(&examination));
     let usable = &examination.usable;
@@ -199,7 +202,8 @@ pub fn examined_pieces(
     let file = path.display();
     let first = seen(trace, stamps.as_deref(), machine, known)?;
     if first.examination.refuses() && !trust {
-        return Err(Refused { file: file.to_string(), examination: first.examination, driven }.into());
+        let (file, examination) = (file.to_string(), first.examination);
+        return Err(Refused { file, examination, warnings, driven }.into());
     }
     warnings.extend(told(&first.examination));
     let doubts = doubts(&first.examination, trust);

@@ -8,8 +8,12 @@ use crate::report::{Block, Cell, Table};
 /// Whether an estimate is one: finite, and larger than its standard error.
 pub fn is_shown(e: &Estimate) -> bool {
     // What no axis has is not shown as a value of it.
-    let negative = e.value < 0.0 && matches!(e.name, "I" | "I1" | "I2" | "B" | "K" | "wn" | "zeta");
-    e.value.is_finite() && !negative && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
+    let impossible = match e.name {
+        "I" | "I1" | "I2" | "K" | "wn" => e.value <= 0.0,
+        "B" | "zeta" => e.value < 0.0,
+        _ => false,
+    };
+    e.value.is_finite() && !impossible && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
 }
 
 pub fn value(e: &Estimate) -> Cell {

@@ -76,6 +76,28 @@ impl Run<'_> {
         fits.reduce(f64::min)
     }
 
+    /// Share of what an axis that coasts leaves of an output that the torque explains, per cent, of the output where that is largest: below
+    /// a half the record is followed by its initial state, whatever the inertias.
+    pub fn driven(&self, p: &Parameters, scheme: Scheme) -> Option<f64> {
+        if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
+            return None;
+        }
+        let free = Free {
+            parameters: false,
+            offset: self.record.zero_offset != 0.0,
+            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
+        };
+        let still = vec![0.0; self.compared.len()];
+        let coasting = self.outputs.driven_by(&still);
+        let left = |model: &OutputError<'_>| model.residuals(&model.fit(p, scheme, free));
+        let (driven, coasting) = (left(self.outputs), left(&coasting));
+        let explained = driven
+            .iter()
+            .zip(&coasting)
+            .map(|((_, with), (_, without))| 100.0 * (1.0 - rms(with) / rms(without).max(f64::MIN_POSITIVE)));
+        explained.reduce(f64::max)
+    }
+
     /// The torque from the motion (Inverse Problem 2): `I1*a1 + I2*a2` with measured accelerations, else row 1 of (2)
     /// between samples.
     fn excitation(&self, estimated: &Estimated) -> ExcitationEstimate {

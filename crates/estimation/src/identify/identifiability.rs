@@ -37,6 +37,8 @@ pub struct Identifiability {
 pub(super) struct Evidence {
     /// Fit on the held-out part, per cent.
     pub held_out: Option<f64>,
+    /// Share of an output that the torque explains beyond the initial state, per cent, where that is largest.
+    pub driven: Option<f64>,
     /// Share of the accelerations that the equations of motion explain, motor and table, where no simulation was compared.
     pub explained: Option<[f64; 2]>,
     /// Torques that go with viscous friction, dry friction and load at one unit of each, as shares of the torque's size.
@@ -103,6 +105,10 @@ impl Identifiability {
         {
             doubts.push(format!("Its simulation does not follow {}.", worst.signal.name()));
             "Diagnose the record for what the model leaves out (`eixo diagnose`).".clone_into(&mut advice);
+        } else if evidence.driven.is_some_and(|d| is_below(d, LEAST_FIT)) {
+            doubts.push("Its simulation follows the record as well without the torque: an inertia shows in what a torque does to it.".to_owned());
+            "Look at the torque of the record (`eixo inspect`): its sign, its unit, whether it is clipped or of another axis."
+                .clone_into(&mut advice);
         } else if let Some(held) = evidence.held_out.filter(|h| is_below(*h, LEAST_FIT)) {
             doubts.push(if held.is_finite() && held > 0.0 {
                 format!("A fit to the first two thirds of the record follows the last third to {held:.0} % only.")

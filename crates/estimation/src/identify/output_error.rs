@@ -130,6 +130,12 @@ impl<'a> OutputError<'a> {
         Self::in_pieces(trace, std::iter::once(0..trace.len()).collect(), vec![trace.start], rho, structure, effects)
     }
 
+    /// The same with another torque, N.m, one value a sample.
+    #[must_use]
+    pub fn driven_by(&self, torque: &'a [f64]) -> Self {
+        Self { torque, ..self.clone() }
+    }
+
     /// Takes a record in pieces, see [`OutputError::new`].
     ///
     /// # Errors

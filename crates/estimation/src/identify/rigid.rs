@@ -325,7 +325,8 @@ pub(super) fn identify(
                 format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
-            evidence = Evidence { held_out: held_out(regressed), shares: Some(shares(&motions)), explained: None };
+            evidence =
+                Evidence { held_out: held_out(regressed), shares: Some(shares(&motions)), ..Evidence::default() };
             for (i, name) in names.into_iter().enumerate() {
                 let r = if i == 0 { reference } else { None };
                 result.parameters.push(Estimate::new(name, units(motion)[i], found.values[i], Some(found.std[i]), r));

@@ -265,14 +265,15 @@ pub fn identify_joined(
     }
     let recommended = recommend(&methods, record.omega.is_some());
     steps.next("held-out part");
-    let held_out =
-        recommended.as_ref().filter(|r| methods[r.method].method != Method::Frequency.name()).and_then(|r| {
-            let name = methods[r.method].method;
-            let p = run.estimates.iter().find(|(n, _)| *n == name)?.1.parameters(machine.parameters.rho);
-            run.held_out(&p, scheme)
-        });
+    let simulated = recommended.as_ref().and_then(|r| {
+        let name = methods[r.method].method;
+        let found = run.estimates.iter().find(|(n, _)| *n == name && name != Method::Frequency.name())?;
+        Some(found.1.parameters(machine.parameters.rho))
+    });
+    let held_out = simulated.and_then(|p| run.held_out(&p, scheme));
+    let driven = simulated.and_then(|p| run.driven(&p, scheme));
     let best = recommended.as_ref().map(|r| &methods[r.method]);
-    let identifiability = Identifiability::of(best, Evidence { held_out, ..Evidence::default() });
+    let identifiability = Identifiability::of(best, Evidence { held_out, driven, ..Evidence::default() });
     let frequency_response = measured.as_ref().and_then(|m| {
         let index = recommended.as_ref()?.method;
         let p = run.estimates.iter().find(|(name, _)| *name == methods[index].method)?.1.parameters(1.0);
