@@ -111,6 +111,19 @@ fn a_play_in_the_model_comes_back_from_its_circle_in_micrometres() {
 }
 
 #[test]
+fn of_axes_without_effects_no_rounding_is_ranked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let output = eixo(at, &["circle", "--json", "c.json", "--report", "c.html"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("The circular deviation is 0 µm.") && !said.contains("not explained"), "{said}");
+    assert_eq!(json(at, "c.json")["trace"], Value::Null);
+    let page = std::fs::read_to_string(at.join("c.html")).expect("the page");
+    assert!(!page.contains("10⁻¹⁸") && !page.contains("10⁻¹⁵"), "a plot of rounding");
+}
+
+#[test]
 fn what_cannot_be_read_is_said_and_inputs_are_not_written_over() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();

@@ -205,6 +205,29 @@ fn a_torque_that_was_logged_early_identifies_nothing() {
 }
 
 #[test]
+fn a_refusal_says_what_reading_the_record_found_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("axis.toml"), AXIS).unwrap();
+    let mut log = Log::new(1);
+    log.0[2].fill(0.25);
+    log.write(&at("log.csv"), POSITIONS);
+    // A cell of the torque is lost.
+    let text = std::fs::read_to_string(at("log.csv")).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let mut cells: Vec<&str> = lines[100].split(',').collect();
+    cells[1] = "";
+    lines[100] = cells.join(",");
+    std::fs::write(at("log.csv"), lines.join("\n")).unwrap();
+    let done = run::eixo_in(folder.path(), &["identify", "log.csv", "--axis", "axis.toml", "--json", "seen.json"]);
+    let said = String::from_utf8_lossy(&done.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    assert!(said.contains("No verdict is given") && said.contains("has no number in 1 of"), "{said}");
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(at("seen.json")).unwrap()).unwrap();
+    assert!(json["warnings"][0].as_str().unwrap().contains("has no number in 1 of"), "{json}");
+}
+
+#[test]
 fn the_record_that_they_were_made_of_is_believed() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -6,6 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Path;
 
+/// Smallest length that a circular test shows, m: a nanometre is far below what a ballbar resolves.
+pub const SHOWN: f64 = 1e-9;
+
 /// The figures of a circular test, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roundness {

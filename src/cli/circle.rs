@@ -8,7 +8,7 @@ use super::diagnosed;
 use super::drives::{Drives, ideal, machine};
 use super::outputs;
 use super::stdout::out;
-use crate::circle::roundness::{Roundness, bidirectional};
+use crate::circle::roundness::{Roundness, SHOWN, bidirectional};
 use crate::circle::trace::{analyse, turns};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
 use crate::effects::{EFFECTS, Effect, Length};
@@ -175,7 +175,7 @@ pub(super) fn findings(axes: &[Machine; 2], found: Option<&[Machine; 2]>, wanted
     let less = if less.len() < 2 { Vec::new() } else { less };
     let without =
         less.into_iter().map(|(name, axes)| turn(format!("without {name}"), axes)).collect::<Result<_, _>>()?;
-    let analysis = runs.last().and_then(|run| {
+    let analysis = runs.last().filter(|run| run.both >= SHOWN).and_then(|run| {
         let [one, other] = run.paths.clone();
         let (turns, _) = turns(&[(circle.clockwise, one), (!circle.clockwise, other)], circle.radius)?;
         analyse(&turns, circle.radius, Some(circle.feed))

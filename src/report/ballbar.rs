@@ -7,6 +7,7 @@ use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::circle::measured::Measured;
+use crate::circle::roundness::SHOWN;
 use crate::circle::trace::{Analysis, Effect, Kind, Measure, Turn, remedy};
 
 /// The figures of ISO 230-4 of a measured test, m.
@@ -48,9 +49,9 @@ const WORTH: f64 = 0.05;
 /// Most deviations that are told what to do about.
 const MOST: usize = 5;
 
-/// Micrometres.
-fn micro(metres: f64) -> Cell {
-    Cell::Number(if metres.abs() < 1e-9 { 0.0 } else { 1e6 * metres }, 3, "µm".to_owned())
+/// Micrometres; what is below all that such a test shows is zero.
+pub fn micro(metres: f64) -> Cell {
+    Cell::Number(if metres.abs() < SHOWN { 0.0 } else { 1e6 * metres }, 3, "µm".to_owned())
 }
 
 fn text(cell: &Cell) -> String {
@@ -59,7 +60,7 @@ fn text(cell: &Cell) -> String {
 
 fn size(e: &Effect) -> Cell {
     match e.kind.measure() {
-        Measure::Ratio => Cell::Number(if e.size.abs() < 1e-9 { 0.0 } else { 1e6 * e.size }, 3, "µm/m".to_owned()),
+        Measure::Ratio => Cell::Number(if e.size.abs() < SHOWN { 0.0 } else { 1e6 * e.size }, 3, "µm/m".to_owned()),
         _ => micro(e.size),
     }
 }
@@ -70,8 +71,8 @@ const fn way(clockwise: bool) -> &'static str {
 
 /// What belongs to the size, in words.
 fn detail(e: &Effect, turns: &[Turn]) -> String {
-    let um = |m: f64| format::number(if m.abs() < 1e-9 { 0.0 } else { 1e6 * m }, 3, Medium::Page);
-    if e.size.abs() < 1e-9 && e.ends.is_none() {
+    let um = |m: f64| format::number(if m.abs() < SHOWN { 0.0 } else { 1e6 * m }, 3, Medium::Page);
+    if e.size.abs() < SHOWN && e.ends.is_none() {
         return "none".to_owned();
     }
     if e.error.is_some_and(|error| e.size.abs() < 2.0 * error) {
@@ -129,7 +130,7 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table 
     let mut table = Table::new("What the trace shows", columns);
     let mut told: Vec<Kind> = Vec::new();
     for e in &a.effects {
-        let unseen = e.size.abs() < 1e-9 || e.error.is_some_and(|error| e.size.abs() < 2.0 * error);
+        let unseen = e.size.abs() < SHOWN || e.error.is_some_and(|error| e.size.abs() < 2.0 * error);
         if medium == Medium::Terminal && unseen && e.kind != Kind::Remainder {
             continue;
         }
@@ -137,11 +138,11 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table 
             Cell::text(e.kind.name()),
             size(e),
             e.error.map_or(Cell::Empty, |error| {
-                if error < 1e-9 { Cell::Empty } else { size(&Effect { size: error, ..e.clone() }) }
+                if error < SHOWN { Cell::Empty } else { size(&Effect { size: error, ..e.clone() }) }
             }),
             micro(e.contribution),
             if a.circularity > 0.0 { Cell::Bar((e.contribution / a.circularity).max(0.0)) } else { Cell::Empty },
-            e.pair.filter(|_| e.size.abs() >= 1e-9).map_or(Cell::Empty, micro),
+            e.pair.filter(|_| e.size.abs() >= SHOWN).map_or(Cell::Empty, micro),
         ];
         if let Some(model) = model {
             let same = |m: &&Effect| {
@@ -284,7 +285,7 @@ fn polar(f: &Findings) -> PolarPlot {
 pub(super) fn unrolled(a: &Analysis) -> Vec<Figure> {
     let both = || a.turns.iter().flat_map(|t| &t.deviation).chain(a.model.iter().flatten()).copied();
     let (low, high) = both().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
-    let margin = 0.05 * (high - low).max(1e-9);
+    let margin = 0.05 * (high - low).max(SHOWN);
     let range = super::Range::Fixed(low - margin, high + margin);
     let figure = |(turn, model): (&Turn, &Vec<f64>)| {
         let mut order: Vec<(f64, f64, f64)> = turn

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::ballbar;
+use super::ballbar::{self, micro};
 use super::chart::{Axis, Chart, Colour, Dash, Series, When};
 use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace, Ring};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
-use crate::circle::roundness::{Roundness, deviations};
+use crate::circle::roundness::{Roundness, SHOWN, deviations};
 use crate::circle::trace::Analysis;
 use crate::circle::{CircleTest, Feedback, Path, Servo};
 use crate::trace::Motion;
@@ -94,7 +94,11 @@ pub fn report(f: &Findings) -> Report {
         let mut order: Vec<(f64, f64)> =
             angle.iter().zip(&deviation).map(|(a, d)| (a.to_degrees().rem_euclid(360.0), *d)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (degrees, sorted): (Vec<f64>, Vec<f64>) = order.into_iter().unzip();
+        let (degrees, mut sorted): (Vec<f64>, Vec<f64>) = order.into_iter().unzip();
+        if run.roundness[0].deviation < SHOWN {
+            // What varies less is the rounding of the simulation.
+            sorted.fill(run.roundness[0].mean);
+        }
         let line = Series::line(&*run.name, degrees, sorted).in_colour(colour).with_dash(dash);
         unrolled.series.push(line.of_model(if last { When::After } else { When::Before }));
     }
@@ -183,11 +187,6 @@ fn takes(f: &Findings) -> Table {
         table.row(vec![Cell::text(name), micro(run.both), micro(taken), share]);
     }
     table
-}
-
-/// Micrometres; a nanometre is below what such a test shows.
-fn micro(metres: f64) -> Cell {
-    Cell::Number(if metres.abs() < 1e-9 { 0.0 } else { 1e6 * metres }, 3, "µm".to_owned())
 }
 
 fn verdict(f: &Findings) -> Verdict {

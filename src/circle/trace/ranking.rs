@@ -9,6 +9,7 @@ use super::shapes::{Axis, Shape, known};
 use super::tones::{Scan, Tone};
 use super::{Point, Turn, points, remainder, wrapped};
 use crate::circle::Path;
+use crate::circle::roundness::SHOWN;
 use crate::circle::roundness::{Roundness, bidirectional};
 
 /// Most points of a turn that are worked on; a longer trace is averaged over groups of neighbours.
@@ -17,9 +18,6 @@ const MOST: usize = 7200;
 const TONES: usize = 2;
 /// A tone below this share of the circularity is not told.
 const MATERIAL: f64 = 0.01;
-/// A nanometre: below it is nothing to be seen by such a test, m.
-const FLOOR: f64 = 1e-9;
-
 /// What deviates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -260,7 +258,7 @@ pub fn analyse(turns: &[Turn], radius: f64, feed: Option<f64>) -> Option<Analysi
         }
         let shapes = fit.shapes.iter().copied().chain(tone.shapes(turns.len())).collect();
         let Some(with) = Fit::of(&all, &keep, shapes) else { break };
-        if amplitude(&with, tone, turns.len()).0 < FLOOR.max(MATERIAL * whole) {
+        if amplitude(&with, tone, turns.len()).0 < SHOWN.max(MATERIAL * whole) {
             break;
         }
         fit = with;
@@ -463,7 +461,7 @@ impl Trace {
         effects.push(Effect { error: None, ..self.effect(Kind::Remainder, (rms, 0.0), &left) });
         for (both, sum) in &pairs {
             let seen =
-                |e: &&Effect| e.kind.of_both() == Some(*both) && e.size.abs() > FLOOR.max(2.0 * e.error.unwrap_or(0.0));
+                |e: &&Effect| e.kind.of_both() == Some(*both) && e.size.abs() > SHOWN.max(2.0 * e.error.unwrap_or(0.0));
             let axes: BTreeSet<&str> = effects.iter().filter(seen).map(|e| e.kind.id()).collect();
             if axes.len() == 2 {
                 let taken = self.whole - circularity(&self.turns, self.radius, sum).unwrap_or(self.whole);

@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::shapes::Axis;
 use super::{Point, wrapped};
+use crate::circle::roundness::SHOWN;
 
 const DEG: f64 = PI / 180.0;
 /// Half width of the mean that is taken off: what is slower is no stick-slip.
@@ -61,7 +62,7 @@ pub(super) fn stick_slip(points: &[Point], keep: &[bool], residual: &[f64]) -> [
     let base = rms(&|p| from_reversal(Axis::X, p) > PI / 4.0 - FAST && from_reversal(Axis::Y, p) > PI / 4.0 - FAST);
     Axis::ALL.map(|axis| {
         let there = rms(&|p| from_reversal(axis, p) < CREEP);
-        if there <= UNLIKE * base || there < 1e-9 {
+        if there <= UNLIKE * base || there < SHOWN {
             return (0.0, vec![0.0; points.len()]);
         }
         let share = 1.0 - base / there;

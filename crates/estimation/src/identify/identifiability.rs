@@ -37,6 +37,8 @@ pub struct Identifiability {
 pub(super) struct Evidence {
     /// Fit on the held-out part, per cent.
     pub held_out: Option<f64>,
+    /// Half the sampling rate, rad/s.
+    pub nyquist: Option<f64>,
     /// Share of an output that the torque explains beyond the initial state, per cent, where that is largest.
     pub driven: Option<f64>,
     /// Share of the accelerations that the equations of motion explain, motor and table, where no simulation was compared.
@@ -99,6 +101,11 @@ impl Identifiability {
             "Excite the axis more around its natural frequency and record longer: what stands still or moves slowly tells of \
              no inertia and no stiffness."
                 .clone_into(&mut advice);
+        }
+        let wn = best.modal.iter().find(|e| e.name == "wn");
+        if evidence.nyquist.zip(wn).is_some_and(|(nyquist, wn)| wn.value > nyquist) {
+            doubts.push("Its natural frequency lies beyond half the sampling rate: no sample shows it.".to_owned());
+            "Sample faster, or identify a rigid axis (structure = \"rigid\" in the axis file).".clone_into(&mut advice);
         }
         if let Some(worst) = best.outputs.iter().min_by(|a, b| a.fit_percent.total_cmp(&b.fit_percent))
             && is_below(worst.fit_percent, LEAST_FIT)

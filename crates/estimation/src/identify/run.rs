@@ -273,7 +273,10 @@ pub fn identify_joined(
     let held_out = simulated.and_then(|p| run.held_out(&p, scheme));
     let driven = simulated.and_then(|p| run.driven(&p, scheme));
     let best = recommended.as_ref().map(|r| &methods[r.method]);
-    let identifiability = Identifiability::of(best, Evidence { held_out, driven, ..Evidence::default() });
+    let identifiability = Identifiability::of(
+        best,
+        Evidence { held_out, driven, nyquist: Some(std::f64::consts::PI / joined.samples().dt), ..Evidence::default() },
+    );
     let frequency_response = measured.as_ref().and_then(|m| {
         let index = recommended.as_ref()?.method;
         let p = run.estimates.iter().find(|(name, _)| *name == methods[index].method)?.1.parameters(1.0);

@@ -21,8 +21,8 @@ const LEFT: f64 = 0.25;
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
-/// Probability from which an effect may be named: more likely than not.
-pub const LIKELY: f64 = 0.5;
+/// Probability from which an effect may be named: more likely than not, and by more than one of two that are alike is by rounding.
+pub const LIKELY: f64 = 0.55;
 /// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
 /// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
@@ -130,6 +130,9 @@ impl Search<'_> {
         let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
         pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
+        if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
+            return self.conclude(given, parameters, simple, pool);
+        }
         // What is below two of its standard errors, everything free, is no cause.
         let decisive = |i: usize| match is_undetermined(&finished, chosen.terms[i].0, independent) {
             true => 0.0,
@@ -233,10 +236,11 @@ impl Search<'_> {
 
     /// Each set of effects once, in its best forms, best first, with its probability.
     fn weighed(&self, pool: Vec<Fit>, independent: f64) -> Vec<Weighed> {
+        let is_any_simpler = |f: &Fit| f.terms.iter().any(|t| is_simpler(f, t.0, independent));
         let mut all: Vec<Weighed> = pool
             .into_iter()
             .map(|fit| Weighed { evidence: self.evidence(&fit, independent), fit, probability: 0.0 })
-            .filter(|w| w.evidence.is_finite() && !w.fit.at_bound && !is_simpler(&w.fit, independent))
+            .filter(|w| w.evidence.is_finite() && !w.fit.at_bound && !is_any_simpler(&w.fit))
             .collect();
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let key = |f: &Fit| {

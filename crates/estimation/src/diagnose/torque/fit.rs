@@ -23,6 +23,8 @@ pub const FARTHEST: f64 = 2.3;
 /// What a form that adds to a plainer one costs beside it: as much as an effect of its own, and a little more, so that of two accounts of
 /// one thing (an unlike friction either way, a bias) the one by effects of their own is told.
 const RICHER: f64 = 2.2;
+/// Least degrees of freedom that are counted: with fewer any account follows the record.
+const FEWEST: f64 = 0.1;
 /// Cost of an effect in log evidence: one of some fifty.
 pub const PRICE: f64 = 4.0;
 
@@ -354,11 +356,14 @@ impl Problem<'_> {
             + if lines { (self.band.omega.len() as f64).ln() } else { 0.0 }
     }
 
-    /// Log evidence with `share` of the values independent.
+    /// Log evidence with `share` of the values independent: Schwarz's, with the term by which a small sample is followed by many parameters
+    /// whatever it is of (Hurvich, Tsai, Biometrika 76, 1989).
     pub fn evidence(&self, f: &Fit, share: f64) -> f64 {
         let n = share * self.band.values();
+        let k = f.coordinates.len() as f64;
         share * f.log_likelihood + f.log_prior
-            - 0.5 * f.coordinates.len() as f64 * n.ln()
+            - 0.5 * k * n.ln()
+            - k * (k + 1.0) / (n - k - 1.0).max(FEWEST)
             - f.terms.iter().map(|t| self.price(*t)).sum::<f64>()
     }
 }

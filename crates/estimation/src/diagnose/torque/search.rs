@@ -467,6 +467,26 @@ impl Search<'_> {
         self.raced(probed, Some(fit))
     }
 
+    /// The likelier fit with the simpler law of the same thing in place of an effect that stands where it is that law.
+    pub fn simplified<'f>(&self, fit: &Fit, independent: f64, pool: &'f [Fit]) -> Option<&'f Fit> {
+        let gone = fit.terms.iter().map(|t| t.0).find(|e| is_simpler(fit, *e, independent))?;
+        let is_simple = |e: Effect| {
+            let (own, info) = (gone.info(), e.info());
+            e.simpler_at_zero().is_none() && (info.family, info.place) == (own.family, own.place)
+        };
+        let same = |f: &&Fit| {
+            let others = || fit.terms.iter().filter(|t| t.0 != gone);
+            f.terms.len() == fit.terms.len()
+                && others().all(|t| f.terms.contains(t))
+                && f.terms.iter().any(|t| is_simple(t.0))
+        };
+        let likelier = |f: &&Fit| !f.at_bound && self.evidence(f, independent) > self.evidence(fit, independent);
+        pool.iter()
+            .filter(same)
+            .filter(likelier)
+            .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
+    }
+
     /// The fit with its effects in the forms of largest evidence: a form that frees more is no further cause, however little it explains.
     fn in_best_form(&self, fit: Fit, pool: &mut Pool) -> Fit {
         let mut best = fit;
@@ -512,13 +532,13 @@ pub fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
-/// Whether an effect stands where it is a simpler one: the shape that it has beyond that one's is below two of its standard errors.
-pub fn is_simpler(fit: &Fit, independent: f64) -> bool {
-    fit.coordinates.iter().zip(&fit.std).any(|(c, std)| match c.free {
-        Free::Effect(e, i) if e.simpler_at_zero() == Some(i) => {
-            std.is_finite() && c.value(&fit.model).abs() < 2.0 * std / independent.sqrt()
-        }
-        _ => false,
+/// Whether an effect of a fit stands where it is a simpler one: the shape that it has beyond that one's is below two of its standard errors.
+pub fn is_simpler(fit: &Fit, effect: Effect, independent: f64) -> bool {
+    let Some(shape) = effect.simpler_at_zero() else { return false };
+    fit.coordinates.iter().zip(&fit.std).any(|(c, std)| {
+        c.free == Free::Effect(effect, shape)
+            && std.is_finite()
+            && c.value(&fit.model).abs() < 2.0 * std / independent.sqrt()
     })
 }
 
@@ -614,13 +634,13 @@ mod tests {
             fit.std.push(0.1);
             fit
         };
-        assert!(is_simpler(&of(0.19), 1.0) && !is_simpler(&of(0.21), 1.0));
+        assert!(is_simpler(&of(0.19), effect, 1.0) && !is_simpler(&of(0.21), effect, 1.0));
         // A quarter of the values: twice the standard error.
-        assert!(is_simpler(&of(0.39), 0.25) && !is_simpler(&of(0.41), 0.25));
+        assert!(is_simpler(&of(0.39), effect, 0.25) && !is_simpler(&of(0.41), effect, 0.25));
         // One that could not be told says nothing.
         let mut unknown = of(0.01);
         unknown.std.pop();
         unknown.std.push(f64::INFINITY);
-        assert!(!is_simpler(&unknown, 1.0));
+        assert!(!is_simpler(&unknown, effect, 1.0));
     }
 }
