@@ -584,7 +584,7 @@ impl Band {
         self.torque_rms(s) / deviation(&record.torque).max(f64::MIN_POSITIVE)
     }
 
-    /// Variance of the discrepancy of one equation that is this share of the torque.
+    /// Variance of the discrepancy, of two equations together, that is this share of the torque.
     pub fn of_torque_share(&self, share: f64, record: &Record) -> f64 {
         (share * deviation(&record.torque)).powi(2) / self.bins()
     }

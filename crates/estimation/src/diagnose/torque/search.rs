@@ -357,11 +357,13 @@ impl Search<'_> {
     fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
-        let least = self.band().of_torque_share(self.negligible(), self.problem.record);
-        (0..self.band().equations()).any(|i| {
-            let explained = before[i] - after[i];
-            after[i] <= (1.0 - share) * before[i] && explained >= least.max(MINOR * self.gap[i])
-        })
+        let equations = 0..self.band().equations();
+        let explained = |i: usize| before[i] - after[i];
+        let of_torque: f64 = equations.clone().map(|i| explained(i).max(0.0)).sum();
+        of_torque >= self.band().of_torque_share(self.negligible(), self.problem.record)
+            && equations
+                .into_iter()
+                .any(|i| after[i] <= (1.0 - share) * before[i] && explained(i) >= MINOR * self.gap[i])
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
