@@ -10,6 +10,7 @@ pub(crate) mod abuse;
 mod bounds;
 mod instance;
 pub(crate) mod logger;
+mod texts;
 mod three;
 
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Reading and setting values, and their derivatives.
 
 use super::super::abi::{self, Call, Text};
-use super::super::logger::lossy;
+use super::super::texts::Room;
 use super::super::{HostError, Status, note};
 use super::{Instance, c_string};
 
@@ -65,9 +65,11 @@ impl Instance {
             return Ok(self.get_text3(references, false)?.into_iter().map(Result::unwrap_or_default).collect());
         }
         let mut values = vec![std::ptr::null(); references.len()];
+        let mut room = Room::new(references.len());
         checked!(self, get_string(references.as_ptr(), references.len(), values.as_mut_ptr()))?;
-        // SAFETY: the FMU gave C strings, valid until the next call.
-        Ok(values.iter().map(|&text| unsafe { lossy(text) }).collect())
+        room.read(&values);
+        let text = |k| String::from_utf8_lossy(room.text(k).unwrap_or_default()).into_owned();
+        Ok((0..values.len()).map(text).collect())
     }
 
     /// `fmi2SetReal`.

@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use super::super::abi::{self, Call, Text};
 use super::super::instance::Instance;
-use super::super::{HostError, abuse, note};
+use super::super::texts::{self, Room};
+use super::super::{HostError, note};
 use super::layout::{Run, runs};
 use super::{check, status_of};
 use crate::description::{Kind, Value};
@@ -96,20 +97,9 @@ impl Instance {
                 .collect());
         }
         let mut values = vec![std::ptr::null(); run.total];
-        let room = checked.then(|| abuse::Room::twice(run.total));
+        let [first, second] = Room::twice(run.total);
         call!(self, get3_string(references, count, values.as_mut_ptr(), values.len()))?;
-        if let Some(room) = room {
-            return Ok(abuse::steady(&values, room));
-        }
-        let check = |text: &Text| {
-            if text.is_null() {
-                return Err("a null pointer");
-            }
-            // SAFETY: the FMU gave a C string, valid until the next call.
-            let bytes = unsafe { std::ffi::CStr::from_ptr(*text) }.to_bytes();
-            std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "no valid UTF-8")
-        };
-        Ok(values.iter().map(check).collect())
+        Ok(if checked { texts::steady(&values, [first, second]) } else { texts::once(&values, first) })
     }
 
     pub(in super::super) fn get_real3(&mut self, handles: &[u32], out: &mut [f64]) -> Result<(), HostError> {
