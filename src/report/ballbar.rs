@@ -49,9 +49,14 @@ const WORTH: f64 = 0.05;
 /// Most deviations that are told what to do about.
 const MOST: usize = 5;
 
-/// Micrometres; what is below all that such a test shows is zero.
+/// In millionths; what is below all that such a test shows is zero.
+fn millionths(value: f64) -> f64 {
+    if value.abs() < SHOWN { 0.0 } else { 1e6 * value }
+}
+
+/// Micrometres.
 pub fn micro(metres: f64) -> Cell {
-    Cell::Number(if metres.abs() < SHOWN { 0.0 } else { 1e6 * metres }, 3, "µm".to_owned())
+    Cell::Number(millionths(metres), 3, "µm".to_owned())
 }
 
 fn text(cell: &Cell) -> String {
@@ -60,7 +65,7 @@ fn text(cell: &Cell) -> String {
 
 fn size(e: &Effect) -> Cell {
     match e.kind.measure() {
-        Measure::Ratio => Cell::Number(if e.size.abs() < SHOWN { 0.0 } else { 1e6 * e.size }, 3, "µm/m".to_owned()),
+        Measure::Ratio => Cell::Number(millionths(e.size), 3, "µm/m".to_owned()),
         _ => micro(e.size),
     }
 }
@@ -71,7 +76,7 @@ const fn way(clockwise: bool) -> &'static str {
 
 /// What belongs to the size, in words.
 fn detail(e: &Effect, turns: &[Turn]) -> String {
-    let um = |m: f64| format::number(if m.abs() < SHOWN { 0.0 } else { 1e6 * m }, 3, Medium::Page);
+    let um = |m: f64| format::number(millionths(m), 3, Medium::Page);
     if e.size.abs() < SHOWN && e.ends.is_none() {
         return "none".to_owned();
     }

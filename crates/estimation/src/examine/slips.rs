@@ -159,11 +159,22 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let missing: usize = found.iter().map(|(_, m)| m).sum();
     let ends = std::iter::once(0).chain(found.iter().map(|s| s.0)).chain([n]);
     let whole = ends.clone().zip(ends.skip(1)).max_by_key(|(a, b)| b - a).unwrap_or((0, n));
+    let (severity, meaning) = if found.len() < PLACES {
+        (
+            Severity::Warn,
+            "The logger may have dropped rows and numbered the others through; so few places may also look so by chance.",
+        )
+    } else {
+        (
+            Severity::Refuse,
+            "The logger dropped rows and numbered the others through. Where the axis moves slowly more may be missing that do not show.",
+        )
+    };
     let places = if found.len() == 1 { "1 place".to_owned() } else { format!("{} places", found.len()) };
     findings.push(
         Finding::new(
             "lost_samples",
-            if found.len() < PLACES { Severity::Warn } else { Severity::Refuse },
+            severity,
             "time",
             format!(
                 "{missing} sample{} missing under even time stamps, at {places}, the first at {:.6} s: the motion goes on there as if \
@@ -171,11 +182,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
                 if missing == 1 { " is" } else { "s are" },
                 input.time(first.0)
             ),
-            if found.len() < PLACES {
-                "The logger may have dropped rows and numbered the others through; so few places may also look so by chance."
-            } else {
-                "The logger dropped rows and numbered the others through. Where the axis moves slowly more may be missing that do not show."
-            },
+            meaning,
             format!(
                 "Log the drive's own time stamps, over a bus that keeps up; the longest part without a loss that shows is --from {:.6} --to \
                  {:.6}.",

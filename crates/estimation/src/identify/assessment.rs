@@ -19,6 +19,16 @@ impl Run<'_> {
         self.oe.as_ref().map(|f| f.scheme).or(self.request.scheme).unwrap_or(Scheme::Exact)
     }
 
+    /// What a simulation beside this record is free in: the zeros of its positions and a bias of its torque where the estimates have them, and
+    /// the parameters where asked.
+    fn free(&self, parameters: bool) -> Free {
+        Free {
+            parameters,
+            offset: self.record.zero_offset != 0.0,
+            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
+        }
+    }
+
     /// Fit, whiteness and excitation estimate of a method's parameters.
     pub fn assess(&self, result: &mut MethodResult, scheme: Scheme) {
         let Some((_, estimated)) = self.estimates.iter().find(|(name, _)| *name == result.method) else { return };
@@ -27,11 +37,7 @@ impl Run<'_> {
         if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
             return;
         }
-        let free = Free {
-            parameters: false,
-            offset: self.record.zero_offset != 0.0,
-            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
-        };
+        let free = self.free(false);
         let refit;
         let fit = match &self.oe {
             Some(fit) if result.method == Method::Oe.name() => fit,
@@ -55,11 +61,7 @@ impl Run<'_> {
             return None;
         }
         let (rho, structure, effects) = (self.machine.parameters.rho, self.machine.structure, self.machine.effects);
-        let free = Free {
-            parameters: true,
-            offset: self.record.zero_offset != 0.0,
-            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
-        };
+        let free = self.free(true);
         let (first, rest) = (self.compared.part(0..2 * n / 3), self.compared.part(2 * n / 3..n));
         let fitted = OutputError::of(&first, rho, structure, effects).ok()?.fit(p, scheme, free);
         let p = fitted.estimated.parameters(rho);
@@ -76,25 +78,20 @@ impl Run<'_> {
         fits.reduce(f64::min)
     }
 
-    /// Share of what an axis that coasts leaves of an output that the torque explains, per cent, of the output where that is largest: below
-    /// a half the record is followed by its initial state, whatever the inertias.
-    pub fn driven(&self, p: &Parameters, scheme: Scheme) -> Option<f64> {
+    /// Share of what an axis that coasts leaves of an output that the torque explains by the method's parameters `p`, per cent, of the output
+    /// where that is largest: below a half the record is followed by its initial state, whatever the inertias.
+    pub fn driven(&self, assessed: &MethodResult, p: &Parameters, scheme: Scheme) -> Option<f64> {
         if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
             return None;
         }
-        let free = Free {
-            parameters: false,
-            offset: self.record.zero_offset != 0.0,
-            bias: self.oe.as_ref().is_some_and(|f| f.bias != 0.0),
-        };
         let still = vec![0.0; self.compared.len()];
         let coasting = self.outputs.driven_by(&still);
-        let left = |model: &OutputError<'_>| model.residuals(&model.fit(p, scheme, free));
-        let (driven, coasting) = (left(self.outputs), left(&coasting));
-        let explained = driven
+        let left = coasting.residuals(&coasting.fit(p, scheme, self.free(false)));
+        let explained = assessed
+            .outputs
             .iter()
-            .zip(&coasting)
-            .map(|((_, with), (_, without))| 100.0 * (1.0 - rms(with) / rms(without).max(f64::MIN_POSITIVE)));
+            .zip(&left)
+            .map(|(output, (_, without))| 100.0 * (1.0 - output.rms_error / rms(without).max(f64::MIN_POSITIVE)));
         explained.reduce(f64::max)
     }
 

@@ -73,12 +73,12 @@ impl Identifiability {
         };
         let zeta = best.modal.iter().find(|e| e.name == "zeta");
         // A damping below zero that is not small is none of an axis.
-        let driven = zeta.is_some_and(|z| z.value < -SMALL_DAMPING);
+        let grows = zeta.is_some_and(|z| z.value < -SMALL_DAMPING);
         let zeta = zeta.and_then(|e| e.std);
         let account = |e: &Estimate| -> bool {
             let Some(std) = e.std else { return true };
             let share = |i: usize| evidence.shares.is_some_and(|s| 2.0 * std * s[i] <= SMALL_TORQUE);
-            if e.name == "B" && driven {
+            if e.name == "B" && grows {
                 return false;
             }
             2.0 * std <= DETERMINED * e.value.abs()

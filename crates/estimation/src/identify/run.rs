@@ -265,14 +265,14 @@ pub fn identify_joined(
     }
     let recommended = recommend(&methods, record.omega.is_some());
     steps.next("held-out part");
-    let simulated = recommended.as_ref().and_then(|r| {
-        let name = methods[r.method].method;
-        let found = run.estimates.iter().find(|(n, _)| *n == name && name != Method::Frequency.name())?;
-        Some(found.1.parameters(machine.parameters.rho))
-    });
-    let held_out = simulated.and_then(|p| run.held_out(&p, scheme));
-    let driven = simulated.and_then(|p| run.driven(&p, scheme));
     let best = recommended.as_ref().map(|r| &methods[r.method]);
+    let simulated = best.and_then(|best| {
+        let name = best.method;
+        let found = run.estimates.iter().find(|(n, _)| *n == name && name != Method::Frequency.name())?;
+        Some((best, found.1.parameters(machine.parameters.rho)))
+    });
+    let held_out = simulated.and_then(|(_, p)| run.held_out(&p, scheme));
+    let driven = simulated.and_then(|(best, p)| run.driven(best, &p, scheme));
     let identifiability = Identifiability::of(
         best,
         Evidence { held_out, driven, nyquist: Some(std::f64::consts::PI / joined.samples().dt), ..Evidence::default() },

@@ -4,8 +4,9 @@ use std::sync::atomic::Ordering;
 
 use super::super::model::Model;
 use super::super::verdict::Verdict;
+use super::determined::{is_simpler, is_undetermined};
 use super::fit::Fit;
-use super::search::{ALIKE, Search, is_more, is_simpler, is_undetermined};
+use super::search::{ALIKE, Search, is_more};
 use crate::effects::Effect;
 use crate::examine::NOMINAL_OFF;
 

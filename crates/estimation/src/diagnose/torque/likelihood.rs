@@ -576,22 +576,13 @@ impl Band {
 
     /// Rms in the band of the torque lacking beyond what the noise makes, N.m; of two equations together.
     pub fn torque_rms(&self, s: Discrepancy) -> f64 {
-        (s.iter().take(self.equations()).sum::<f64>() * self.bins()).sqrt()
+        let samples = 2.0 * self.weight.iter().sum::<f64>() / self.n as f64;
+        (s.iter().take(self.equations()).sum::<f64>() * samples).sqrt()
     }
 
     /// The same over the rms of the torque about its mean.
     pub fn torque_share(&self, s: Discrepancy, record: &Record) -> f64 {
         self.torque_rms(s) / deviation(&record.torque).max(f64::MIN_POSITIVE)
-    }
-
-    /// Variance of the discrepancy, of two equations together, that is this share of the torque.
-    pub fn of_torque_share(&self, share: f64, record: &Record) -> f64 {
-        (share * deviation(&record.torque)).powi(2) / self.bins()
-    }
-
-    /// Samples of the band in one of the record.
-    fn bins(&self) -> f64 {
-        2.0 * self.weight.iter().sum::<f64>() / self.n as f64
     }
 
     /// Rms in the band of the torque that the noise makes, N.m; of two equations together.

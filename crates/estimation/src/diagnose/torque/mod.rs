@@ -10,6 +10,7 @@
 mod band;
 mod conclusion;
 mod descent;
+mod determined;
 mod fit;
 mod gap;
 mod hidden;

@@ -12,15 +12,16 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::super::model::{Coordinate, Free, Model};
+use super::super::model::{Coordinate, Model};
 use super::conclusion::Decision;
+use super::determined::{is_lost, is_simpler};
 use super::fit::{Fit, Problem, STEPS, Term};
 use super::likelihood::{Band, Discrepancy, Sight};
 use super::pool::Pool;
 use super::scales::Scales;
 use super::starts::{Look, StartPoint};
 use crate::effects::Effect;
-use crate::numerics::level::{deviation, rms};
+use crate::numerics::level::rms;
 
 /// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
 const MATERIAL: f64 = 0.25;
@@ -313,14 +314,13 @@ impl Search<'_> {
 
     /// Whether what a fit leaves is less than a log's torque is true to.
     fn is_negligible(&self, fit: &Fit) -> bool {
-        self.left(fit) < self.negligible()
+        self.band().torque_rms(fit.discrepancy) < self.negligible()
     }
 
-    /// Share of the torque's changes below which nothing is a cause: what a drive is true to goes with all of its torque.
+    /// Torque below which nothing is a cause, N.m: what a drive is true to goes with all of its torque, a weight's with the rest.
     fn negligible(&self) -> f64 {
-        let torque = &self.problem.record.torque;
         let share = if self.band().sight == Sight::Both { NEGLIGIBLE_IN_TWIST } else { NEGLIGIBLE };
-        share * rms(torque) / deviation(torque).max(f64::MIN_POSITIVE)
+        share * rms(&self.problem.record.torque)
     }
 
     /// Whether what a fit leaves holds no further cause.
@@ -357,13 +357,10 @@ impl Search<'_> {
     fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
-        let equations = 0..self.band().equations();
-        let explained = |i: usize| before[i] - after[i];
-        let of_torque: f64 = equations.clone().map(|i| explained(i).max(0.0)).sum();
-        of_torque >= self.band().of_torque_share(self.negligible(), self.problem.record)
-            && equations
-                .into_iter()
-                .any(|i| after[i] <= (1.0 - share) * before[i] && explained(i) >= MINOR * self.gap[i])
+        let explained = [0, 1].map(|i| (before[i] - after[i]).max(0.0));
+        self.band().torque_rms(explained) >= self.negligible()
+            && (0..self.band().equations())
+                .any(|i| after[i] <= (1.0 - share) * before[i] && explained[i] >= MINOR * self.gap[i])
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
@@ -534,34 +531,6 @@ pub fn is_more(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
-/// Whether an effect of a fit stands where it is a simpler one: the shape that it has beyond that one's is below two of its standard errors.
-pub fn is_simpler(fit: &Fit, effect: Effect, independent: f64) -> bool {
-    let Some(shape) = effect.simpler_at_zero() else { return false };
-    fit.coordinates.iter().zip(&fit.std).any(|(c, std)| {
-        c.free == Free::Effect(effect, shape)
-            && std.is_finite()
-            && c.value(&fit.model).abs() < 2.0 * std / independent.sqrt()
-    })
-}
-
-/// Whether the effect that the plainer lacks is below two standard errors of the richer's fit, with `independent` of its values so.
-fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
-    rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|t| is_undetermined(rich, t.0, independent))
-}
-
-/// Whether every size of an effect of a fit is below two of its standard errors, or what tells it from a change of the axis' own parameters
-/// is, with `independent` of its values so.
-pub fn is_undetermined(fit: &Fit, effect: Effect, independent: f64) -> bool {
-    let below = |c: &Coordinate, std: f64| c.value(&fit.model).abs() < 2.0 * std / independent.sqrt();
-    let own =
-        || fit.coordinates.iter().zip(&fit.std).filter(|(c, _)| matches!(c.free, Free::Effect(e, _) if e == effect));
-    // A shape that was held so far says nothing.
-    let identifying =
-        |c: &Coordinate| effect.identifying_parameter().is_some_and(|i| c.free == Free::Effect(effect, i));
-    own().filter(|(c, _)| !c.is_shape()).all(|(c, std)| below(c, *std))
-        || own().any(|(c, std)| identifying(c) && std.is_finite() && below(c, *std))
-}
-
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
 fn forms(effect: Effect, richer: bool) -> Vec<Term> {
     let info = effect.info();
@@ -596,53 +565,5 @@ mod tests {
             all.sort_unstable();
             assert_eq!(all, (0..e.info().variants.len()).map(|v| (e, v)).collect::<Vec<Term>>());
         }
-    }
-
-    #[test]
-    fn an_effect_below_two_standard_errors_of_its_independent_values_is_lost() {
-        let term = (Effect::LoadMotor, 0);
-        let plain = fit(&[]);
-        let mut rich = fit(&[term]);
-        rich.model.effects.of_mut(term.0)[0] = 0.3;
-        rich.coordinates.push(Coordinate::new(Free::Effect(term.0, 0), &rich.model));
-        rich.std.push(0.1);
-        assert!(!is_lost(&plain, &rich, 1.0));
-        // A quarter of the values: twice the standard error.
-        assert!(is_lost(&plain, &rich, 0.25));
-    }
-
-    #[test]
-    fn a_mode_whose_stiffness_is_not_known_is_none() {
-        let effect = Effect::FlexibleMode;
-        let of = |errors: [f64; 2]| {
-            let mut fit = fit(&[(effect, 0)]);
-            fit.model.effects.of_mut(effect)[..2].copy_from_slice(&[1e-3, 100.0]);
-            fit.coordinates.extend([0, 1].map(|i| Coordinate::new(Free::Effect(effect, i), &fit.model)));
-            fit.std.extend(errors);
-            fit
-        };
-        assert!(!is_undetermined(&of([1e-4, 10.0]), effect, 1.0));
-        assert!(is_undetermined(&of([1e-4, 60.0]), effect, 1.0) && is_undetermined(&of([1e-3, 10.0]), effect, 1.0));
-    }
-
-    #[test]
-    fn a_bristle_whose_reach_is_below_two_of_its_errors_is_a_simpler_friction() {
-        let effect = Effect::PreslidingMotor;
-        let reach = effect.simpler_at_zero().expect("Coulomb's friction");
-        let of = |value: f64| {
-            let mut fit = fit(&[(effect, 0)]);
-            fit.model.effects.of_mut(effect)[reach] = value;
-            fit.coordinates.push(Coordinate::new(Free::Effect(effect, reach), &fit.model));
-            fit.std.push(0.1);
-            fit
-        };
-        assert!(is_simpler(&of(0.19), effect, 1.0) && !is_simpler(&of(0.21), effect, 1.0));
-        // A quarter of the values: twice the standard error.
-        assert!(is_simpler(&of(0.39), effect, 0.25) && !is_simpler(&of(0.41), effect, 0.25));
-        // One that could not be told says nothing.
-        let mut unknown = of(0.01);
-        unknown.std.pop();
-        unknown.std.push(f64::INFINITY);
-        assert!(!is_simpler(&unknown, effect, 1.0));
     }
 }
