@@ -35,6 +35,8 @@ pub struct Extent<'a> {
 const MEASURED: f64 = 1.5;
 /// Least share of the record over which a coupling with play is in contact: one that never closes couples nothing.
 const CONTACT: f64 = 0.1;
+/// Periods that tell a frequency from a torque that changes slowly: fewer are a transient.
+const PERIODS: f64 = 3.0;
 /// Least amplitude of a torque that repeats, over the largest torque: no drive knows its own better.
 const KNOWN: f64 = 1e-3;
 
@@ -92,10 +94,10 @@ impl Extent<'_> {
         time.abs() * self.band >= 0.02 && time.abs() >= 0.05 * self.dt
     }
 
-    /// Whether an angular frequency lies in the band, with at least two periods in the record.
+    /// Whether an angular frequency lies in the band, with as many periods in the record as make it one.
     #[must_use]
     pub fn holds(&self, omega: f64) -> bool {
-        omega <= self.band && omega * self.length >= 2.0 * std::f64::consts::TAU
+        omega <= self.band && omega * self.length >= PERIODS * std::f64::consts::TAU
     }
 
     /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band.

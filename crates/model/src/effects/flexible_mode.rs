@@ -14,7 +14,10 @@ use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use super::side::Side;
 use crate::scalar::Scalar;
 
-/// A mode swings in the band, against the inertia that it hangs on, and is not damped to death.
+/// Least damping ratio of a mode: that of a bare piece of steel. Without any it is a line that swings on from where it began.
+const UNDAMPED: f64 = 1e-3;
+
+/// A mode swings in the band, against the inertia that it hangs on, is damped, and is not damped to death.
 fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
     let (inertia, stiffness, damping) = (p[0], p[1], p[2]);
     let coupled = (stiffness * (1.0 / inertia + 1.0 / x.inertia[0])).sqrt();
@@ -22,7 +25,7 @@ fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
         && inertia <= 4.0 * x.inertia[1]
         && x.holds((stiffness / inertia).sqrt())
         && coupled <= 2.0 * x.band
-        && damping <= 0.5 * (inertia * stiffness).sqrt()
+        && (2.0 * UNDAMPED..=0.5).contains(&(damping / (inertia * stiffness).sqrt()))
 }
 
 const PARAMETERS: &[ParameterInfo] = &[

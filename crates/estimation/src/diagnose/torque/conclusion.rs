@@ -212,7 +212,8 @@ impl Search<'_> {
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
-    /// without it: what no effect explains may be what explains this one, too.
+    /// without it: what no effect explains may be what explains this one, too. Less of it where the effect hardly stands out of a
+    /// remainder of any colour.
     fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
         let plain = if chosen.terms.len() == 1 { Some(parameters) } else { plainer(chosen, i, pool) };
         let Some(plain) = plain else { return 1.0 };
@@ -220,7 +221,7 @@ impl Search<'_> {
             let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
             if without > with { (without - with) / without } else { 0.0 }
         };
-        (0..self.band().equations()).map(share).fold(0.0, f64::max)
+        (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, plain)
     }
 
     /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.

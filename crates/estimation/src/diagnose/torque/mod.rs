@@ -15,6 +15,7 @@ mod fit;
 mod gap;
 mod hidden;
 mod likelihood;
+mod octaves;
 mod pool;
 mod race;
 mod scales;
