@@ -172,8 +172,16 @@ impl Search<'_> {
             // What is named without an effect has no rival that has another such effect in it.
             let pool: Vec<Fit> =
                 ranking.into_iter().map(|w| w.fit).filter(|f| f.terms.len() < chosen.terms.len()).collect();
+            // The likeliest of the shorter: where one as good as it takes an effect's place it is another that is told, and no less explained.
             let known = plainer(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
             let plain = known.cloned().unwrap_or(refitted);
+            let own = self.evidence(&plain, independent);
+            let likelier = |f: &&Fit| !f.at_bound && !f.terms.is_empty() && self.evidence(f, independent) > own;
+            let other = pool
+                .iter()
+                .filter(likelier)
+                .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)));
+            let plain = other.cloned().unwrap_or(plain);
             return self.conclude(given, parameters, plain, pool);
         }
         let likely = probabilities.iter().all(likely);
