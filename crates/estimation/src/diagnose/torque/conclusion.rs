@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::super::model::Model;
 use super::super::verdict::Verdict;
-use super::determined::{is_simpler, is_undetermined};
+use super::determined::{is_simpler, is_steady, is_undetermined};
 use super::fit::Fit;
 use super::search::{ALIKE, Search, is_more};
 use crate::effects::Effect;
@@ -137,7 +137,10 @@ impl Search<'_> {
         // What is below two of its standard errors, everything free, is no cause.
         let decisive = |i: usize| match is_undetermined(&finished, chosen.terms[i].0, independent) {
             true => 0.0,
-            false => self.decisive(&chosen, i, &parameters, &pool),
+            false => {
+                let steady = is_steady(&finished, chosen.terms[i].0, independent);
+                steady * self.decisive(&chosen, i, &parameters, &pool)
+            }
         };
         let decisive: Vec<f64> = (0..chosen.terms.len()).map(decisive).collect();
         let mut ranking = self.weighed(pool, independent);

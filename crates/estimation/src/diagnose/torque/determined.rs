@@ -1,7 +1,8 @@
 //! What a record does not know of a fit's effects: their sizes and shapes beside the standard errors.
 
 use super::super::model::{Coordinate, Free};
-use super::fit::Fit;
+use super::fit::{Fit, PRICE};
+use super::scatter;
 use crate::effects::Effect;
 
 /// Standard errors below which a value is no more than its error.
@@ -39,6 +40,13 @@ pub fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
 pub fn is_undetermined(fit: &Fit, effect: Effect, independent: f64) -> bool {
     own(fit, effect).filter(|(c, _)| !c.is_shape()).all(|at| is_zero(fit, at, independent))
         || effect.identifying_parameter().is_some_and(|i| vanishes(fit, effect, i, independent))
+}
+
+/// Probability that an effect of a fit has its size in every stretch of the record: by the best known of its sizes.
+pub fn is_steady(fit: &Fit, effect: Effect, independent: f64) -> f64 {
+    let known = own(fit, effect).filter(|(c, std)| !c.is_shape() && std.is_finite());
+    let errors = known.map(|(c, std)| c.value(&fit.model).abs() * independent.sqrt() / std);
+    errors.reduce(f64::max).map_or(1.0, |errors| scatter::steadiness(errors, PRICE))
 }
 
 #[cfg(test)]
@@ -99,5 +107,23 @@ mod tests {
         unknown.std.pop();
         unknown.std.push(f64::INFINITY);
         assert!(!is_simpler(&unknown, effect, 1.0));
+    }
+
+    #[test]
+    fn an_effect_is_as_steady_as_the_best_known_of_its_sizes_says() {
+        let term = (Effect::LoadMotor, 0);
+        let of = |error: f64| {
+            let mut fit = fit(&[term]);
+            fit.model.effects.of_mut(term.0)[0] = 0.3;
+            fit.coordinates.push(Coordinate::new(Free::Effect(term.0, 0), &fit.model));
+            fit.std.push(error);
+            fit
+        };
+        assert!(is_steady(&of(0.03), term.0, 1.0) > 0.99);
+        assert!(is_steady(&of(0.15), term.0, 1.0) < 0.2);
+        // A quarter of the values: half as many errors.
+        assert!((is_steady(&of(0.03), term.0, 0.25) - is_steady(&of(0.06), term.0, 1.0)).abs() < 1e-12);
+        // Of one whose error is not known nothing is said.
+        assert_eq!(is_steady(&of(f64::INFINITY), term.0, 1.0), 1.0);
     }
 }
