@@ -222,12 +222,10 @@ impl Search<'_> {
                 break;
             }
             passed.push(best.terms.clone());
-            // What is left of a large gap may still be a machine's remainder, which tells no two accounts apart; less of the torque than any
-            // drive is true to does.
-            let enough = self.is_enough(&best);
-            if self.at_floor(&best) || enough && !self.is_exact(&best) {
+            if self.at_floor(&best) {
                 break;
             }
+            let enough = self.is_enough(&best);
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
             if !enough && let Some(next) = self.joined(&best, pool) {
                 best = self.pruned(next, pool);
