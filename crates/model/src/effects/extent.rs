@@ -167,6 +167,16 @@ mod tests {
     }
 
     #[test]
+    fn a_mode_whose_peak_reaches_into_the_band_is_one() {
+        // Against an inertia of 1 kg.m2; the band ends at 1000 rad/s.
+        let admits = |omega: f64, ratio: f64| {
+            let (inertia, damping) = (0.5, 2.0 * ratio * 0.5 * omega);
+            (Effect::FlexibleMode.info().bounds)(&[inertia, inertia * omega * omega, damping], &resting())
+        };
+        assert!(admits(990.0, 0.01) && admits(1040.0, 0.06) && !admits(1040.0, 0.01) && !admits(1200.0, 0.06));
+    }
+
+    #[test]
     fn a_ripple_of_less_than_a_thousandth_of_the_torque_is_none() {
         let admits = |amplitude: f64| (Effect::TorqueRipple.info().bounds)(&[amplitude, 10.0, 0.0], &resting());
         assert!(admits(0.5) && admits(-0.01) && !admits(5e-4) && !admits(1.1));

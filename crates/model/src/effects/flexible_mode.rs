@@ -17,13 +17,14 @@ use crate::scalar::Scalar;
 /// Least damping ratio of a mode: that of a bare piece of steel. Without any it is a line that swings on from where it began.
 const UNDAMPED: f64 = 1e-3;
 
-/// A mode swings in the band, against the inertia that it hangs on, is damped, and is not damped to death.
+/// A mode swings in the band, its peak as wide as half of its power, against the inertia that it hangs on, is damped, and is not damped to
+/// death.
 fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
     let (inertia, stiffness, damping) = (p[0], p[1], p[2]);
     let coupled = (stiffness * (1.0 / inertia + 1.0 / x.inertia[0])).sqrt();
     inertia > 0.0
         && inertia <= 4.0 * x.inertia[1]
-        && x.holds((stiffness / inertia).sqrt())
+        && x.holds((stiffness / inertia).sqrt() - 0.5 * damping / inertia)
         && coupled <= 2.0 * x.band
         && (2.0 * UNDAMPED..=0.5).contains(&(damping / (inertia * stiffness).sqrt()))
 }
