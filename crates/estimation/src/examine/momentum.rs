@@ -490,7 +490,8 @@ fn balance(
     // Six coefficients explain some of any torque: each half a line of a single spectrum, less of an averaged one.
     let by_chance = 3.0 / (lines.len() as f64 * s.averages);
     let motor = || if s.has(TABLE) { 1.0 - motor_side(s, lines, MAIN, TABLE) } else { 0.0 };
-    if plus.1.max(turned_anywhere.1) < EXPLAINED + by_chance && motor() < EXPLAINED + by_chance {
+    let explained = |share: f64| share >= EXPLAINED + by_chance;
+    if !explained(plus.1.max(turned_anywhere.1)) && !explained(motor()) && !rigid::follows(input) {
         findings.push(Finding::new(
             "not_followed",
             Severity::Refuse,

@@ -96,18 +96,31 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
     let n = x.len();
-    let mut best: Option<(f64, f64)> = None;
-    for width in [0, 1, 2, 4, 8, 16, 32, 64].into_iter().filter(|w| SHORTEST + 8 * w <= n) {
-        if let Some((left, mass, error)) = in_time(input, torque, x, width)
-            && left < MOST_LEFT
-            && mass > 3.0 * error
-            && mass.is_finite()
-            && best.is_none_or(|(least, _)| left < 0.98 * least)
+    let mut best: Option<InTime> = None;
+    for width in widths(n) {
+        if let Some(found) = in_time(input, torque, x, width)
+            && found.left < MOST_LEFT
+            && found.mass > 3.0 * found.error
+            && found.mass.is_finite()
+            && best.as_ref().is_none_or(|best| found.left < 0.98 * best.left)
         {
-            best = Some((left, mass));
+            best = Some(found);
         }
     }
-    best.map(|(_, mass)| mass)
+    best.map(|found| found.mass)
+}
+
+/// Whether the same balance explains most of the torque with a friction that brakes: of slow moves, where friction is nearly all of the
+/// torque, spectra show a few lines alone, and noise in those.
+pub(super) fn follows(input: &Input<'_>) -> bool {
+    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
+    let brakes = |found: InTime| found.left < MOST_LEFT && found.friction > 0.0 && found.mass > -3.0 * found.error;
+    widths(x.len()).any(|width| in_time(input, torque, x, width).is_some_and(brakes))
+}
+
+/// Widths of the smoothing that are tried of a record of `n` samples.
+fn widths(n: usize) -> impl Iterator<Item = usize> {
+    [0, 1, 2, 4, 8, 16, 32, 64].into_iter().filter(move |w| SHORTEST + 8 * w <= n)
 }
 
 /// A mean over `2*width + 1` samples, twice; the ends are left out.
@@ -133,12 +146,24 @@ const TURNS: f64 = 1e4;
 /// Most samples that one solution looks at.
 pub(super) const SAMPLES: usize = 20_000;
 
-/// Share of the torque's power that is left, the inertia and its standard error, by a smoothing of a width.
-fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option<(f64, f64, f64)> {
+/// The balance in the time domain.
+struct InTime {
+    /// Share of the torque's power about its mean that is left.
+    left: f64,
+    /// Inertia and its standard error.
+    mass: f64,
+    error: f64,
+    /// Friction at nine tenths of the speeds.
+    friction: f64,
+}
+
+/// The balance by a smoothing of a width.
+fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option<InTime> {
     let (t, q) = (smoothed(torque, width), smoothed(x, width));
     let dt = input.dt;
     let speed = |k: usize| (q[k + 1] - q[k - 1]) / (2.0 * dt);
-    let quiet = 0.02 * quantile((1..q.len() - 1).map(speed), 0.9);
+    let fast = quantile((1..q.len() - 1).map(speed), 0.9);
+    let quiet = 0.02 * fast;
     let middle = x[x.len() / 2];
     let size = x.iter().fold(0.0_f64, |m, v| m.max((v - middle).abs()));
     let hinge = input.motion == Motion::Rotary && size > HINGE && size < TURNS;
@@ -160,7 +185,8 @@ fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option
     // Smoothed samples are not independent: one in a width is.
     let error = (solution.variance(0) * solution.inverse[(0, 0)] * (2 * width + 1) as f64).sqrt();
     let left = solution.residual[(0, 0)] / total;
-    left.is_finite().then(|| (left, solution.phi[(0, 0)], error))
+    let of = |i: usize| solution.phi[(i, 0)];
+    left.is_finite().then(|| InTime { left, mass: of(0), error, friction: of(1) * fast + of(2) })
 }
 
 fn against(turned: f64, own: f64) -> Finding {

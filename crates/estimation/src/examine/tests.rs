@@ -509,6 +509,21 @@ fn slow_moves() -> Columns {
 }
 
 #[test]
+fn a_torque_that_friction_and_inertia_explain_in_time_is_followed_and_another_is_not() {
+    // Noise of the encoder from sample to sample as large as the motion: a few lines stand above it.
+    let mut e = noise(23, 2e-3);
+    let mut columns = slow_moves();
+    columns.v[1].iter_mut().for_each(|x| *x += e());
+    assert!(rigid::follows(&columns.motor_only()));
+    let own = columns.v[0].clone();
+    columns.v[0].iter_mut().for_each(|t| *t = -*t);
+    assert!(!rigid::follows(&columns.motor_only()), "it brakes the wrong way");
+    let n = own.len();
+    columns.v[0] = (0..n).map(|k| own[(k + n / 8) % n]).collect();
+    assert!(!rigid::follows(&columns.motor_only()), "an eighth of the record late");
+}
+
+#[test]
 fn slow_moves_under_friction_tell_sign_and_unit_of_torque_and_table() {
     let looked_at = |change: &dyn Fn(&mut Columns)| {
         let mut columns = slow_moves();
