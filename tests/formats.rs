@@ -31,7 +31,7 @@ fn refusal(table: &Table, name: &str) -> String {
 #[test]
 #[cfg(feature = "parquet")]
 fn parquet_files_of_every_codec_and_encoding_hold_the_numbers_that_were_written() {
-    for name in ["none", "snappy", "gzip", "zstd", "lz4", "version2"] {
+    for name in ["none", "snappy", "gzip", "zstd", "lz4", "version2", "checked"] {
         let table = Table::read(&data(&format!("{name}.parquet"))).unwrap();
         assert_eq!(table.rows(), 200, "{name}");
         for k in 0..200 {
@@ -40,6 +40,27 @@ fn parquet_files_of_every_codec_and_encoding_hold_the_numbers_that_were_written(
             }
         }
     }
+}
+
+#[test]
+#[cfg(feature = "parquet")]
+fn a_parquet_page_that_is_not_the_one_that_was_written_is_refused_by_its_checksum() {
+    let folder = tempfile::tempdir().unwrap();
+    // A byte in the middle of the mantissa of one number of the column's only page.
+    let flipped = |name: &str| {
+        let mut bytes = std::fs::read(data(name)).unwrap();
+        let value = row(61)[2].to_le_bytes();
+        let at = bytes.windows(8).position(|w| w == value).expect("the number as it was written");
+        bytes[at + 5] ^= 0x10;
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        Table::read(&path)
+    };
+    let error = flipped("checked.parquet").unwrap_err().to_string();
+    assert!(error.contains("checked.parquet") && error.contains("CRC") && error.contains("Write it again"), "{error}");
+    // The same byte of a file without checksums is another number, and nothing tells.
+    let table = flipped("none.parquet").unwrap();
+    assert!(column(&table, "theta1")[61] != row(61)[2]);
 }
 
 #[test]
