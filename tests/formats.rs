@@ -327,6 +327,46 @@ fn what_a_controls_trace_does_not_hold_is_named() {
 }
 
 #[test]
+fn a_controls_trace_that_ends_in_the_middle_is_read_up_to_its_last_whole_sample_and_that_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log");
+    for (name, sample, cuts, columns) in [
+        (
+            "logs/sinumerik.xml",
+            "<rec time=\"0.199\"",
+            &["<rec time=\"0.1", "<rec", "<"][..],
+            ["Torque X1", "Position X1"],
+        ),
+        ("logs/tncscope.sco", "199000;", &["199000;-0.125;11.2", "199000;", "19"], ["i ist X", "s actual X"]),
+    ] {
+        let [torque, angle] = columns.map(Column::named);
+        let mapping = Mapping { signals: vec![(Signal::T, torque), (Signal::Theta1, angle)], ..Mapping::default() };
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            let loaded = load(&path, &mapping).unwrap();
+            (loaded.trace.len(), loaded.warnings.join("\n"))
+        };
+        let whole = std::fs::read_to_string(data(name)).unwrap();
+        let (before, _) = whole.split_once(sample).unwrap();
+        let row = before.matches('\n').count() + 1;
+        for cut in cuts {
+            let (rows, said) = read(&format!("{before}{cut}"));
+            assert_eq!(rows, 199, "{name}, {cut}");
+            assert!(said.contains(&format!("log: row {row}, the last, is cut off ({cut:?})")), "{name}: {said}");
+        }
+        // One that only lacks its end has lost no sample; one that is damaged in the middle is an error.
+        let end = whole.trim_end().trim_end_matches("</traceDataRoot>");
+        let (rows, said) = read(end);
+        assert!(rows == 200 && !said.contains("cut off"), "{name}: {said}");
+        let damaged =
+            whole.replacen("<rec time=\"0.011\"", "<rec time=0.011", 1).replacen("\n11000;", "\n11000;1;2;", 1);
+        let at = damaged.lines().zip(whole.lines()).position(|(a, b)| a != b).unwrap() + 1;
+        let error = Table::parse(damaged.as_bytes(), "log").unwrap_err().to_string();
+        assert!(error.starts_with("log: ") && error.contains(&format!(" {at}: ")), "{name}, {at}: {error}");
+    }
+}
+
+#[test]
 fn forms_that_are_not_read_say_how_to_save_them() {
     for (bytes, says) in [
         (&b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1rest"[..], ".xlsx or CSV"),

@@ -1,11 +1,10 @@
-//! Text that is no plain CSV, brought to it: UTF-16, JSON, the logs of LinuxCNC, columns set apart by blanks.
+//! Text that is no plain CSV, brought to it: UTF-16, the logs of LinuxCNC, columns set apart by blanks; and which reader it is for.
 //!
 //! Sources: halscope's `write_log_file` (LinuxCNC, src/hal/utils/scope_files.c) writes the period in nanoseconds and then a
 //! line a sample, each value behind the name of its channel; halsampler(1) writes the values alone, with `-t` the number of
-//! the sample first. JSON Lines: jsonlines.org.
+//! the sample first.
 
-use serde_json::Value;
-
+use super::csv::cut::{last_of_words, told, word};
 use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table};
 use super::vendors;
@@ -63,7 +62,7 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
         || first.starts_with(b"[{")
         || (first.starts_with(b"[") && first.trim_ascii_end().ends_with(b"]"))
     {
-        return json(text, file).map(Form::Table);
+        return super::json::read(text, file).map(Form::Table);
     }
     if vendors::is_xml(text) {
         return vendors::sinumerik(text, file).map(Form::Table);
@@ -160,6 +159,11 @@ impl Filled {
         self.rows
     }
 
+    /// Whether no row named a column.
+    pub const fn is_empty(&self) -> bool {
+        self.headers.is_empty()
+    }
+
     /// The table.
     pub fn table(self, file: &str, first_line: usize) -> Table {
         Table {
@@ -174,92 +178,6 @@ impl Filled {
     }
 }
 
-/// JSON Lines, an array of objects, or an object of arrays.
-fn json(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
-    let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
-    let mut filled = Filled::default();
-    let mut cut = None;
-    let row = |filled: &mut Filled, value: &Value, line: usize| -> Result<(), TraceError> {
-        let Value::Object(object) = value else {
-            return Err(wrong(format!("row {line}: not an object such as {{\"time\": 0.0, \"T\": 0.1}}")));
-        };
-        for (name, value) in object {
-            cell(filled, name, value, line, file)?;
-        }
-        filled.end(line);
-        Ok(())
-    };
-    match serde_json::from_slice::<Value>(bytes) {
-        Ok(Value::Array(rows)) => {
-            for (k, value) in rows.iter().enumerate() {
-                row(&mut filled, value, k + 1)?;
-            }
-        }
-        // An array of objects beside what the logger says of itself.
-        Ok(Value::Object(object)) if object.values().filter(|v| is_rows(v)).count() == 1 => {
-            for value in object.values().filter(|v| is_rows(v)).filter_map(Value::as_array) {
-                for (k, value) in value.iter().enumerate() {
-                    row(&mut filled, value, k + 1)?;
-                }
-            }
-        }
-        Ok(Value::Object(object)) if object.values().any(Value::is_array) => {
-            let rows = object.values().filter_map(Value::as_array).map(Vec::len).max().unwrap_or(0);
-            for k in 0..rows {
-                for (name, values) in &object {
-                    let Some(value) = values.as_array().and_then(|v| v.get(k)) else { continue };
-                    cell(&mut filled, name, value, k + 1, file)?;
-                }
-                filled.end(k + 1);
-            }
-        }
-        _ => {
-            let last = bytes.trim_ascii_end().split(|b| *b == b'\n').count();
-            for (k, line) in bytes.split(|b| *b == b'\n').enumerate() {
-                let line = line.trim_ascii();
-                if line.is_empty() {
-                    continue;
-                }
-                match serde_json::from_slice(line) {
-                    Ok(value) => row(&mut filled, &value, k + 1)?,
-                    // An object that ends before it is closed, behind whole ones.
-                    Err(e) if e.is_eof() && k + 1 == last && filled.rows > 0 => {
-                        let text: String = String::from_utf8_lossy(line).chars().take(40).collect();
-                        cut = Some(super::csv::cut::word(file, last, &text));
-                    }
-                    Err(e) => {
-                        return Err(wrong(format!("row {}: not JSON ({e}); a record is one object a line", k + 1)));
-                    }
-                }
-            }
-        }
-    }
-    if filled.headers.is_empty() {
-        return Err(wrong("the file holds no columns; a record is one object of numbers a line".to_owned()));
-    }
-    Ok(Table { cut, ..filled.table(file, 1) })
-}
-
-/// Whether a value is an array of objects.
-fn is_rows(value: &Value) -> bool {
-    value.as_array().and_then(|a| a.first()).is_some_and(Value::is_object)
-}
-
-/// A value of a row: a number, the text of a number or of a time stamp; of an object each of its values, as `axis.torque`.
-fn cell(filled: &mut Filled, name: &str, value: &Value, line: usize, file: &str) -> Result<(), TraceError> {
-    match value {
-        Value::Object(inner) => inner.iter().try_for_each(|(part, value)| match value {
-            // No deeper: a name of three parts is no channel.
-            Value::Object(_) => Ok(()),
-            value => cell(filled, &format!("{name}.{part}"), value, line, file),
-        }),
-        Value::String(text) => {
-            filled.put(name, super::csv::number(text.as_bytes(), false), || text.clone(), line, file)
-        }
-        _ => filled.put(name, value.as_f64(), || value.to_string(), line, file),
-    }
-}
-
 /// A saved log of halscope.
 fn halscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
@@ -268,30 +186,27 @@ fn halscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let period = lines.next().and_then(|(_, l)| l.split_whitespace().nth(3)?.parse::<f64>().ok()).filter(|p| *p > 0.0);
     let period =
         period.ok_or_else(|| wrong("row 1: no sampling period, as in: Sampling period is 1000000 ns".to_owned()))?;
-    let mut filled = Filled::default();
-    let mut first = 0;
-    for (k, line) in lines {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        if words.is_empty() {
-            continue;
-        }
-        if !words.len().is_multiple_of(2) {
-            return Err(wrong(format!(
-                "row {}: {} words; halscope writes a name and a value for each channel",
-                k + 1,
-                words.len()
-            )));
-        }
-        if first == 0 {
-            first = k + 1;
-        }
-        filled.put("time", Some(filled.rows as f64 * period * 1e-9), String::new, k + 1, file)?;
-        for pair in words.chunks_exact(2) {
-            filled.put(pair[0], pair[1].parse().ok(), || pair[1].to_owned(), k + 1, file)?;
-        }
-        filled.end(k + 1);
+    let (numbers, mut rows): (Vec<usize>, Vec<&str>) =
+        lines.filter(|(_, line)| !line.trim().is_empty()).map(|(k, line)| (k + 1, line)).unzip();
+    let mut cut = None;
+    if last_of_words(&rows, text.ends_with('\n')) {
+        cut = rows.pop().map(|row| word(file, numbers[rows.len()], &told(row.trim().as_bytes())));
     }
-    Ok(filled.table(file, first.max(1)))
+    let mut filled = Filled::default();
+    for (row, &line) in rows.iter().zip(&numbers) {
+        let words: Vec<&str> = row.split_whitespace().collect();
+        if !words.len().is_multiple_of(2) {
+            let what =
+                format!("row {line}: {} words; halscope writes a name and a value for each channel", words.len());
+            return Err(wrong(what));
+        }
+        filled.put("time", Some(filled.rows as f64 * period * 1e-9), String::new, line, file)?;
+        for pair in words.chunks_exact(2) {
+            filled.put(pair[0], pair[1].parse().ok(), || pair[1].to_owned(), line, file)?;
+        }
+        filled.end(line);
+    }
+    Ok(Table { cut, ..filled.table(file, numbers.first().copied().unwrap_or(1)) })
 }
 
 /// Columns set apart by blanks, made CSV; None where a comma, a semicolon or a tab separates, or there is one column. Without
@@ -330,9 +245,12 @@ fn blanks(text: &[u8]) -> Option<Vec<u8>> {
         out.extend_from_slice(names.join("\t").as_bytes());
         out.push(b'\n');
     }
-    for line in text.split(|b| *b == b'\n') {
+    // The last line ends where it did: one without an end may be cut.
+    for (k, line) in text.split(|b| *b == b'\n').enumerate() {
+        if k > 0 {
+            out.push(b'\n');
+        }
         out.extend_from_slice(&joined(line));
-        out.push(b'\n');
     }
     Some(out)
 }
@@ -346,29 +264,6 @@ mod tests {
     }
 
     #[test]
-    fn json_in_its_three_forms_is_one_table() {
-        for text in [
-            "{\"time\": 0, \"T [mN.m]\": 1.5}\n{\"time\": 0.1, \"T [mN.m]\": -2}\n",
-            "[{\"time\": 0, \"T [mN.m]\": 1.5}, {\"time\": 0.1, \"T [mN.m]\": -2}]",
-            "{\"time\": [0, 0.1], \"T [mN.m]\": [1.5, -2]}",
-        ] {
-            let table = table(text.as_bytes());
-            assert_eq!(table.rows(), 2, "{text}");
-            let at = table.position("T").unwrap();
-            assert_eq!(table.column(at).unwrap(), [1.5, -2.0]);
-            assert_eq!(table.headers[at].unit.as_deref(), Some("mN.m"));
-        }
-        let table = table(b"{\"time\": 0, \"T\": 1}\n{\"time\": 1}\n");
-        assert!(table.column(table.position("T").unwrap()).unwrap_err().to_string().contains("row 2"));
-        let error = Table::parse(b"{\"time\": 0}\n{\"time\": \n{\"time\": 2}\n", "log").unwrap_err().to_string();
-        assert!(error.contains("row 2") && error.contains("not JSON"), "{error}");
-        // The last object was never closed: the logger was stopped.
-        let table = Table::parse(b"{\"time\": 0}\n{\"time\": 1}\n{\"time\": ", "log").unwrap();
-        assert_eq!(table.rows(), 2);
-        assert!(table.cut.unwrap().contains("log: row 3, the last, is cut off"));
-    }
-
-    #[test]
     fn halscope_and_halsampler_are_read_as_they_write() {
         let scope = b"Sampling period is 1000000 ns \n\njoint.0.pos-fb +1.00000000000000 pid.out -0.50000000000000 \njoint.0.pos-fb +2.0 pid.out -0.25 \n";
         let scope = table(scope);
@@ -378,6 +273,24 @@ mod tests {
         let sampler = table(b"0 123.55 33.4 0 -12 \n1 123.60 33.5 0 -11 \n");
         assert_eq!(sampler.names(), "column 1, column 2, column 3, column 4, column 5");
         assert_eq!(sampler.column(1).unwrap(), [123.55, 123.60]);
+        // A logger that was stopped: in a name, behind a channel, in a number.
+        let header = "Sampling period is 1000000 ns \n\n";
+        let rows: String = (0..20).map(|k| format!("a +{k}.50000 b -0.25000 \n")).collect();
+        for cut in ["a +20.50000 b -0.2", "a +20.50000 b", "a +20.50000 b ", "a +20.50000 ", "a +20.50000\n", "a"] {
+            let table = table(format!("{header}{rows}{cut}").as_bytes());
+            assert_eq!(table.rows(), 20, "{cut:?}");
+            assert!(table.cut.as_ref().unwrap().contains("log: row 23, the last, is cut off"), "{:?}", table.cut);
+        }
+        let whole = table(format!("{header}{rows}a +20.50000 b -0.25000").as_bytes());
+        assert_eq!((whole.rows(), whole.cut), (21, None));
+        let damaged = format!("{header}{}", rows.replacen("a +7.50000 b", "a +7.50000", 1));
+        let error = Table::parse(damaged.as_bytes(), "log").unwrap_err().to_string();
+        assert!(error.contains("log: row 10: 3 words"), "{error}");
+        let sampler: String = (0..20).map(|k| format!("{k} 0.50000 -0.25000 \n")).collect();
+        for cut in ["20 0.50000 -0.2", "20 0.50000 ", "20"] {
+            let table = table(format!("{sampler}{cut}").as_bytes());
+            assert_eq!((table.rows(), table.cut.is_some()), (20, true), "{cut:?}");
+        }
         let named = table(b"time [s]  T [N.m]\n0.0   1.5\n0.1  -2.5\n");
         assert_eq!((named.names(), named.headers[1].unit.as_deref()), ("time, T".to_owned(), Some("N.m")));
     }
@@ -415,15 +328,5 @@ mod tests {
         log[..200].fill(0);
         let error = Table::parse(&log, "log").unwrap_err().to_string();
         assert!(error.contains("neither text"), "{error}");
-    }
-
-    #[test]
-    fn json_of_nested_objects_and_rows_beside_other_things_is_a_table() {
-        let text = br#"{"logger": "x", "rows": [
-            {"t": "2026-03-01T12:00:00Z", "axis": {"T": 1.5, "q": 0.1}}, {"t": "2026-03-01T12:00:01Z", "axis": {"T": -2.5, "q": 0.2}}]}"#;
-        let table = table(text);
-        assert_eq!(table.names(), "t, axis.T, axis.q");
-        assert_eq!(table.column(1).unwrap(), [1.5, -2.5]);
-        assert_eq!(table.column(0).unwrap()[1] - table.column(0).unwrap()[0], 1.0);
     }
 }

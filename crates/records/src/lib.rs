@@ -18,6 +18,7 @@ mod hdf5;
 #[cfg(not(feature = "hdf5"))]
 #[path = "no_hdf5.rs"]
 mod hdf5;
+mod json;
 mod load;
 mod lost;
 pub mod machine;

@@ -9,6 +9,7 @@
 //! `%DIMENSION=`, `%COUNT=` and `%CYCLETIME=` (microseconds); behind `%[DATA]` stand rows of time and values, each closed by a
 //! semicolon. Source: the public MATLAB reader `read_tncscope_file`. No export of a control was at hand for either.
 
+use super::csv::cut::{told, word};
 use super::error::TraceError;
 use super::forms::Filled;
 use super::table::{Table, header};
@@ -36,8 +37,19 @@ fn named(name: &str, unit: &str) -> String {
 /// A trace of Sinumerik.
 pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
-    let document = Document::parse(bytes).map_err(|e| {
-        wrong(format!("line {}: XML that is not well-formed ({}); save the trace again", e.position.line, e.message))
+    let mut cut = None;
+    let document = Document::parse(bytes).or_else(|e| {
+        closed(bytes)
+            .and_then(|closed| {
+                cut = closed.begun.map(|(line, text)| word(file, line, &text));
+                Document::parse(&closed.whole).ok()
+            })
+            .ok_or_else(|| {
+                wrong(format!(
+                    "line {}: XML that is not well-formed ({}); save the trace again",
+                    e.position.line, e.message
+                ))
+            })
     })?;
     let within = |e: &Element, names: &[&str]| -> Option<Element> {
         names.iter().try_fold(e.clone(), |e, name| if e.name == *name { Some(e) } else { e.child(name).cloned() })
@@ -79,7 +91,31 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     if filled.rows() == 0 {
         return Err(wrong("its dataFrame has no rec: no sample was recorded".to_owned()));
     }
-    Ok(filled.table(file, 1))
+    Ok(Table { cut, ..filled.table(file, 1) })
+}
+
+/// A trace of Sinumerik that was closed behind its last whole sample.
+struct Closed {
+    whole: Vec<u8>,
+    /// Line and text of the sample that was begun behind that.
+    begun: Option<(usize, String)>,
+}
+
+/// Closes a trace of Sinumerik that ends in the middle; None where it has no whole sample.
+fn closed(bytes: &[u8]) -> Option<Closed> {
+    let end = memchr::memmem::rfind(bytes, b"/>")? + 2;
+    let begun = bytes[end..].trim_ascii();
+    let mut whole = bytes[..end].to_vec();
+    for name in ["dataFrame", "traceData", "traceDataRoot"] {
+        let opened = [">", " "].iter().any(|b| memchr::memmem::find(bytes, format!("<{name}{b}").as_bytes()).is_some());
+        if opened {
+            whole.extend_from_slice(format!("</{name}>").as_bytes());
+        }
+    }
+    let line = 1 + memchr::memchr_iter(b'\n', &bytes[..bytes.trim_ascii_end().len()]).count();
+    // The end of an element is no sample.
+    let sample = !begun.is_empty() && !begun.starts_with(b"</");
+    Some(Closed { whole, begun: sample.then(|| (line, told(begun))) })
 }
 
 /// A file of TNCscope.
@@ -123,14 +159,22 @@ pub(super) fn tncscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         let name = if count > 0 { format!("{name} ({})", count + 1) } else { name.to_owned() };
         names.push(named(&name, unit));
     }
+    let mut rows: Vec<(usize, &str)> = lines
+        .map(|(number, line)| (number + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('%'))
+        .collect();
+    let mut cut = None;
+    if let [.., (_, before), (at, last)] = rows[..] {
+        let cells = |row: &str| row.matches(';').count();
+        // Each row is closed by a semicolon.
+        if before.ends_with(';') && cells(last) < cells(before) {
+            cut = Some(word(file, at, &told(last.as_bytes())));
+            rows.pop();
+        }
+    }
     let mut filled = Filled::default();
     let mut row = 0_u32;
-    for (number, line) in lines {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('%') {
-            continue;
-        }
-        let at = number + 1;
+    for (at, line) in rows {
         // The first cell is the control's own count of time; the cycle time is what spaces the samples.
         let cells: Vec<&str> = line.trim_end_matches(';').split(';').map(str::trim).collect();
         if cells.len() > names.len() + 1 {
@@ -153,5 +197,5 @@ pub(super) fn tncscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     if row == 0 {
         return Err(wrong("no sample stands behind %[DATA]".to_owned()));
     }
-    Ok(filled.table(file, 1))
+    Ok(Table { cut, ..filled.table(file, 1) })
 }

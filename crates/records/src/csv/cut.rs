@@ -23,8 +23,18 @@ pub(in super::super) fn whole(body: &[u8], format: &Format, begins: bool) -> (us
     if !is_data(line) || (begins && before.is_empty()) || !is_cut(line, end < body.len(), &before, format) {
         return (body.len(), None);
     }
-    let text: String = String::from_utf8_lossy(trim(line)).chars().take(40).collect();
-    (start, Some(text))
+    (start, Some(told(trim(line))))
+}
+
+/// Whether the last of some rows is cut, whose words are set apart by blanks and are as many in each. `ended`: whether its line has an end.
+pub(in super::super) fn last_of_words(rows: &[&str], ended: bool) -> bool {
+    let [before @ .., last] = rows else { return false };
+    let joined = |row: &&str| row.split_whitespace().collect::<Vec<_>>().join(" ").into_bytes();
+    let Some(columns) = before.first().map(|row| row.split_whitespace().count()) else { return false };
+    let nearest: Vec<Vec<u8>> = before.iter().rev().take(ROWS).map(joined).collect();
+    let nearest: Vec<&[u8]> = nearest.iter().map(Vec::as_slice).collect();
+    let format = Format { separator: b' ', columns, decimal_comma: false, blank_last: false };
+    is_cut(&joined(last), ended, &nearest, &format)
 }
 
 /// Whether a last row is cut, beside the rows before it: it is short or, where its line has no end, its last number breaks off.
@@ -57,6 +67,11 @@ fn is_cut(line: &[u8], ended: bool, before: &[&[u8]], format: &Format) -> bool {
 fn separators(line: &[u8], format: &Format) -> usize {
     let quoted = |at: usize| memchr_iter(b'"', &line[..at]).count() % 2 == 1;
     memchr_iter(format.separator, line).filter(|at| !quoted(*at)).count()
+}
+
+/// The text of a row that was left out, as it is told.
+pub(in super::super) fn told(row: &[u8]) -> String {
+    String::from_utf8_lossy(row).chars().take(40).collect()
 }
 
 /// What is said of a last row that was left out.
