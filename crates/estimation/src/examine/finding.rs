@@ -36,7 +36,7 @@ const MOST: usize = 64;
 pub struct Finding {
     /// What it is, one word for programs. Of numbers and time: `magnitude`, `interval`, `time_order`, `lost_samples`,
     /// `time_rounded`, `time_jitter`. Of one channel: `constant`, `stuck`, `jump`, `wrapped`, `spikes`, `held`, `clipped`. Of
-    /// channels beside each other: `sign`, `units`, `scale`, `swapped`, `foreign`, `filtered`, `copy`. Of torque and motion:
+    /// channels beside each other: `sign`, `units`, `scale`, `swapped`, `foreign`, `filtered`, `copy`, `computed`. Of torque and motion:
     /// `not_followed`, `misaligned`, `inertia`, `one_direction`, `no_excitation`, `too_short`. Of stretches: `standstill`,
     /// `standing`, `drive_off`.
     pub id: &'static str,

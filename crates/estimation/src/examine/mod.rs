@@ -14,6 +14,7 @@
 
 mod ceiling;
 mod channels;
+mod computed;
 mod copies;
 mod encoders;
 mod finding;
@@ -255,6 +256,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
     let input = &cut(input, n);
     let bad = channels::examine(input, &mut findings);
     copies::examine(input, &mut findings);
+    computed::examine(input, &mut findings);
     slips::examine(input, &mut findings);
     sizes(input, &mut findings);
     let usable = usable::examine(input, &bad, &mut findings);

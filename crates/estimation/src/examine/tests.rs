@@ -441,6 +441,15 @@ fn broken() -> Vec<(&'static str, Columns, &'static [&'static str])> {
         },
         &["copy"],
     );
+    add(
+        "an inertia times the second differences of the motor's angle as torque",
+        &mut |c| {
+            let x = c.v[1].clone();
+            (1..n - 1).for_each(|k| c.v[0][k] = 2.4e2 * (x[k + 1] - 2.0 * x[k] + x[k - 1]));
+            (c.v[0][0], c.v[0][n - 1]) = (0.0, 0.0);
+        },
+        &["computed"],
+    );
     add("counts as angle", &mut |c| c.v[1].iter_mut().for_each(|v| *v = (*v * 1e9).round()), &["magnitude"]);
     cases
 }
