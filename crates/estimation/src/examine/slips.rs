@@ -11,10 +11,12 @@ use super::Input;
 use super::finding::{Finding, Severity};
 use super::robust::{quantile, step};
 
-/// Samples on either side of a row: few for a fast motion, many for one that hardly stands out of the noise.
-const SIDES: [usize; 2] = [3, 6];
-/// Most samples lost in a row that a cubic over so few still reaches across.
-const LOST: usize = 5;
+/// Samples on either side of a row, and the most lost in a row that a cubic over so many still reaches across: few samples for a fast motion,
+/// many for one that hardly stands out of the noise, or of which much is missing at once.
+const SIDES: [(usize, usize); 3] = [(3, 5), (6, 10), (12, 24)];
+/// Samples on either side of the shortest, and of the longest.
+const NEAR: usize = SIDES[0].0;
+const WIDE: usize = SIDES[2].0;
 /// Error of the cubic, in what it usually is about there, from which a row does not belong behind the one before: as of a lost sample.
 const FAR: f64 = 6.0;
 /// The same up to which samples belong together, with those between them missing.
@@ -69,8 +71,8 @@ struct Position<'a> {
 }
 
 impl Fits {
-    fn new(side: usize) -> Self {
-        Self { side, basis: (0..=LOST).map(|missing| cubics(side, missing)).collect() }
+    fn new((side, most): (usize, usize)) -> Self {
+        Self { side, basis: (0..=most).map(|missing| cubics(side, missing)).collect() }
     }
 
     /// What the cubic leaves about row `k` with so many samples missing before it.
@@ -91,7 +93,8 @@ impl Fits {
             if self.left(x.values, *k, 0) <= FAR * FAR * usual {
                 return None;
             }
-            let best = (1..=LOST).map(|m| (m, self.left(x.values, *k, m))).min_by(|a, b| a.1.total_cmp(&b.1));
+            let best =
+                (1..self.basis.len()).map(|m| (m, self.left(x.values, *k, m))).min_by(|a, b| a.1.total_cmp(&b.1));
             best.filter(|(_, left)| *left <= AGREE * AGREE * usual).map(|(missing, _)| (*k, missing))
         };
         candidates.iter().filter_map(slip).collect()
@@ -107,7 +110,7 @@ impl Fits {
 
 /// Rows before which samples are missing, and how many, as the positions say with one voice.
 fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
-    let margin = SIDES[1];
+    let margin = WIDE;
     let mut found: Vec<(usize, usize)> = Vec::new();
     let fits = SIDES.map(Fits::new);
     for (c, position) in positions.iter().enumerate() {
@@ -120,7 +123,7 @@ fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
             start = rows.end;
             let usual = quantile(rows.clone().map(third), 0.5);
             // A sample that repeats the one before it is held, or the motion stands: what follows makes up for it.
-            let moves = |k: &usize| x[k - SIDES[0]..k + SIDES[0]].windows(2).all(|w| w[0] != w[1]);
+            let moves = |k: &usize| x[k - NEAR..k + NEAR].windows(2).all(|w| w[0] != w[1]);
             let stands = |k: &usize| third(*k).abs() > STANDS * usual;
             let candidates: Vec<usize> = rows.clone().filter(stands).filter(moves).collect();
             if candidates.is_empty() {
@@ -136,7 +139,7 @@ fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
     }
     // One is seen by both encoders, with both lengths, and from the rows beside it.
     found.sort_unstable();
-    found.dedup_by(|next, first| next.0 - first.0 <= SIDES[0]);
+    found.dedup_by(|next, first| next.0 - first.0 <= NEAR);
     found
 }
 

@@ -227,6 +227,25 @@ fn samples_that_are_missing_under_even_stamps_are_found_where_the_axis_moves_and
 }
 
 #[test]
+fn many_samples_in_a_row_that_are_missing_under_even_stamps_are_found_and_counted() {
+    let c = slow_moves();
+    for missing in [6, 9, 15, 24] {
+        let mut broken = c.clone();
+        // The later first, so that the earlier rows keep their numbers.
+        for first in [1650, 1150, 700, 180] {
+            broken.v.iter_mut().filter(|v| !v.is_empty()).for_each(|v| drop(v.drain(first..first + missing)));
+        }
+        for input in [broken.positions(), broken.motor_only()] {
+            let found = examine(&input);
+            let slips = found.find("lost_samples").unwrap_or_else(|| panic!("{missing}: {:#?}", found.findings));
+            assert_eq!((slips.severity, slips.stretches.len()), (Severity::Refuse, 4), "{missing}: {slips:?}");
+            assert!(slips.seen.starts_with(&format!("{} samples are missing", 4 * missing)), "{}", slips.seen);
+        }
+    }
+    assert!(examine(&c.positions()).find("lost_samples").is_none());
+}
+
+#[test]
 fn a_torque_that_the_log_clipped_is_refused_and_one_that_the_drive_limited_is_not() {
     let coulomb = effect("coulomb_motor", &[("level", 0.002)]);
     for settings in [Settings::default(), coulomb] {
