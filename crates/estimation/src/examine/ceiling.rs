@@ -138,16 +138,28 @@ fn at_width(input: &Input<'_>, torque: &[f64], width: usize, held: bool) -> Opti
     Some((left, (excess > SURE * error).then(|| excess / high.abs().max(low.abs()))))
 }
 
-/// Whether a column stands at its ends time and again, between which it takes many values: a column of a few levels ends at one by nature.
+/// Stretches in which a column stands at its ends time and again, between which it takes many values: a column of a few levels ends at one by
+/// nature.
 pub(super) fn stands(x: &[f64]) -> Vec<std::ops::Range<usize>> {
     let n = x.len();
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     let at_end: Vec<std::ops::Range<usize>> =
         [low, high].into_iter().flat_map(|end| runs(n, |k| x[k] == end)).filter(|r| r.len() >= 3).collect();
     let count: usize = at_end.iter().map(std::ops::Range::len).sum();
-    let inside = |w: &&[f64]| w.iter().all(|v| *v > low && *v < high);
-    let within = x.windows(2).filter(inside).count();
-    let changes = x.windows(2).filter(inside).filter(|w| w[0] != w[1]).count();
-    let levels = within * 4 < n || changes * 2 < within;
-    if at_end.len() < 3 || count * 200 < n || levels { Vec::new() } else { at_end }
+    if at_end.len() < 3 || count * 200 < n || levels(x, low, high) { Vec::new() } else { at_end }
+}
+
+/// Values between the ends from which they are told from some levels.
+const VALUES: usize = 16;
+
+/// Whether a column takes a few values, or keeps each for some samples, and does not pass all that are between its ends: however little of it
+/// is there.
+fn levels(x: &[f64], low: f64, high: f64) -> bool {
+    let inside = |v: &f64| *v > low && *v < high;
+    let within = x.windows(2).filter(|w| w.iter().all(inside)).count();
+    let changes = x.windows(2).filter(|w| w.iter().all(inside) && w[0] != w[1]).count();
+    let mut values: Vec<f64> = x.iter().copied().filter(inside).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    changes * 2 < within || values.len() < VALUES
 }

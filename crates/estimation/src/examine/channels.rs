@@ -18,6 +18,8 @@ const ABRUPT: f64 = 3.0;
 const JUMP: f64 = 8.0;
 /// Share of samples that repeat the one before from which a channel counts as held.
 const HELD: f64 = 0.3;
+/// Share of the samples at its ends from which a torque stands there most of the time.
+const MOSTLY: f64 = 0.5;
 
 /// Looks at every channel. Gives the stretches that no use can be made of.
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
@@ -311,7 +313,12 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
         return;
     }
     let count: usize = at_end.iter().map(Range::len).sum();
-    let mut seen = format!("{} stands at its largest or smallest value for {count} samples.", channel.name);
+    let share = count as f64 / x.len() as f64;
+    let mut seen = format!(
+        "{} stands at its largest or smallest value for {count} samples ({:.1} % of the record).",
+        channel.name,
+        100.0 * share
+    );
     let limit = "A model of the machine needs that limit: see `eixo effects saturation`.";
     let (severity, means, remedy) = if channel.name == "T" {
         match ceiling::felt(input, x) {
@@ -324,6 +331,12 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
                 )
             }
             Felt::This => (Severity::Note, "The drive's limit is reached.", limit),
+            Felt::Untold if share > MOSTLY => (
+                Severity::Warn,
+                "The drive's limit is reached, or that of the log, most of the time: what more was asked for, or given, this record does not tell.",
+                "Record a motion that needs less torque, or widen the range of the column in the logger; where it is the drive that gives no \
+                 more, a model of the machine needs that limit: see `eixo effects saturation`.",
+            ),
             Felt::Untold => (
                 Severity::Note,
                 "The drive's limit is reached, or that of the log: which of the two, this record does not tell.",

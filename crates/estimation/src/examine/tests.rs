@@ -279,6 +279,30 @@ fn a_torque_that_the_log_clipped_is_refused_and_one_that_the_drive_limited_is_no
     }
 }
 
+#[test]
+fn a_torque_that_stands_at_its_ends_most_of_the_time_is_told_with_its_samples_and_one_of_a_few_levels_is_not() {
+    let free = axis(Kind::RandomPhase, 4096, 2, &Settings::default(), 2e-6);
+    let mut sizes: Vec<f64> = free.v[0].iter().map(|t| t.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    for share in [0.6, 0.8, 0.95] {
+        let limit = sizes[((1.0 - share) * sizes.len() as f64) as usize];
+        let at_end = free.v[0].iter().filter(|t| t.abs() >= limit).count();
+        let mut clipped = free.clone();
+        clipped.v[0].iter_mut().for_each(|t| *t = t.clamp(-limit, limit));
+        for input in [clipped.positions(), clipped.motor_only()] {
+            let found = examine(&input);
+            let seen = found.find("clipped").expect("it stands at its ends");
+            assert!(seen.severity <= Severity::Warn && !seen.stretches.is_empty(), "{share}: {seen:?}");
+            // Stretches of less than three samples are chance.
+            assert!(seen.samples <= at_end && seen.samples as f64 > 0.8 * at_end as f64, "{share}: {seen:?}");
+        }
+        let mut levels = free.clone();
+        let step = limit / 3.0;
+        levels.v[0].iter_mut().for_each(|t| *t = (t.clamp(-limit, limit) / step).round() * step);
+        assert!(examine(&levels.positions()).find("clipped").is_none(), "{share}");
+    }
+}
+
 /// Slow triangles under control, with an encoder whose noise from sample to sample is as large as the motion.
 #[test]
 fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_no_foreign_one() {
