@@ -301,10 +301,26 @@ fn what_no_torque_moves_and_what_no_sample_shows_is_not_identified_even_where_it
             .and_then(|t| t.with(Signal::Theta1, one))
             .and_then(|t| t.with(Signal::Theta2, two));
         write_csv(&path, &odd.expect("a trace"), Motion::Rotary).expect("written");
-        let out = eixo(&["identify", text(&path), "--trust"]);
+        let [json, page] = ["odd.json", "odd.html"].map(|name| folder.path().join(name));
+        let out = eixo(&["identify", text(&path), "--trust", "--json", text(&json), "--report", text(&page)]);
         let said = String::from_utf8_lossy(&out.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(out.status.code(), Some(1), "{said}");
         assert!(!said.contains("identifies the axis:") && said.contains(why), "{why}: {said}");
+        if why != "half the sampling" {
+            continue;
+        }
+        // Estimates that are refused are nowhere told, nor is what follows from them.
+        let found: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
+        let methods = found["methods"].as_array().expect("methods");
+        let refused = |m: &&serde_json::Value| m["failure"].as_str().is_some_and(|f| f.contains(why));
+        assert!(methods.iter().any(|m| m["method"] == "oe" && refused(&m)), "{methods:?}");
+        for m in methods.iter().filter(refused) {
+            let lists = ["parameters", "modal", "outputs"].map(|list| m[list].as_array().map(Vec::len));
+            assert_eq!(lists, [Some(0); 3], "{m}");
+            assert!(m["history"].is_null() && m["excitation"].is_null(), "{m}");
+        }
+        let page = std::fs::read_to_string(&page).expect("written");
+        assert!(page.contains(why) && !page.contains("Estimates of Output error"));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Estimates with their errors: of one method, and of all side by side.
 
-use super::has_reference;
+use super::{has_estimates, has_reference};
 use crate::identify::result::{Estimate, Identification, MethodResult};
 use crate::report::format::{self, Medium};
 use crate::report::{Block, Cell, Table};
@@ -16,14 +16,20 @@ pub fn is_shown(e: &Estimate) -> bool {
     e.value.is_finite() && !impossible && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
 }
 
-pub fn value(e: &Estimate) -> Cell {
+/// The estimate with its standard error, in words where it is none.
+pub fn value(e: &Estimate, unit: &str) -> Cell {
     if !is_shown(e) {
         return Cell::text("not determined");
     }
     match e.std {
-        Some(std) => Cell::Estimate(e.value, std, e.unit.to_owned()),
-        None => Cell::Number(e.value, 5, e.unit.to_owned()),
+        Some(std) => Cell::Estimate(e.value, std, unit.to_owned()),
+        None => Cell::Number(e.value, 5, unit.to_owned()),
     }
+}
+
+/// How far the estimate is from its reference: nothing where it is none.
+fn error(e: &Estimate) -> Cell {
+    e.error_percent.filter(|_| is_shown(e)).map_or(Cell::Empty, |p| Cell::Percent(p / 100.0))
 }
 
 /// Parameters and modal parameters of one method.
@@ -38,12 +44,12 @@ pub fn estimates(m: &MethodResult) -> Table {
     for e in all {
         let mut cells = vec![
             Cell::text(e.name),
-            value(e),
+            value(e, e.unit),
             e.std.filter(|_| is_shown(e) && e.value != 0.0).map_or(Cell::Empty, |s| Cell::Percent((s / e.value).abs())),
         ];
         if reference {
             cells.push(e.reference.map_or(Cell::Empty, |r| Cell::Number(r, 5, e.unit.to_owned())));
-            cells.push(e.error_percent.map_or(Cell::Empty, |p| Cell::Percent(p / 100.0)));
+            cells.push(error(e));
         }
         table.row(cells);
     }
@@ -85,20 +91,18 @@ fn matrix(found: &Identification, caption: &str, units: bool, cell: impl Fn(&Est
 }
 
 pub fn compare(found: &Identification) -> Table {
-    matrix(found, "Estimates by method", true, |e| match e.std {
-        Some(std) => Cell::Estimate(e.value, std, String::new()),
-        None => Cell::Number(e.value, 5, String::new()),
-    })
+    matrix(found, "Estimates by method", true, |e| value(e, ""))
 }
 
 pub fn errors(found: &Identification) -> Table {
-    matrix(found, "Error against the reference", false, |e| {
-        e.error_percent.map_or(Cell::Empty, |p| Cell::Percent(p / 100.0))
-    })
+    matrix(found, "Error against the reference", false, error)
 }
 
 pub fn side_by_side(found: &Identification) -> Vec<Block> {
-    let mut blocks = vec![Block::Table(compare(found))];
+    let mut blocks = Vec::new();
+    if has_estimates(found) {
+        blocks.push(Block::Table(compare(found)));
+    }
     if has_reference(found) {
         blocks.push(Block::Table(errors(found)));
     }

@@ -63,7 +63,7 @@ pub fn short(found: &Identification) -> Vec<Block> {
     if let Some(best) = recommended(found) {
         blocks.push(Block::Table(estimates(best)));
     }
-    if found.methods.len() > 1 {
+    if found.methods.len() > 1 && has_estimates(found) {
         blocks.push(Block::Table(compare(found)));
     }
     if has_reference(found) {
@@ -104,6 +104,11 @@ fn recommended(found: &Identification) -> Option<&MethodResult> {
         Some(r) => found.methods.get(r.method),
         None => found.methods.iter().find(|m| m.failure.is_none()),
     }
+}
+
+/// Whether any method has an estimate: refused ones are none.
+fn has_estimates(found: &Identification) -> bool {
+    found.methods.iter().any(|m| !m.parameters.is_empty())
 }
 
 fn has_reference(found: &Identification) -> bool {

@@ -12,12 +12,7 @@ pub fn verdict(found: &Identification) -> Verdict {
         return Verdict {
             tone: Tone::Unsure,
             sentence: "No method could identify the axis from this trace.".to_owned(),
-            detail: found
-                .methods
-                .iter()
-                .filter_map(|m| m.failure.as_ref().map(|f| format!("{}: {f}.", m.title)))
-                .collect::<Vec<_>>()
-                .join(" "),
+            detail: failures(found),
             figures: Vec::new(),
         };
     };
@@ -59,7 +54,7 @@ pub fn verdict(found: &Identification) -> Verdict {
     };
     let known = best.modal.iter().chain(best.parameters.iter()).filter(|e| is_shown(e));
     let figures = if identifiability.identified {
-        known.take(4).map(|e| (e.name.to_owned(), value(e))).collect()
+        known.take(4).map(|e| (e.name.to_owned(), value(e, e.unit))).collect()
     } else {
         Vec::new()
     };
@@ -72,6 +67,20 @@ pub fn verdict(found: &Identification) -> Verdict {
         words.join(" ")
     };
     Verdict { tone, sentence, detail, figures }
+}
+
+/// Why no method has an estimate, each reason once, behind the methods that it holds for.
+fn failures(found: &Identification) -> String {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (m, why) in found.methods.iter().filter_map(|m| Some((m, m.failure.as_deref()?))) {
+        match reasons.iter_mut().find(|(reason, _)| *reason == why) {
+            Some((_, methods)) => methods.push(&m.title),
+            None => reasons.push((why, vec![&m.title])),
+        }
+    }
+    let sentences: Vec<String> =
+        reasons.iter().map(|(why, methods)| sentence_of(&format!("{}: {why}", methods.join(", ")))).collect();
+    sentences.join(" ")
 }
 
 /// A remark as a sentence: capital letter, full stop.

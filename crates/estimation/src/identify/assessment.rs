@@ -29,9 +29,10 @@ impl Run<'_> {
         }
     }
 
-    /// Fit, whiteness and excitation estimate of a method's parameters.
+    /// Fit, whiteness and excitation estimate of a method's parameters, but for refused ones.
     pub fn assess(&self, result: &mut MethodResult, scheme: Scheme) {
-        let Some((_, estimated)) = self.estimates.iter().find(|(name, _)| *name == result.method) else { return };
+        let found = self.estimates.iter().find(|(name, _)| *name == result.method && result.failure.is_none());
+        let Some((_, estimated)) = found else { return };
         result.excitation = Some(self.excitation(estimated));
         let p = estimated.parameters(self.machine.parameters.rho);
         if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {

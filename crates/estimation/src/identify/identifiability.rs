@@ -6,7 +6,9 @@
 
 use serde::Serialize;
 
-use super::result::{Estimate, MethodResult};
+use super::levenberg::Termination;
+use super::result::{Estimate, MethodResult, UNSEEN};
+use super::run::Method;
 
 /// Two standard errors of a determined parameter are at most this share of it.
 pub const DETERMINED: f64 = 0.3;
@@ -37,14 +39,23 @@ pub struct Identifiability {
 pub(super) struct Evidence {
     /// Fit on the held-out part, per cent.
     pub held_out: Option<f64>,
-    /// Half the sampling rate, rad/s.
-    pub nyquist: Option<f64>,
     /// Share of an output that the torque explains beyond the initial state, per cent, where that is largest.
     pub driven: Option<f64>,
     /// Share of the accelerations that the equations of motion explain, motor and table, where no simulation was compared.
     pub explained: Option<[f64; 2]>,
     /// Torques that go with viscous friction, dry friction and load at one unit of each, as shares of the torque's size.
     pub shares: Option<[f64; 3]>,
+}
+
+/// What speaks against a record whose estimates have a natural frequency that no sample shows, and what to do.
+const BEYOND: [&str; 2] = [
+    "Its natural frequency lies beyond half the sampling rate: no sample shows it.",
+    "Sample faster, or identify a rigid axis (structure = \"rigid\" in the axis file); look at the torque of the record (`eixo inspect`).",
+];
+
+/// Whether a method's estimates were refused for that.
+fn is_unseen(m: &MethodResult) -> bool {
+    m.failure.as_deref() == Some(UNSEEN)
 }
 
 /// Whether a figure is below a bound; one that is no number is.
@@ -59,17 +70,20 @@ impl Identifiability {
         Self { identified: true, ..Self::default() }
     }
 
-    /// Judges the method to trust.
-    pub(super) fn of(best: Option<&MethodResult>, evidence: Evidence) -> Self {
+    /// Judges the method to trust, `best` of the methods.
+    pub(super) fn of(methods: &[MethodResult], best: Option<&MethodResult>, evidence: Evidence) -> Self {
         let mut doubts = Vec::new();
         let Some(best) = best.filter(|m| m.failure.is_none() && !m.parameters.is_empty()) else {
-            return Self {
-                doubts: vec!["No method gives parameters of an axis that can exist.".to_owned()],
-                advice: "Look at the record (`eixo inspect`); excite the axis around and above its natural frequency, with both \
-                         sides moving."
-                    .to_owned(),
-                ..Self::default()
+            let [doubt, advice] = if methods.iter().any(is_unseen) {
+                BEYOND
+            } else {
+                [
+                    "No method gives parameters of an axis that can exist.",
+                    "Look at the record (`eixo inspect`); excite the axis around and above its natural frequency, with both \
+                     sides moving.",
+                ]
             };
+            return Self { doubts: vec![doubt.to_owned()], advice: advice.to_owned(), ..Self::default() };
         };
         let zeta = best.modal.iter().find(|e| e.name == "zeta");
         // A damping below zero that is not small is none of an axis.
@@ -102,10 +116,11 @@ impl Identifiability {
              no inertia and no stiffness."
                 .clone_into(&mut advice);
         }
-        let wn = best.modal.iter().find(|e| e.name == "wn");
-        if evidence.nyquist.zip(wn).is_some_and(|(nyquist, wn)| wn.value > nyquist) {
-            doubts.push("Its natural frequency lies beyond half the sampling rate: no sample shows it.".to_owned());
-            "Sample faster, or identify a rigid axis (structure = \"rigid\" in the axis file).".clone_into(&mut advice);
+        // The simulation that follows the record best is one that no sample shows: another that follows it too is not more than that.
+        let converged = |m: &MethodResult| m.termination.is_some_and(Termination::is_converged);
+        if methods.iter().any(|m| m.method == Method::Oe.name() && converged(m) && is_unseen(m)) {
+            doubts.push(BEYOND[0].to_owned());
+            BEYOND[1].clone_into(&mut advice);
         }
         if let Some(worst) = best.outputs.iter().min_by(|a, b| a.fit_percent.total_cmp(&b.fit_percent))
             && is_below(worst.fit_percent, LEAST_FIT)

@@ -83,7 +83,7 @@ impl Run<'_> {
 
     fn take(&mut self, result: &mut MethodResult, estimated: Estimated) {
         let reference = self.request.reference.then_some(&self.machine.parameters);
-        result.assess(&estimated, reference, self.machine.signals.motion);
+        result.assess(&estimated, reference, self.machine.signals.motion, self.joined.samples().dt);
         self.estimates.push((result.method, estimated));
     }
 

@@ -12,6 +12,10 @@ use crate::trace::{Motion, Signal};
 /// Version of the JSON form.
 pub const SCHEMA: &str = "eixo.identification/1";
 
+/// Why estimates with a natural frequency that no sample shows are refused.
+pub(super) const UNSEEN: &str = "the natural frequency of its estimates lies beyond half the sampling rate, where no sample shows it: sample faster, or \
+     identify a rigid axis (structure = \"rigid\" in the axis file)";
+
 /// Everything an identification found.
 #[derive(Debug, Clone, Serialize)]
 pub struct Identification {
@@ -251,25 +255,30 @@ impl MethodResult {
         }
     }
 
+    /// Takes nothing in, and says why: numbers of no axis are not shown, nor the way to them, as they would be read.
+    fn refuse(&mut self, why: &str) {
+        self.history = None;
+        self.failure = Some(why.to_owned());
+    }
+
     /// Whether a simulation with the estimates is the record to within rounding: what is left then has a shape, but no cause.
     #[must_use]
     pub fn explains_exactly(&self) -> bool {
         !self.outputs.is_empty() && self.outputs.iter().all(OutputFit::is_rounding)
     }
 
-    /// Takes the estimates in, against a reference where there is one, with what is to be said of them.
-    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion) {
-        self.parameters = estimated.estimates(reference, motion);
+    /// Takes the estimates in, against a reference where there is one, with what is to be said of them. `dt`: sampling interval, s.
+    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion, dt: f64) {
         if !estimated.is_physical() {
-            // Numbers of no axis are not shown: they would be read.
-            self.parameters.clear();
-            self.failure = Some(
+            return self.refuse(
                 "the estimates are not those of an axis (an inertia or the stiffness is not positive): noise or an unmodelled \
-                 effect rules this regression; use OE, or diagnose the record"
-                    .to_owned(),
+                 effect rules this regression; use OE, or diagnose the record",
             );
-            return;
         }
+        if estimated.parameters(1.0).modal().wn > std::f64::consts::PI / dt {
+            return self.refuse(UNSEEN);
+        }
+        self.parameters = estimated.estimates(reference, motion);
         self.modal = estimated.modal(reference);
         for e in &self.parameters {
             if let Some(std) = e.std.filter(|s| *s > 0.5 * e.value.abs()) {

@@ -356,7 +356,7 @@ pub(super) fn identify(
         }
         Err(why) => result.failure = Some(why),
     }
-    let identifiability = Identifiability::of(recommended.as_ref().map(|_| &result), evidence);
+    let identifiability = Identifiability::of(&[], recommended.as_ref().map(|_| &result), evidence);
     let torque = trace.require(Signal::T)?;
     Ok(Identification {
         schema: SCHEMA,

@@ -273,10 +273,7 @@ pub fn identify_joined(
     });
     let held_out = simulated.and_then(|(_, p)| run.held_out(&p, scheme));
     let driven = simulated.and_then(|(best, p)| run.driven(best, &p, scheme));
-    let identifiability = Identifiability::of(
-        best,
-        Evidence { held_out, driven, nyquist: Some(std::f64::consts::PI / joined.samples().dt), ..Evidence::default() },
-    );
+    let identifiability = Identifiability::of(&methods, best, Evidence { held_out, driven, ..Evidence::default() });
     let frequency_response = measured.as_ref().and_then(|m| {
         let index = recommended.as_ref()?.method;
         let p = run.estimates.iter().find(|(name, _)| *name == methods[index].method)?.1.parameters(1.0);

@@ -183,7 +183,8 @@ pub fn identify(
     }
     let best = methods.iter().position(|m| !m.modal.is_empty());
     let explained = Some(squares.explained());
-    let identifiability = Identifiability::of(best.map(|k| &methods[k]), Evidence { explained, ..Evidence::default() });
+    let evidence = Evidence { explained, ..Evidence::default() };
+    let identifiability = Identifiability::of(&methods, best.map(|k| &methods[k]), evidence);
     let unit = Signal::T.unit(motion);
     let at = stream.frame();
     Ok(Identification {
@@ -309,7 +310,8 @@ fn assessed(
         Err(why) => result.failure = Some(why.to_string()),
         Ok((estimated, history)) => {
             result.history = history;
-            result.assess(&estimated, request.reference.then_some(&machine.parameters), machine.signals.motion);
+            let reference = request.reference.then_some(&machine.parameters);
+            result.assess(&estimated, reference, machine.signals.motion, frame.stream.frame().dt);
         }
     }
     result
