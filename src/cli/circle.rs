@@ -92,7 +92,7 @@ const FEED: f64 = 1.0;
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let inputs = [&args.axis, &args.y, &args.diagnosed, &args.diagnosed_y].into_iter().filter_map(Option::as_deref);
     let inputs = inputs.chain(args.measured.iter().map(PathBuf::as_path));
-    outputs::check(inputs, [args.output.as_ref(), args.report.as_ref(), args.json.as_ref()])?;
+    outputs::check(inputs, [args.output.as_ref()], [args.report.as_ref(), args.json.as_ref()])?;
     let x = machine(args.axis.as_deref())?;
     let y = machine(args.y.as_deref().or(args.axis.as_deref()))?;
     if !args.measured.is_empty() {

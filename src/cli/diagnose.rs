@@ -185,7 +185,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     }
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref()).chain(args.holdout.as_deref());
-    outputs::check(inputs, [args.json.as_ref(), args.report.as_ref(), args.fmu.as_ref()])?;
+    outputs::check(inputs, [], [args.json.as_ref(), args.report.as_ref(), args.fmu.as_ref()])?;
     let trace = args.traces.first().context("no trace given")?;
     let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
     let steps = args.progress.steps();

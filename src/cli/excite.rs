@@ -86,7 +86,7 @@ fn band(text: &str) -> Result<(f64, f64), String> {
 /// # Errors
 /// When the signal cannot be made or the file cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    outputs::check([], [Some(&args.output)])?;
+    outputs::check([], [Some(&args.output)], [])?;
     let kind = match args.kind {
         Signals::Schroeder => Kind::Schroeder,
         Signals::RandomPhase => Kind::RandomPhase,

@@ -63,7 +63,7 @@ pub enum Version {
 /// # Errors
 /// When the axis file cannot be used, or the FMU cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    outputs::check(args.axis.as_deref().into_iter().chain(args.y.as_deref()), [Some(&args.fmu)])?;
+    outputs::check(args.axis.as_deref().into_iter().chain(args.y.as_deref()), [], [Some(&args.fmu)])?;
     let x = args.axis.as_deref().map(Machine::read).transpose()?;
     if args.fmu.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
         anyhow::ensure!(args.fmi == Version::Two, "--fmi 3 writes an FMU: give {} the end .fmu", args.fmu.display());

@@ -154,7 +154,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         });
     }
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref());
-    outputs::check(inputs, [args.json.as_ref(), args.report.as_ref(), args.axis_out.as_ref()])?;
+    outputs::check(inputs, [], [args.json.as_ref(), args.report.as_ref(), args.axis_out.as_ref()])?;
     let path = args.traces.first().context("no trace given")?;
     let bar = progress();
     let done = examine(path, args.axis.as_deref(), &args, &mut |what| bar.set_message(what.to_owned()));

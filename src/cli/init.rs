@@ -84,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let folder = args.log.parent().unwrap_or(Path::new(""));
     let axis = args.output.clone().unwrap_or_else(|| folder.join("axis.toml"));
     let page = args.report.clone().unwrap_or_else(|| axis.with_extension("html"));
-    outputs::check([args.log.as_path()], [Some(&axis), Some(&page)])?;
+    outputs::check([args.log.as_path()], [], [Some(&axis), Some(&page)])?;
     for path in [&axis, &page] {
         anyhow::ensure!(
             args.force || !path.is_file(),

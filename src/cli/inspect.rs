@@ -40,7 +40,7 @@ pub struct Args {
 /// When the record cannot be read, or an output not be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let inputs = std::iter::once(args.trace.as_path()).chain(args.axis.as_deref());
-    outputs::check(inputs, [args.json.as_ref(), args.report.as_ref()])?;
+    outputs::check(inputs, [], [args.json.as_ref(), args.report.as_ref()])?;
     let mut machine = match &args.axis {
         Some(axis) => Machine::read(axis)?,
         None => Machine { name: "axis".to_owned(), ..Machine::default() },

@@ -69,7 +69,7 @@ impl Many {
         items.retain(|item| summary.is_none() || item.path.canonicalize().ok() != summary);
         let inputs =
             items.iter().map(|item| item.path.as_path()).chain(items.iter().filter_map(|item| item.axis.as_deref()));
-        super::outputs::check(inputs, [self.summary.as_ref()])?;
+        super::outputs::check(inputs, [self.summary.as_ref()], [])?;
         for wanted in &self.part {
             anyhow::ensure!(
                 items.iter().any(|item| item.path == *wanted),

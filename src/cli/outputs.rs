@@ -39,23 +39,31 @@ fn identity(path: &Path) -> Option<Identity> {
 const FOREIGN: [&str; 12] =
     ["xlsx", "xlsm", "xls", "ods", "mat", "h5", "hdf5", "npz", "npy", "feather", "arrow", "pdf"];
 
-/// Checks the outputs of a command against its inputs.
+/// Checks the outputs of a command against its inputs: its tables, which are CSV or Parquet by their ending, and the others.
 ///
 /// # Errors
-/// When an output is an input or another output, cannot be written, or has the ending of a form that is not.
+/// When an output is an input or another output, cannot be written, or has the ending of a form that it is not written in.
 pub fn check<'a>(
     inputs: impl IntoIterator<Item = &'a Path>,
-    outputs: impl IntoIterator<Item = Option<&'a PathBuf>>,
+    tables: impl IntoIterator<Item = Option<&'a PathBuf>>,
+    others: impl IntoIterator<Item = Option<&'a PathBuf>>,
 ) -> anyhow::Result<()> {
     let inputs: Vec<(&Path, Option<Identity>)> = inputs.into_iter().map(|p| (p, identity(p))).collect();
     let mut seen: Vec<(&Path, Identity)> = Vec::new();
-    for path in outputs.into_iter().flatten() {
+    let tables = tables.into_iter().flatten().map(|path| (path, true));
+    for (path, table) in tables.chain(others.into_iter().flatten().map(|path| (path, false))) {
         if path == Path::new("-") {
             super::stdout::to_stderr();
         }
         if path.extension().is_some_and(|end| FOREIGN.iter().any(|f| end.eq_ignore_ascii_case(f))) {
             bail!(
                 "{}: this form is not written; tables end in .csv or .parquet, pages in .html, results in .json",
+                path.display()
+            );
+        }
+        if !table && path.extension().is_some_and(|end| end.eq_ignore_ascii_case("parquet")) {
+            bail!(
+                "{}: this output is no table and is not written as Parquet: give it the ending of what it is",
                 path.display()
             );
         }
@@ -106,16 +114,20 @@ mod tests {
         let dotted = folder.path().join(".").join("log.csv");
         for name in [Some(at("log.csv")), Some(at("hard.csv")), cfg!(unix).then(|| at("soft.csv")), Some(dotted)] {
             let Some(output) = name else { continue };
-            let error = check([input.as_path()], [Some(&output)]).unwrap_err().to_string();
+            let error = check([input.as_path()], [Some(&output)], []).unwrap_err().to_string();
             assert!(error.contains("is the input"), "{error}");
         }
         let (a, b) = (at("new.csv"), folder.path().join("./new.csv"));
-        assert!(check([input.as_path()], [Some(&a)]).is_ok());
-        assert!(check([input.as_path()], [Some(&a), Some(&b)]).unwrap_err().to_string().contains("two outputs"));
-        assert!(check([input.as_path()], [Some(&at("no/new.csv"))]).is_err());
-        let error = check([], [Some(&at("new.XLSX"))]).unwrap_err().to_string();
+        assert!(check([input.as_path()], [Some(&a)], []).is_ok());
+        assert!(check([input.as_path()], [Some(&a)], [Some(&b)]).unwrap_err().to_string().contains("two outputs"));
+        assert!(check([input.as_path()], [Some(&at("no/new.csv"))], []).is_err());
+        let error = check([], [Some(&at("new.XLSX"))], []).unwrap_err().to_string();
         assert!(error.contains("new.XLSX") && error.contains(".csv or .parquet"), "{error}");
+        let parquet = at("new.Parquet");
+        assert!(check([], [Some(&parquet)], []).is_ok());
+        let error = check([], [], [Some(&parquet)]).unwrap_err().to_string();
+        assert!(error.contains("new.Parquet") && error.contains("no table"), "{error}");
         let null = PathBuf::from("/dev/null");
-        assert!(!null.exists() || check([input.as_path()], [Some(&null), Some(&null)]).is_ok());
+        assert!(!null.exists() || check([input.as_path()], [Some(&null)], [Some(&null)]).is_ok());
     }
 }

@@ -184,7 +184,7 @@ fn open(path: &Path) -> anyhow::Result<Model> {
 /// When the FMU or the input cannot be used, the FMU stops, or the trace cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let inputs = std::iter::once(args.model.as_path()).chain(args.input.as_deref());
-    outputs::check(inputs, [Some(&args.output)])?;
+    outputs::check(inputs, [Some(&args.output)], [])?;
     if args.controlled {
         return controlled(args);
     }

@@ -134,7 +134,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let fmu = args.fmu.as_ref().context("no FMU given")?;
     let inputs = [Some(fmu), args.reference.as_ref(), args.input.as_ref()].into_iter().flatten().map(PathBuf::as_path);
-    outputs::check(inputs, [args.output.as_ref(), args.report.as_ref()])?;
+    outputs::check(inputs, [], [args.output.as_ref(), args.report.as_ref()])?;
     for (name, value) in [("--timeout", args.timeout), ("--budget", args.budget)] {
         anyhow::ensure!(value > 0.0 && value < 1e6, "{name} {}: must be above 0 and below 1e6 (s)", number(value));
     }
