@@ -327,6 +327,20 @@ EXPORT Status fmi3GetBinary(void *c, const uint32_t r[], size_t count, size_t si
         if (r[n] != 54) return fail(TWO(c), "unknown reference");
         sizes[n] = sizeof bytes;
         value[n] = bytes;
+#if DEFECT3_BINARY_FREED
+        uint8_t *copy = malloc(sizeof bytes);
+        value[n] = memcpy(copy, bytes, sizeof bytes);
+        free(copy);
+#endif
+#if DEFECT3_BINARY_STACK
+        value[n] = (const uint8_t *)on_the_stack("moving");
+#endif
+#if DEFECT3_BINARY_NULL
+        value[n] = NULL;
+#endif
+#if DEFECT3_BINARY_SIZE
+        sizes[n] = (size_t)-1;
+#endif
     }
     return OK;
 }

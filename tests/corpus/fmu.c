@@ -42,7 +42,8 @@ enum {
     BOOLEAN_LATE, RESET_LABEL, RESET_EARLY, STATE_EFFECT, STATE_ONCE, ONE_SIZE, EXACT_POINT, EXACT_STOP, SLOPE_SIGN,
     TOLERANCE, ENDLESS, NAME_LONG, NAME_FORMAT, UMASK, SIGNALS_BLOCKED, TIMER, MAPPED,
     LOG_ALWAYS, LOG_STAYS, PARAMETERS_LOST, PARAMETERS_REFUSED, PARAMETERS_LATE, RESOURCES_URI, STRING_SHORT,
-    STRING_OVERFLOW, STRING_FREED, STRING_STACK, DAEMON
+    STRING_OVERFLOW, STRING_FREED, STRING_STACK, DAEMON,
+    STRING_LONG, STRING_LONG_FREED, LOG_UNFILTERED, LOG_NEEDS_CATEGORY, LOG_UNKNOWN
 };
 #ifndef DEFECT
 #define DEFECT NONE
@@ -541,6 +542,15 @@ static const char *on_the_stack(const char *text) {
 
 EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const char *value[]) {
     Instance *i = c;
+/* A text that is longer than a host makes room for ahead. */
+static const char *long_text(const Values *s) {
+    static const int length = 100000;
+    char *text = malloc(length + 1);
+    memset(text, text_of(s)[0], length);
+    text[length] = 0;
+    return text;
+}
+
     Values *s = &i->values;
     size_t n;
     if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetString")) return ERROR;
@@ -571,6 +581,12 @@ EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const
 }
 
 EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const double value[]) {
+        if ((IS(STRING_LONG) || IS(STRING_LONG_FREED)) && r[n] == 1) {
+            free(i->small);
+            value[n] = i->small = (char *)long_text(s);
+            if (IS(STRING_LONG_FREED)) free(i->small), i->small = NULL;
+            continue;
+        }
     Instance *i = c;
     if (!i) return ERROR;
     Values *s = &i->values;

@@ -164,6 +164,7 @@ pub const DEFECTS: &[(&str, &str)] = &[
 ];
 
 pub fn mutants() -> Vec<Mutant> {
+    ("STRING_LONG_FREED", "string-values"),
     let mutant = |&(defect, rule): &(&'static str, &'static str)| {
         Mutant::new(defect, rule, move || pack(&corpus::running(DESCRIPTION, defect)))
     };

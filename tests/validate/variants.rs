@@ -258,6 +258,7 @@ pub fn variants() -> Vec<Variant> {
     }
     files.push(("documentation/licenses/".to_owned(), vec![]));
     add("other files", pack(&files));
+    add("a text longer than a host makes room for", pack(&running(DESCRIPTION, "STRING_LONG")));
     all.push(empty_structure());
     all
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use super::abi::{self, CALLS, Call};
 use super::instance::{ALLOCATION_FAILS, Instance};
 use super::logger::lossy;
-use super::texts::{Room, steady};
+use super::texts::{Given, Room, steady};
 use super::{Binary, HostError, Status, note};
 use crate::description::Fmi;
 
@@ -147,7 +147,7 @@ impl Instance {
         // SAFETY: the pointers are valid for the length.
         let status = unsafe { function(self.component, references.as_ptr(), references.len(), values.as_mut_ptr()) };
         ok(Call::get_string, status)?;
-        let texts = steady(&values, room);
+        let texts = steady(Given::Strings(&values), room);
         note(Call::None);
         Ok(texts)
     }

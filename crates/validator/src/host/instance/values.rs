@@ -1,7 +1,7 @@
 //! Reading and setting values, and their derivatives.
 
 use super::super::abi::{self, Call, Text};
-use super::super::texts::Room;
+use super::super::texts::{Given, Room};
 use super::super::{HostError, Status, note};
 use super::{Instance, c_string};
 
@@ -67,7 +67,7 @@ impl Instance {
         let mut values = vec![std::ptr::null(); references.len()];
         let mut room = Room::new(references.len());
         checked!(self, get_string(references.as_ptr(), references.len(), values.as_mut_ptr()))?;
-        room.read(&values);
+        room.read(Given::Strings(&values));
         let text = |k| String::from_utf8_lossy(room.text(k).unwrap_or_default()).into_owned();
         Ok((0..values.len()).map(text).collect())
     }

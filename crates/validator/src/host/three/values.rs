@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::super::abi::{self, Call, Text};
 use super::super::instance::Instance;
-use super::super::texts::{self, Room};
+use super::super::texts::{self, Given, Room};
 use super::super::{HostError, note};
 use super::layout::{Run, runs};
 use super::{check, status_of};
@@ -32,16 +32,7 @@ macro_rules! set {
     }};
 }
 
-/// Bytes as the XML spells them.
-fn hexadecimal(bytes: &[u8]) -> String {
-    use std::fmt::Write;
-    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
-        // Writing into a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
-}
-
+/// Bytes of a text of hexadecimal digits.
 fn from_hexadecimal(text: &str) -> Vec<u8> {
     let digits: Vec<u8> = text.chars().filter_map(|c| c.to_digit(16)).map(|d| d as u8).collect();
     digits.chunks(2).map(|pair| 16 * pair[0] + pair.get(1).copied().unwrap_or(0)).collect()
@@ -81,25 +72,17 @@ impl Instance {
     /// Strings and binaries; `checked`, whether they stay what they are while the FMU is not called.
     fn texts(&self, run: &Run, checked: bool) -> Result<Vec<Result<String, &'static str>>, HostError> {
         let (references, count) = (run.references.as_ptr(), run.references.len());
-        if run.kind == Kind::Binary {
-            let mut sizes = vec![0_usize; run.total];
-            let mut values = vec![std::ptr::null::<u8>(); run.total];
-            call!(self, get3_binary(references, count, sizes.as_mut_ptr(), values.as_mut_ptr(), values.len()))?;
-            return Ok(sizes
-                .iter()
-                .zip(&values)
-                .map(|(&size, &value)| match (size, value.is_null()) {
-                    (0, _) => Ok(String::new()),
-                    (_, true) => Err("a null pointer with a size"),
-                    // SAFETY: the FMU gave a pointer to as many bytes, valid until the next call.
-                    _ => Ok(hexadecimal(unsafe { std::slice::from_raw_parts(value, size) })),
-                })
-                .collect());
-        }
-        let mut values = vec![std::ptr::null(); run.total];
+        let (mut sizes, mut bytes) = (vec![texts::NO_SIZE; run.total], vec![std::ptr::null(); run.total]);
+        let mut strings = vec![std::ptr::null(); run.total];
         let [first, second] = Room::twice(run.total);
-        call!(self, get3_string(references, count, values.as_mut_ptr(), values.len()))?;
-        Ok(if checked { texts::steady(&values, [first, second]) } else { texts::once(&values, first) })
+        let given = if run.kind == Kind::Binary {
+            call!(self, get3_binary(references, count, sizes.as_mut_ptr(), bytes.as_mut_ptr(), bytes.len()))?;
+            Given::Binaries(&sizes, &bytes)
+        } else {
+            call!(self, get3_string(references, count, strings.as_mut_ptr(), strings.len()))?;
+            Given::Strings(&strings)
+        };
+        Ok(if checked { texts::steady(given, [first, second]) } else { texts::once(given, first) })
     }
 
     pub(in super::super) fn get_real3(&mut self, handles: &[u32], out: &mut [f64]) -> Result<(), HostError> {
@@ -366,8 +349,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_hexadecimal_digits() {
-        assert_eq!(hexadecimal(b"\x00\xffA"), "00ff41");
+    fn hexadecimal_digits_are_bytes() {
         assert_eq!(from_hexadecimal("00FF41"), b"\x00\xffA");
     }
 }
