@@ -256,9 +256,19 @@ EXPORT void fmi2FreeInstance(Component c) {
 
 EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const char *const categories[]) {
     Instance *i = c;
-    (void)categories;
+    size_t n;
+    int events = on && (!count && !IS(LOG_NEEDS_CATEGORY) || IS(LOG_UNFILTERED));
     if (IS(DEBUG_LOGGING) && count) return fail(i, "no such category");
-    if (!IS(LOG_STAYS) || on) i->logging = on;
+    for (n = 0; n < count; n++) {
+        /* Index of a category. */
+        static const char *const known[] = {"logEvents", "logStatusError", NULL};
+        int k = 0;
+        while (IS(LOG_UNKNOWN) ? strcmp(known[k], categories[n]) : known[k] && strcmp(known[k], categories[n])) k++;
+        if (!known[k]) return fail(i, "no such category");
+        events |= on && k == 0;
+    }
+    /* Errors are logged in any case, all else is of one category. */
+    if (!IS(LOG_STAYS) || on) i->logging = events;
     return OK;
 }
 
@@ -532,6 +542,15 @@ EXPORT Status fmi2GetBoolean(Component c, const uint32_t r[], size_t count, int 
 
 static const char *text_of(const Values *s) { return fabs(s->v) > 1e-3 ? "moving" : "at rest"; }
 
+/* A text that is longer than a host makes room for ahead. */
+static const char *long_text(const Values *s) {
+    static const int length = 100000;
+    char *text = malloc(length + 1);
+    memset(text, text_of(s)[0], length);
+    text[length] = 0;
+    return text;
+}
+
 /* A text in memory that the next call takes. */
 static const char *on_the_stack(const char *text) {
     char copy[64];
@@ -542,15 +561,6 @@ static const char *on_the_stack(const char *text) {
 
 EXPORT Status fmi2GetString(Component c, const uint32_t r[], size_t count, const char *value[]) {
     Instance *i = c;
-/* A text that is longer than a host makes room for ahead. */
-static const char *long_text(const Values *s) {
-    static const int length = 100000;
-    char *text = malloc(length + 1);
-    memset(text, text_of(s)[0], length);
-    text[length] = 0;
-    return text;
-}
-
     Values *s = &i->values;
     size_t n;
     if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetString")) return ERROR;
@@ -571,6 +581,12 @@ static const char *long_text(const Values *s) {
             value[n] = copy;
             continue;
         }
+        if ((IS(STRING_LONG) || IS(STRING_LONG_FREED)) && r[n] == 1) {
+            free(i->small);
+            value[n] = i->small = (char *)long_text(s);
+            if (IS(STRING_LONG_FREED)) free(i->small), i->small = NULL;
+            continue;
+        }
         switch (r[n]) {
         case 0: value[n] = IS(STRING_KEPT) && i->kept_label ? i->kept_label : s->label; break;
         case 1: value[n] = IS(STRING_NULL) ? NULL : IS(STRING_LATIN) ? "bewegt \xe4" : text_of(s); break;
@@ -581,12 +597,6 @@ static const char *long_text(const Values *s) {
 }
 
 EXPORT Status fmi2SetReal(Component c, const uint32_t r[], size_t count, const double value[]) {
-        if ((IS(STRING_LONG) || IS(STRING_LONG_FREED)) && r[n] == 1) {
-            free(i->small);
-            value[n] = i->small = (char *)long_text(s);
-            if (IS(STRING_LONG_FREED)) free(i->small), i->small = NULL;
-            continue;
-        }
     Instance *i = c;
     if (!i) return ERROR;
     Values *s = &i->values;

@@ -153,6 +153,9 @@ pub const DEFECTS: &[(&str, &str)] = &[
     ("FORGES", "simulate"),
     ("LOG_ALWAYS", "logging-off"),
     ("LOG_STAYS", "logging-off"),
+    ("LOG_UNFILTERED", "log-chosen"),
+    ("LOG_NEEDS_CATEGORY", "log-chosen"),
+    ("LOG_UNKNOWN", "log-unknown"),
     ("PARAMETERS_LOST", "parameters-initial"),
     ("PARAMETERS_REFUSED", "parameters-initial"),
     ("PARAMETERS_LATE", "parameters-initial"),
@@ -161,10 +164,10 @@ pub const DEFECTS: &[(&str, &str)] = &[
     ("STRING_OVERFLOW", "set-get-other"),
     ("STRING_FREED", "string-values"),
     ("STRING_STACK", "string-values"),
+    ("STRING_LONG_FREED", "string-values"),
 ];
 
 pub fn mutants() -> Vec<Mutant> {
-    ("STRING_LONG_FREED", "string-values"),
     let mutant = |&(defect, rule): &(&'static str, &'static str)| {
         Mutant::new(defect, rule, move || pack(&corpus::running(DESCRIPTION, defect)))
     };

@@ -208,3 +208,68 @@ pub(in super::super) fn log_categories(p: &Probe) -> Tested {
     let unknown: Vec<&String> = used.iter().filter(|c| !c.is_empty() && !declared.contains(c.as_str())).collect();
     Ok(if unknown.is_empty() { vec![] } else { vec![format!("log categories in use but not declared: {unknown:?}")] })
 }
+
+/// Categories of the messages with fmi2OK of a short run whose debug logging was switched on by `on`.
+fn logged(p: &Probe, options: &InstanceOptions, on: Option<&[&str]>) -> Result<BTreeSet<String>, HostError> {
+    let mut instance = Instance::new(Arc::clone(&p.binary), None, options)?;
+    if let Some(categories) = on {
+        instance.set_debug_logging(true, categories)?;
+    }
+    // What is logged while the instance is made comes before any choice.
+    let _ = instance.take_log();
+    p.enter(&mut instance)?;
+    instance.exit_initialization()?;
+    p.run(&mut instance, 0, 5)?;
+    instance.terminate()?;
+    let idle = instance.take_log().into_iter().filter(|m| m.status == Status::Ok);
+    Ok(idle.map(|m| m.category).filter(|category| !category.is_empty()).collect())
+}
+
+/// "If loggingOn = fmi2True and nCategories = 0, then all debug messages shall be output. If loggingOn = fmi2True and
+/// nCategories > 0, then only debug messages according to the categories argument shall be output" (section 2.1.5). What
+/// loggingOn of fmi2Instantiate lets through the standard leaves open: some of all.
+pub(in super::super) fn log_chosen(p: &Probe) -> Tested {
+    /// Each category takes an instance.
+    const MOST: usize = 8;
+    if p.interface().only_once {
+        return not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
+    }
+    // What is logged even where debug logging is off is another rule's, and so is what is not declared.
+    let off = logged(p, &p.options(), None)?;
+    let on = logged(p, &InstanceOptions { logging: true, ..p.options() }, None)?;
+    let all = logged(p, &p.options(), Some(&[]))?;
+    let missing: Vec<&String> = on.difference(&all).collect();
+    let mut problems = Vec::new();
+    if !missing.is_empty() {
+        problems.push(format!(
+            "with loggingOn of fmi2Instantiate there are messages of the categories {missing:?}, after fmi2SetDebugLogging(fmi2True) of no category, which is all of them, there are none"
+        ));
+    }
+    let declared: BTreeSet<&String> = p.d.log_categories.iter().map(|c| &c.0).collect();
+    for category in declared.iter().take(MOST) {
+        let others = logged(p, &p.options(), Some(&[category]))?;
+        let other = |name: &&String| name != category && declared.contains(name) && !off.contains(*name);
+        let others: Vec<&String> = others.iter().filter(other).collect();
+        if !others.is_empty() {
+            problems.push(format!("of the category {category:?} alone, messages of {others:?} are logged as well"));
+            break;
+        }
+    }
+    Ok(problems)
+}
+
+/// "None, some or all allowed values for categories are defined in the modelDescription.xml file" (section 2.1.5): another
+/// one may be taken or refused, and is survived.
+pub(in super::super) fn log_unknown(p: &Probe) -> Tested {
+    let mut instance = p.instantiate()?;
+    // Whether it is refused is the FMU's affair; an instance that has returned fmi2Error is only to be freed.
+    let taken = instance.set_debug_logging(true, &["noSuchCategory"]).is_ok();
+    if taken {
+        p.enter(&mut instance)?;
+        instance.exit_initialization()?;
+        p.run(&mut instance, 0, 3)?;
+        instance.terminate()?;
+    }
+    instance.free();
+    Ok(vec![])
+}

@@ -280,10 +280,12 @@ impl Instance {
     pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Result<(), HostError> {
         let texts = categories.iter().map(|c| c_string(c)).collect::<Result<Vec<_>, _>>()?;
         let pointers: Vec<Text> = texts.iter().map(|t| t.as_ptr()).collect();
+        // Of no category, no array: so most importers call it.
+        let array = if pointers.is_empty() { std::ptr::null() } else { pointers.as_ptr() };
         if self.three.is_some() {
-            return checked!(self, set_debug_logging3(u8::from(on), pointers.len(), pointers.as_ptr()));
+            return checked!(self, set_debug_logging3(u8::from(on), pointers.len(), array));
         }
-        checked!(self, set_debug_logging(i32::from(on), pointers.len(), pointers.as_ptr()))
+        checked!(self, set_debug_logging(i32::from(on), pointers.len(), array))
     }
 
     /// `fmi2SetupExperiment`; times in s. In FMI 3.0 they go with `fmi3EnterInitializationMode`.
