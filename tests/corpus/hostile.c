@@ -27,6 +27,9 @@ static void hostile(void);
 #include <sys/wait.h>
 #include <sys/xattr.h>
 #include <sched.h>
+#include <semaphore.h>
+#include <sys/ioctl.h>
+#include <termios.h>
 
 enum {
     WRITE, APPEND, DELETE, RENAME, FOLDER, SYMLINK, HARDLINK, MODE, CUT, TIMES, OWNER, READ, READ_PASSWORDS, READ_PARENT,
@@ -34,7 +37,8 @@ enum {
     LINK_FOLDER, THREADS_MANY, MEMORY, HANG, SEGMENT, ANONYMOUS_FILE, MOUNT, NAMESPACE, CLOSE_ALL, WRITE_ALL, OUTLIVE, DEVICE,
     PRIORITY_LIMITS, OTHERS_MEMORY, TCP_OVER_6, PAIRED_DATAGRAM, NETLINK, RING, SIGNAL_BY_FILE, SIGNAL_BY_DESCRIPTOR, PARENT_MEMORY,
     PARENT_PRIORITY, PARENT_LIMITS, WATCH_HOME, OTHERS_SEGMENTS, QUEUE, KEYRING, ATTRIBUTE, NODE, NEW_MOUNT,
-    HANDLE, HOST_NAME
+    HANDLE, HOST_NAME, PARENT_AFFINITY, PARENT_SCHEDULING, GROUP, QUEUED_SIGNAL, STOP_PARENT, TERMINAL, SHARED_MEMORY, SEMAPHORE,
+    PARENT_FILES, PAGE_SCRIBBLED, PAGE_CUT, EMPTY_FILES, DEEP_FOLDERS, CLOSED_FOLDER, FILL_DEEP, FILL_BY_MAPPING
 };
 
 static char path[4096];
@@ -215,6 +219,108 @@ static void hostile(void) {
         if (name_to_handle_at(AT_FDCWD, canary("file"), &handle.head, &mount, 0)) break;
         fd = open_by_handle_at(AT_FDCWD, &handle.head, O_RDWR);
         if (fd >= 0) puts("LEAK");
+        break;
+    }
+    case PARENT_AFFINITY: {
+        cpu_set_t one;
+        CPU_ZERO(&one);
+        CPU_SET(0, &one);
+        if (sched_setaffinity(getppid(), sizeof one, &one) == 0 || sched_setaffinity(1, sizeof one, &one) == 0) puts("LEAK");
+        /* One's own threads are one's own affair. */
+        sched_getaffinity(0, sizeof one, &one);
+        if (sched_setaffinity(0, sizeof one, &one) || sched_setaffinity(getpid(), sizeof one, &one)) puts("LEAK");
+        break;
+    }
+    case PARENT_SCHEDULING: {
+        struct sched_param none = {0};
+        struct { unsigned size, policy; unsigned long flags; int nice; unsigned rest[7]; } idle = {48, 5 /* SCHED_IDLE */};
+        if (sched_setscheduler(getppid(), 5, &none) == 0 || sched_setparam(getppid(), &none) == 0) puts("LEAK");
+        if (syscall(SYS_sched_setattr, getppid(), &idle, 0) == 0) puts("LEAK");
+        if (syscall(SYS_ioprio_set, 1, getppid(), 3 << 13 /* idle */) == 0) puts("LEAK");
+        break;
+    }
+    case GROUP:
+        if (setpgid(getppid(), 0) == 0 || setpgid(0, getpgid(getppid())) == 0 || getsid(0) == getsid(getppid())) puts("LEAK");
+        kill(0, SIGTERM);
+        break;
+    case QUEUED_SIGNAL: {
+        siginfo_t info = {.si_signo = SIGKILL, .si_code = SI_QUEUE};
+        if (syscall(SYS_rt_sigqueueinfo, getppid(), SIGKILL, &info) == 0) puts("LEAK");
+        if (syscall(SYS_rt_tgsigqueueinfo, getppid(), getppid(), SIGKILL, &info) == 0) puts("LEAK");
+        if (syscall(SYS_tgkill, getppid(), getppid(), SIGKILL) == 0) puts("LEAK");
+        break;
+    }
+    case STOP_PARENT: if (kill(getppid(), SIGSTOP) == 0) puts("LEAK"); break;
+    case TERMINAL: {
+        struct termios modes;
+        const char *names[] = {"/dev/tty", "/dev/ptmx", "/dev/pts/0", "/dev/pts/1", "/dev/console", "/dev/tty0"};
+        for (n = 0; n < 3; n++)
+            if (tcgetattr(n, &modes) == 0 || ioctl(n, TIOCSTI, "x") == 0 || ioctl(n, TIOCSCTTY, 1) == 0) puts("LEAK");
+        for (n = 0; n < 6; n++)
+            if (open(names[n], O_RDWR | O_NOCTTY) >= 0) puts("LEAK");
+        break;
+    }
+    case SHARED_MEMORY:
+        if (shm_open("/eixo-hostile", O_CREAT | O_RDWR, 0600) >= 0) puts("LEAK"), shm_unlink("/eixo-hostile");
+        break;
+    case SEMAPHORE:
+        if (sem_open("/eixo-hostile", O_CREAT, 0600, 1) != SEM_FAILED) puts("LEAK"), sem_unlink("/eixo-hostile");
+        break;
+    case PARENT_FILES: {
+        const char *names[] = {"fd/0", "fd/1", "fd/2", "oom_score_adj", "comm", "coredump_filter", "clear_refs", "cwd/Cargo.toml"};
+        for (n = 0; n < 8; n++) {
+            snprintf(other, sizeof other, "/proc/%d/%s", getppid(), names[n]);
+            if (open(other, O_WRONLY) >= 0 || open(other, O_RDONLY) >= 0) puts("LEAK");
+        }
+        break;
+    }
+    case PAGE_SCRIBBLED:
+    case PAGE_CUT: {
+        /* The memory that the host shares: each of the mappings that can be written and are seen by others. */
+        FILE *maps = fopen("/proc/self/maps", "r");
+        char line[4096], *file;
+        unsigned long from, to;
+        int found = 0;
+        while (maps && fgets(line, sizeof line, maps)) {
+            if (sscanf(line, "%lx-%lx rw-s", &from, &to) != 2 || !strstr(line, " rw-s ") || !(file = strchr(line, '/'))) continue;
+            found = 1;
+            file[strcspn(file, "\n")] = 0;
+            if (ACT == PAGE_SCRIBBLED) memset((void *)from, 0xA5, to - from);
+            else if (truncate(file, 0) == 0 || unlink(file) == 0 || open(file, O_WRONLY | O_TRUNC) >= 0) puts("LEAK");
+        }
+        if (!found) puts("LEAK");
+        break;
+    }
+    case EMPTY_FILES:
+        for (n = 0; n < 200000; n++) {
+            snprintf(other, sizeof other, "empty%d", n);
+            close(open(other, O_CREAT | O_WRONLY, 0600));
+        }
+        break;
+    case DEEP_FOLDERS: for (n = 0; n < 5000; n++) if (mkdir("d", 0700) || chdir("d")) break; break;
+    case CLOSED_FOLDER:
+        mkdir("closed", 0300);
+        mkdir("closed/within", 0700);
+        put("closed/within/file");
+        mkdir("empty", 0);
+        break;
+    case FILL_DEEP:
+    case FILL_BY_MAPPING: {
+        static char block[1 << 20];
+        memset(block, 1, sizeof block);
+        if (ACT == FILL_DEEP) for (n = 0; n < 3000; n++) if (mkdir("d", 0700) || chdir("d")) break;
+        for (n = 0; n < 4000; n++) {
+            snprintf(other, sizeof other, "fill%d", n);
+            int fd = open(other, O_CREAT | O_RDWR, 0600);
+            if (fd < 0) break;
+            if (ACT == FILL_DEEP) {
+                if (write(fd, block, sizeof block) < 0) break;
+            } else if (ftruncate(fd, sizeof block) == 0) {
+                char *memory = mmap(NULL, sizeof block, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+                if (memory != MAP_FAILED) memcpy(memory, block, sizeof block), munmap(memory, sizeof block);
+            }
+            close(fd);
+        }
         break;
     }
     case HOST_NAME: if (gethostname(other, sizeof other) == 0 && sethostname(other, strlen(other)) == 0) puts("LEAK"); break;

@@ -12,6 +12,7 @@ mod child;
 mod job;
 mod orphans;
 mod page;
+mod removal;
 pub mod sandbox;
 pub mod temporary;
 mod watch;

@@ -253,8 +253,18 @@ mod linux {
         rules
     }
 
+    /// That an argument is the number of an older process, or of the parent: two ways. A thread of this one has a number above
+    /// the process' own, but where the system has begun to count anew.
+    fn elders(argument: u8) -> Vec<Vec<(u8, Op, u64)>> {
+        let own = u64::from(std::process::id());
+        let older = vec![(argument, Op::Ne, 0), (argument, Op::Lt, own)];
+        // In a container of its own a process sees no parent.
+        let parent = Some(u64::from(std::os::unix::process::parent_id())).filter(|parent| *parent != 0);
+        std::iter::once(older).chain(parent.map(|parent| vec![(argument, Op::Eq, parent)])).collect()
+    }
+
     /// Calls that change rights, look at or leave things behind in the kernel, or slow others down; libraries make them in
-    /// passing and live with a no. Which processors another process runs on stays open: a thread of this one is bound by the
+    /// passing and live with a no. Which processors a younger process runs on stays open: a thread of this one is bound by the
     /// same call, under a number that cannot be told from others'.
     fn quiet() -> seccompiler::Result<Rules> {
         let mut all = vec![
@@ -298,6 +308,15 @@ mod linux {
         }
         for call in [libc::SYS_migrate_pages, libc::SYS_move_pages] {
             rules.insert(call, vec![when(&others(0))?]);
+        }
+        let scheduling = [
+            libc::SYS_sched_setaffinity,
+            libc::SYS_sched_setscheduler,
+            libc::SYS_sched_setparam,
+            libc::SYS_sched_setattr,
+        ];
+        for call in scheduling {
+            rules.insert(call, elders(0).iter().map(|way| when(way)).collect::<seccompiler::Result<_>>()?);
         }
         Ok(with_twins(rules))
     }

@@ -49,7 +49,7 @@ fn sweep(root: &Path) {
         // A symbolic link of that name is another's.
         let is_folder = entry.file_type().is_ok_and(|t| t.is_dir()) && own(&entry);
         if is_folder && (ended || age().is_some_and(|a| a.as_secs() > ABANDONED)) {
-            let _ = std::fs::remove_dir_all(entry.path());
+            let _ = super::removal::remove(&entry.path());
         }
     }
 }
@@ -67,15 +67,30 @@ fn own(_entry: &std::fs::DirEntry) -> bool {
     true
 }
 
-/// Bytes in a folder and all below it; symbolic links count as themselves.
+/// Bytes that a folder and all below it take on the disk; symbolic links count as themselves.
 pub(super) fn size(folder: &Path) -> u64 {
+    below(folder, 0)
+}
+
+/// As [`size`], of a folder that was come to by so many handles.
+fn below(folder: &Path, handles: usize) -> u64 {
+    /// What a name and what is known of a file take beside its content, about.
+    const ENTRY: u64 = 512;
+    /// Handles that are open at once.
+    const MOST: usize = 200;
     let mut total = 0;
-    let mut open = vec![folder.to_owned()];
-    while let Some(folder) = open.pop() {
+    let mut open = vec![(folder.to_owned(), 0)];
+    while let Some((folder, depth)) = open.pop() {
+        if depth == super::removal::DEPTH && handles < MOST {
+            // A path has an end, where folders have none: from here on by a handle.
+            total += by_handle(&folder, handles).unwrap_or(0);
+            continue;
+        }
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            total += ENTRY;
             let Ok(metadata) = entry.metadata() else { continue };
             if metadata.is_dir() {
-                open.push(entry.path());
+                open.push((entry.path(), depth + 1));
             } else {
                 // What is not written takes no room on the disk.
                 #[cfg(unix)]
@@ -87,6 +102,18 @@ pub(super) fn size(folder: &Path) -> u64 {
         }
     }
     total
+}
+
+#[cfg(target_os = "linux")]
+fn by_handle(folder: &Path, handles: usize) -> io::Result<u64> {
+    use std::os::fd::AsRawFd;
+    let handle = std::fs::File::open(folder)?;
+    Ok(below(&Path::new("/proc/self/fd").join(handle.as_raw_fd().to_string()), handles + 1))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn by_handle(folder: &Path, handles: usize) -> io::Result<u64> {
+    Ok(below(folder, handles + 1))
 }
 
 #[cfg(test)]
@@ -118,5 +145,22 @@ mod tests {
         sweep(root.path());
         assert!(!gone.exists());
         assert!(kept.iter().all(|path| path.exists()));
+    }
+
+    #[test]
+    fn what_lies_deeper_than_a_path_is_long_is_counted_too() {
+        let root = tempfile::tempdir().unwrap();
+        let chain = |name: &str| {
+            let mut bottom = root.path().join(name);
+            bottom.extend(std::iter::repeat_n("a", 1500));
+            std::fs::create_dir_all(&bottom).unwrap();
+            bottom
+        };
+        let (upper, lower) = (chain("upper"), chain("lower"));
+        std::fs::write(lower.join("file"), vec![1; 1 << 20]).unwrap();
+        std::fs::rename(root.path().join("lower"), upper.join("b")).unwrap();
+        assert!(size(root.path()) >= 1 << 20);
+        super::super::removal::remove(&root.path().join("upper")).unwrap();
+        assert_eq!(size(root.path()), 0);
     }
 }

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use super::job::{Job, Nonce, Order, Received, classify, rest};
 use super::page::{Mapped, Page};
 use super::sandbox::{Strength, wanted};
-use super::{Ended, Outcome, Place, temporary};
+use super::{Ended, Outcome, Place, removal, temporary};
 
 /// Most that is kept of what a child prints, in bytes.
 const MOST_OUTPUT: usize = 4096;
@@ -77,6 +77,13 @@ pub(super) fn run(place: &Place<'_>, job: Job) -> io::Result<Outcome> {
         None => of(child.wait()?),
     };
     streams.drain();
+    // What stays is swept with the rest, later.
+    for folder in &watched {
+        let _ = removal::tame(folder);
+    }
+    for folder in [workplace, private] {
+        let _ = removal::remove(&folder);
+    }
     Ok(outcome(streams, ended, longest, &page, &order.nonce))
 }
 
