@@ -15,8 +15,10 @@ typedef struct {
     LogMessage message;
     void *environment;
     bool event_used, early_allowed, event, configuring;
-    double A[4];
 } Three;
+
+/* The array parameter is a part of the state, with all the rest. */
+#define ARRAY(t) (((Instance *)(t)->two)->values.A)
 
 #define TWO(c) ((c) ? ((Three *)(c))->two : NULL)
 
@@ -33,7 +35,7 @@ static void log_three(void *environment, const char *name, int status, const cha
 static void *take(size_t count, size_t size) { return calloc(count, size); }
 static const Callbacks TEMPLATE = {log_three, take, free, NULL, NULL};
 
-static void unit(Three *t) { t->A[0] = t->A[3] = 1, t->A[1] = t->A[2] = 0; }
+static void unit(Three *t) { ARRAY(t)[0] = ARRAY(t)[3] = 1, ARRAY(t)[1] = ARRAY(t)[2] = 0; }
 
 /* As the URI that fmu.c takes: without the separator at the end, blanks and letters beyond ASCII encoded. */
 static void uri(const char *path, char *out, size_t room) {
@@ -61,7 +63,6 @@ EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, co
     t->environment = environment;
     t->event_used = event_used;
     t->early_allowed = early_allowed;
-    unit(t);
     Callbacks callbacks = TEMPLATE;
     callbacks.environment = t;
     t->two = fmi2Instantiate(name, 1, token, place, &callbacks, visible, logging);
@@ -69,6 +70,7 @@ EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, co
         free(t);
         return NULL;
     }
+    unit(t);
     return t;
 }
 
@@ -194,7 +196,7 @@ EXPORT Status fmi3GetFloat64(void *c, const uint32_t r[], size_t count, double v
 #if !DEFECT3_ARRAY_COUNT
             if (at + need > values) return fail(TWO(c), "too few values");
 #endif
-            if (r[n] == 50 && t) memcpy(value + at, t->A, sizeof t->A);
+            if (r[n] == 50 && t) memcpy(value + at, ARRAY(t), sizeof ARRAY(t));
             else if (fmi2GetReal(TWO(c), both, 2, value + at)) return ERROR;
             at += need;
             continue;
@@ -213,7 +215,7 @@ EXPORT Status fmi3SetFloat64(void *c, const uint32_t r[], size_t count, const do
         if (r[n] == 50) {
             Instance *i = t->two;
             if (at + 4 > values || i->values.phase == STEPPING) return fail(i, "A is fixed");
-            memcpy(t->A, value + at, sizeof t->A);
+            memcpy(ARRAY(t), value + at, sizeof ARRAY(t));
             at += 4;
             continue;
         }
@@ -427,7 +429,7 @@ EXPORT Status fmi3GetDirectionalDerivative(void *c, const uint32_t unknown[], si
         for (; first <= last && at < values; first++, at++)
             for (value[at] = 0, m = 0; m < knowns; m++) {
                 double slope = unknown[n] == 51 ? first == known[m] : partial(TWO(c), unknown[n] == 53 ? 6 : first, known[m]);
-                value[at] += slope * seed[m];
+                value[at] = (IS(DIRECTIONAL_SEVERAL) ? 0 : value[at]) + slope * seed[m];
             }
     }
     return OK;

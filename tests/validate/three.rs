@@ -15,11 +15,12 @@ const BINARY: &str = "binaries/x86_64-linux/corpus.so";
 
 /// Defects of what FMI 3.0 does not have, or has otherwise: input derivatives, allocation callbacks, a callbacks structure,
 /// the types platform, pending steps to cancel.
-const NOT_OF_3: [&str; 20] = [
+const NOT_OF_3: [&str; 21] = [
     "PLATFORM",
     "CANCEL",
     "INPUT_DERIVATIVE",
     "SLOPE_IGNORED",
+    "SLOPE_DOUBLED",
     "CALLBACKS",
     "NAME_KEPT",
     "ALLOCATION",

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::super::description::Causality;
 use super::super::host::{HostError, Status};
 use super::lifecycle::diverted;
 use super::probe::{Learned, Probe, STEPS, Tested, not_applicable, not_tested};
@@ -70,6 +71,10 @@ fn trial(p: &Probe) -> Result<usize, HostError> {
 /// An instance after one that had other values, against one that was the first.
 pub(in super::super) fn sequential(p: &Probe) -> Tested {
     p.comparable()?;
+    // Before any other instance of the process has left something.
+    if let Some(problem) = initial_kept(p)? {
+        return Ok(vec![problem]);
+    }
     let n = p.steps();
     let record = |p: &Probe| -> Result<_, HostError> {
         let mut instance = p.ready()?;
@@ -88,6 +93,39 @@ pub(in super::super) fn sequential(p: &Probe) -> Tested {
         .map(|what| format!("an instance made after one with other values keeps something of it: {what}"))
         .into_iter()
         .collect())
+}
+
+/// Initial values that are set in the first instance of the process, and not in the second: whether the second has those of
+/// the first; the first such variable.
+fn initial_kept(p: &Probe) -> Result<Option<String>, HostError> {
+    /// Each takes two instances.
+    const MOST: usize = 10;
+    let _venture = super::super::host::venture();
+    let states = p.d.variables.iter().filter(|v| matches!(v.causality, Causality::Local | Causality::Output));
+    for v in states.filter(|v| super::probe::settable(v)).take(MOST) {
+        let Some(value) = super::settable_real(p, v) else { continue };
+        let r = [v.value_reference];
+        let initial = |set: bool| -> Result<f64, HostError> {
+            let mut instance = p.instantiate()?;
+            if set {
+                instance.set_real(&r, &[value])?;
+            }
+            p.enter(&mut instance)?;
+            instance.exit_initialization()?;
+            Ok(instance.get_real(&r)?[0])
+        };
+        // Whether it can be set is a rule of its own.
+        if let (Ok(first), Ok(second)) = (initial(true), initial(false))
+            && (first, second) == (value, value)
+        {
+            return Ok(Some(format!(
+                "\"{}\" starts at {value}, to which it was set in an instance before, instead of {}",
+                v.name,
+                super::partial::start(v)
+            )));
+        }
+    }
+    Ok(None)
 }
 
 pub(in super::super) fn independent(p: &Probe) -> Tested {

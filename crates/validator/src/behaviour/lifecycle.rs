@@ -7,7 +7,7 @@ use super::super::description::{BaseType, Causality, Fmi, Value, Variability, Va
 use super::super::host::abi::{CALLS, Call};
 use super::super::host::{Binary, Instance, InstanceOptions, Status, abuse, resource_location};
 use super::measure;
-use super::probe::{Learned, Probe, Tested, not_applicable};
+use super::probe::{Learned, Probe, Snapshot, Tested, not_applicable};
 use super::{Setup, settable_real, settings, values};
 use crate::host::HostError;
 
@@ -335,26 +335,8 @@ pub(in super::super) fn reset(p: &Probe) -> Tested {
         return Ok(vec![problem]);
     }
     p.comparable()?;
-    let n = p.steps();
-    let mut fresh = p.ready()?;
-    let mut expected = vec![p.observe(&mut fresh)?];
-    expected.extend(p.run(&mut fresh, 0, n)?);
-    fresh.free();
-    // With other values if the FMU takes them, so that these must be restored too.
-    let mut instance = match diverted(p)? {
-        Some(instance) => instance,
-        None => {
-            let mut instance = p.ready()?;
-            p.run(&mut instance, 0, n / 2)?;
-            instance
-        }
-    };
-    slopes(p, &mut instance);
-    instance.reset()?;
-    p.enter(&mut instance)?;
-    instance.exit_initialization()?;
-    let mut again = vec![p.observe(&mut instance)?];
-    again.extend(p.run(&mut instance, 0, n)?);
+    let (expected, mut instance) = before_reset(p)?;
+    let again = after_reset(p, &mut instance)?;
     instance.terminate()?;
     let ended = instance.reset().and_then(|()| p.enter(&mut instance)).and_then(|()| instance.exit_initialization());
     if let Err(error) = ended.and_then(|()| p.run(&mut instance, 0, 1)) {
@@ -370,6 +352,36 @@ pub(in super::super) fn reset(p: &Probe) -> Tested {
         None => reset_settings(p)?,
     };
     Ok(what.map(|what| format!("a run after fmi2Reset is not that of a new instance: {what}")).into_iter().collect())
+}
+
+/// What is observed of a new instance, after initialisation and after each step; and an instance that has run otherwise.
+pub(super) fn before_reset(p: &Probe) -> Result<(Vec<Snapshot>, Instance), HostError> {
+    let n = p.steps();
+    let mut fresh = p.ready()?;
+    let mut expected = vec![p.observe(&mut fresh)?];
+    expected.extend(p.run(&mut fresh, 0, n)?);
+    fresh.free();
+    // With other values if the FMU takes them, so that these must be restored too.
+    let mut instance = match diverted(p)? {
+        Some(instance) => instance,
+        None => {
+            let mut instance = p.ready()?;
+            p.run(&mut instance, 0, n / 2)?;
+            instance
+        }
+    };
+    slopes(p, &mut instance);
+    Ok((expected, instance))
+}
+
+/// What is observed of an instance that is reset first, as of a new one.
+pub(super) fn after_reset(p: &Probe, instance: &mut Instance) -> Result<Vec<Snapshot>, HostError> {
+    instance.reset()?;
+    p.enter(instance)?;
+    instance.exit_initialization()?;
+    let mut again = vec![p.observe(instance)?];
+    again.extend(p.run(instance, 0, p.steps())?);
+    Ok(again)
 }
 
 /// An instance that has run with other parameters and start values than its own: all that can be set, else Reals alone, else

@@ -11,6 +11,7 @@ mod measure;
 pub(super) mod partial;
 pub(crate) mod probe;
 pub(super) mod references;
+pub(super) mod rounded;
 pub(super) mod settings;
 pub(super) mod state;
 pub(super) mod steps;

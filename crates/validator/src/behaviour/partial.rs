@@ -103,6 +103,7 @@ pub(in super::super) fn directional(p: &Probe) -> Tested {
         if !initializing {
             p.run(&mut instance, 0, 2)?;
         }
+        let mut single = Vec::new();
         for known in knowns(&p.d, initializing) {
             let quotients = match quotients(p, &mut instance, known, &references) {
                 Ok(quotients) => quotients,
@@ -121,6 +122,7 @@ pub(in super::super) fn directional(p: &Probe) -> Tested {
                 }
                 Err(error) => return Err(Stop::Host(error)),
             };
+            single.push((known.value_reference, given.clone()));
             let values = instance.get_real(&references)?;
             let rows = unknowns.iter().zip(quotients).zip(given).zip(values);
             for ((((_, unknown), quotient), given), value) in rows {
@@ -147,6 +149,15 @@ pub(in super::super) fn directional(p: &Probe) -> Tested {
                 }
             }
         }
+        if problems.is_empty()
+            && let Some((at, sum, given)) = not_the_sum(&mut instance, &references, &single)?
+        {
+            problems.push(format!(
+                "the derivative of \"{}\" in the direction of {} knowns at once is {given}, but {sum} as the sum of those by each of them",
+                unknowns[at].1.name,
+                single.len()
+            ));
+        }
         if !problems.is_empty() {
             break;
         }
@@ -161,6 +172,27 @@ pub(in super::super) fn directional(p: &Probe) -> Tested {
         return not_tested("no output answers to a perturbed input at a communication point");
     }
     Ok(problems)
+}
+
+/// A derivative in the direction of several knowns is the sum of those by each (section 2.1.9). The first unknown of which it
+/// is not: its place, the sum, and what is given.
+fn not_the_sum(
+    instance: &mut Instance,
+    references: &[u32],
+    single: &[(u32, Vec<f64>)],
+) -> Result<Option<(usize, f64, f64)>, HostError> {
+    if single.len() < 2 {
+        return Ok(None);
+    }
+    let knowns: Vec<u32> = single.iter().map(|(known, _)| *known).collect();
+    let seed: Vec<f64> = (0..knowns.len()).map(|k| 1.0 + 0.5 * k as f64).collect();
+    let given = instance.directional_derivative(references, &knowns, &seed)?;
+    Ok(given.into_iter().enumerate().find_map(|(at, given)| {
+        let parts = || single.iter().zip(&seed).map(|((_, column), seed)| seed * column[at]);
+        let (sum, size) = (parts().sum::<f64>(), parts().map(f64::abs).sum::<f64>());
+        // What an FMU gets by differences of its own is right to the square root of its precision.
+        ((given - sum).abs() > 1e-2 * size + 1e-7).then_some((at, sum, given))
+    }))
 }
 
 /// For an FMU that computes its outputs in `fmi2DoStep` alone: the derivatives by the inputs against the difference that

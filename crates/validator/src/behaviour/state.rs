@@ -101,7 +101,31 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     }
     instance.free_state(early)?;
     instance.free_state(late)?;
+    if problems.is_empty() {
+        problems.extend(after_a_promise(p)?);
+    }
     Ok(problems)
+}
+
+/// "fmi2SetFMUstate will not be called for time instants prior to currentCommunicationPoint" (noSetFMUStatePriorToCurrentPoint,
+/// section 4.2.2): steps of which that was said are behind; from the state at their end the run may be had again.
+fn after_a_promise(p: &Probe) -> Result<Option<String>, HostError> {
+    if p.interface().only_once {
+        return Ok(None);
+    }
+    let (n, cut) = (p.steps(), p.steps() / 3);
+    let mut instance = p.ready()?;
+    p.run(&mut instance, 0, cut)?;
+    instance.may_go_back = true;
+    let state = instance.get_state()?;
+    let expected = p.run(&mut instance, cut, n)?;
+    instance.set_state(&state)?;
+    let found = p.run(&mut instance, cut, n)?;
+    instance.free_state(state)?;
+    let what = p.difference_beyond_tolerance(&expected, &found, cut);
+    Ok(what.map(|what| {
+        format!("a state got after steps with noSetFMUStatePriorToCurrentPoint = fmi2True is not restored: {what}")
+    }))
 }
 
 /// A run in which no state is ever got; none where there can be but one instance.
@@ -155,9 +179,40 @@ pub(in super::super) fn serialise(p: &Probe) -> Tested {
     let copy = other.deserialize_state(&bytes)?;
     other.set_state(&copy)?;
     let found = p.run(&mut other, cut, n)?;
-    let what = p.difference_beyond_tolerance(&expected, &found, cut);
+    if let Some(what) = p.difference_beyond_tolerance(&expected, &found, cut) {
+        return Ok(vec![format!("a serialised state read into a new instance is another one: {what}")]);
+    }
+    let what = serialise_diverted(p).unwrap_or_default();
     Ok(what
-        .map(|what| format!("a serialised state read into a new instance is another one: {what}"))
+        .map(|what| {
+            format!("a serialised state with other parameters, read into a new instance, is another one: {what}")
+        })
         .into_iter()
         .collect())
+}
+
+/// The state of an instance with other parameters and start values than its own, read into a new instance, which has its own
+/// ones: "the internal FMU state consists of the values of the continuous states, iteration variables, parameter values, ..."
+/// (section 2.1.8). Nothing where the FMU does not run so.
+fn serialise_diverted(p: &Probe) -> Result<Option<String>, HostError> {
+    let _venture = super::super::host::venture();
+    let Some(mut instance) = super::lifecycle::diverted(p)? else { return Ok(None) };
+    let (n, cut) = (p.steps(), p.steps() / 2);
+    instance.may_go_back = true;
+    let state = instance.get_state()?;
+    let bytes = instance.serialize_state(&state)?;
+    let mut courses = Vec::new();
+    for _ in 0..2 {
+        instance.set_state(&state)?;
+        courses.push(p.run(&mut instance, cut, n)?);
+    }
+    if p.difference_beyond_tolerance(&courses[0], &courses[1], cut).is_some() {
+        return Ok(None);
+    }
+    let mut other = p.ready()?;
+    other.may_go_back = true;
+    let copy = other.deserialize_state(&bytes)?;
+    other.set_state(&copy)?;
+    let found = p.run(&mut other, cut, n)?;
+    Ok(p.difference_beyond_tolerance(&courses[0], &found, cut))
 }

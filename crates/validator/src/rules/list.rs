@@ -11,8 +11,8 @@
 
 use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
 use super::super::behaviour::{
-    dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, settings,
-    state, steps, surroundings, three, values,
+    dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, rounded,
+    settings, state, steps, surroundings, three, values,
 };
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
@@ -312,8 +312,12 @@ rules! { static {
         "Too few values for an array are refused", "Compare nValues with the elements of the variables and return fmi3Error; memory beyond the importer's is read or written otherwise.";
     "reset" Error Conformance "2.1.6" "2.3.1" Loaded(lifecycle::reset);
         "fmi2Reset restores a new instance", "Restore states, parameters, inputs and all internal memory to what fmi2Instantiate made them.";
+    "reset-rounded" Note Robustness "2.1.6" "2.3.1" Indirect(rounded::reset);
+        "A run after fmi2Reset is that of a new instance to the last digit", "Let fmi2Reset forget what the solver remembers, its step size, order and last derivative; a run after others cannot be reproduced otherwise.";
     "state-restore" Error Conformance "2.1.8" "2.2.6.4" Loaded(state::restore);
         "fmi2SetFMUstate restores everything", "Copy all that influences the future: states, inputs, parameters, event times, solver memory.";
+    "state-rounded" Note Robustness "2.1.8" "2.2.6.4" Indirect(rounded::state);
+        "A run from a restored state is the one before to the last digit", "Keep in the FMU state what the solver remembers: its step size, order and last derivative.";
     "state-handles" Error Conformance "2.1.8" "2.2.6.4" Loaded(state::handles);
         "FMU states can be overwritten and freed as the standard says", "Reuse a state that is passed in, set it to null when freed, ignore null.";
     "state-serialise" Error Conformance "2.1.8" "2.2.6.4" Loaded(state::serialise);
@@ -354,6 +358,8 @@ rules! { static {
         "Input derivatives are taken, and zero ones change nothing", "Implement fmi2SetRealInputDerivatives or clear canInterpolateInputs.";
     "input-derivatives-effect" Error Conformance "4.3.1" "-" Indirect(interpolation::effect);
         "Input derivatives have an effect", "Let the input run along its slope during the step, or clear canInterpolateInputs.";
+    "input-derivatives-course" Warning Robustness "4.2.1" "-" Indirect(interpolation::course);
+        "The input runs along its derivative", "Let the input be value + derivative * (t - currentCommunicationPoint) during the step.";
     OUTPUT_DERIVATIVES = "output-derivatives" Error Conformance "4.2.1" "2.2.12" Loaded(interpolation::output_derivatives);
         "Output derivatives are given", "Implement fmi2GetRealOutputDerivatives or set maxOutputDerivativeOrder to 0.";
     "directional-derivative" Error Conformance "2.1.9" "2.2.11" Loaded(partial::directional);
