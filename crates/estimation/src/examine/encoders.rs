@@ -93,6 +93,8 @@ pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, 
 /// The same for a table that moves less than the motor, in the logarithm of the ratio: friction that holds it on a soft coupling leaves it any
 /// share of the motor's way, a unit just one.
 const HELD: f64 = 0.02;
+/// Ratio of two motions up to which they are alike.
+const LIKE: f64 = 1.67;
 
 /// That the table moves so many times as far as the motor because one of them is in another unit.
 fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
@@ -144,7 +146,7 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
         findings.push(finding);
         return;
     }
-    if !(0.6..1.67).contains(&ratio.abs()) {
+    if !(LIKE.recip()..LIKE).contains(&ratio.abs()) {
         findings.push(Finding::new(
             "scale",
             Severity::Warn,
@@ -182,7 +184,9 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     // exchange, too.
     let unexplained = |motor: usize, table: usize| motor_side(s, lines, motor, table);
     let speaks = || unexplained(TABLE, MAIN) < 0.5 * unexplained(MAIN, TABLE);
-    if exchanged < 0.3 && as_given > 3.0 * exchanged && speaks() {
+    // A spring alone moves the table at most as far as the motor, slowly: one that moves further is not it.
+    let may_be = ratio.abs() > LIKE.recip();
+    if may_be && exchanged < 0.3 && as_given > 3.0 * exchanged && speaks() {
         findings.push(Finding::new(
             "swapped",
             Severity::Refuse,
