@@ -111,20 +111,9 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::level::noise;
 
     const DT: f64 = 1e-3;
-
-    /// Noise that is the same in every run: a multiplicative congruence, in units of its deviation.
-    fn noise(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            let mut uniform = || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-            };
-            (0..12).map(|_| uniform()).sum()
-        }
-    }
 
     fn found(torque: &[f64], position: Option<&[f64]>, speed: Option<&[f64]>) -> bool {
         let input = Input { dt: DT, torque: Some(torque), theta1: position, omega1: speed, ..Input::default() };
@@ -152,8 +141,7 @@ mod tests {
 
     #[test]
     fn an_inertia_times_the_differentiated_position_is_found_and_named() {
-        let mut e = noise(1);
-        let noisy: Vec<f64> = (0..4000).map(|k| motion(k) + 1e-5 * e()).collect();
+        let noisy: Vec<f64> = noise(4000, 1).iter().enumerate().map(|(k, e)| motion(k) + 1e-5 * e).collect();
         let counted: Vec<f64> = (0..4000).map(|k| (motion(k) / 1e-4).round() * 1e-4).collect();
         for x in [&noisy, &counted] {
             let speed = gradient(x);
@@ -175,8 +163,7 @@ mod tests {
 
     #[test]
     fn the_motion_of_an_axis_without_friction_is_not_taken_for_the_torque_that_moves_it() {
-        let mut e = noise(2);
-        let white: Vec<f64> = (0..4000).map(|_| e()).collect();
+        let white = noise(4000, 2);
         let slow: Vec<f64> = (0..4000).map(|k| (0.03 * k as f64).sin()).collect();
         let steps: Vec<f64> = (0..4000).map(|k| if (k * k / 7) % 11 < 5 { 1.0 } else { -1.0 }).collect();
         for torque in [&white, &slow, &steps] {
@@ -189,7 +176,7 @@ mod tests {
             assert!(!found(torque, Some(&x), None));
             assert!(!found(torque, None, Some(&v)));
             // A sensor's noise beside it.
-            let seen: Vec<f64> = x.iter().map(|x| x + 1e-7 * e()).collect();
+            let seen: Vec<f64> = x.iter().zip(noise(4000, 3)).map(|(x, e)| x + 1e-7 * e).collect();
             assert!(!found(torque, Some(&seen), None));
         }
     }
