@@ -42,6 +42,11 @@ fn each_verdict_has_its_sentence() {
         d.verdict = Verdict::Unexplained;
         d.ranking.retain(|r| r.hypothesis.effects().is_empty());
     });
+    let worse = with(|d| {
+        d.verdict = Verdict::Unexplained;
+        d.causes.clear();
+        d.ranking.iter_mut().for_each(|r| r.closure_holdout = -9.0);
+    });
     let two = with(|d| {
         let first = d.causes[0].clone();
         d.causes.push(Cause { effect: Effect::ViscousTable, site: Site::Axis, ..first });
@@ -62,6 +67,7 @@ fn each_verdict_has_its_sentence() {
             &["Unexplained", "The nearest, coulomb_motor, closes 99.1 %"],
             "rounding",
         ),
+        (worse, &["Unexplained", "The nearest, coulomb_motor, closes nothing."], "%"),
         (nothing_near, &["Unexplained", "nothing in the library"], "nearest"),
         (rounding(RoundingRole::Noise), &["Unexplained", "The nearest"], "rounding"),
         (rounding(RoundingRole::Withheld), &["Unexplained", "rounding of the readings"], "nearest"),

@@ -2,7 +2,7 @@
 
 use super::naming::{held_out, lower, short_title, title};
 use super::percent;
-use super::words::{REMAINS, closed, in_the_noise};
+use super::words::{REMAINS, in_the_noise};
 use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, UNCAUSED, Verdict as Answer};
 use crate::report::{Cell, Tone, Verdict};
 
@@ -98,6 +98,7 @@ fn nearest(d: &Diagnosis) -> String {
     if !d.causes.is_empty() && fitted.after < TO_THE_NOISE * fitted.noise_floor {
         format!("The nearest, {title}, explains the fitted trace alone: has the machine changed between the two? ")
     } else {
-        format!("The nearest, {title}, closes {} of it. ", closed(best.closure_holdout))
+        let closed = Some(best.closure_holdout).filter(|c| *c > 0.0).map_or_else(|| "nothing".to_owned(), percent);
+        format!("The nearest, {title}, closes {closed} of it. ")
     }
 }

@@ -54,16 +54,12 @@ pub fn sentence(d: &Diagnosis) -> String {
         Verdict::Unexplained => {
             let nearest = d.ranking.iter().find(|r| !r.hypothesis.effects().is_empty());
             let nearest = nearest.map_or_else(String::new, |r| {
-                format!(" The nearest, {}, closes {}.", r.hypothesis, closed(r.closure_holdout))
+                let closed = Some(r.closure_holdout).filter(|c| *c > 0.0).map_or_else(|| "nothing".to_owned(), percent);
+                format!(" The nearest, {}, closes {closed}.", r.hypothesis)
             });
             format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}")
         }
     }
-}
-
-/// Share of the held-out gap that something closes; in words where it closes none.
-pub fn closed(share: f64) -> String {
-    if share > 0.0 { percent(share) } else { "nothing".to_owned() }
 }
 
 /// No gap of a record whose noise makes more torque than the model leaves.
