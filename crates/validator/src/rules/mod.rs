@@ -91,6 +91,11 @@ impl Rule {
         matches!(self.check, Check::Static)
     }
 
+    /// Whether it notes what is seen beside calls whose success is another rule's, an end of the process in them included.
+    pub(crate) fn is_aside(&self) -> bool {
+        self.severity == Severity::Note && matches!(self.check, Check::Behaviour(Behaviour::Indirect(_)))
+    }
+
     /// The section of a version of the standard; none where the rule is not one of that version.
     #[must_use]
     pub fn section(&self, fmi: Fmi) -> Option<&'static str> {

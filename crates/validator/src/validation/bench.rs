@@ -288,6 +288,9 @@ impl<'a> Bench<'a> {
             let why = format!("with other parameters and start values than its own, {message}");
             return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
         }
+        if let Some(message) = died.as_ref().filter(|_| rule.is_aside()) {
+            return (Verdict::NotTested(message.clone()), vec![], answer.map(|a| a.learned));
+        }
         if died.is_some() && rule.is(id::REFERENCE_BITS) {
             let why = "reading an unknown value reference ends the process".to_owned();
             return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
