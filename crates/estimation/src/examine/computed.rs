@@ -12,6 +12,7 @@
 
 use super::Input;
 use super::finding::{Finding, Severity};
+use super::least::Line;
 use super::robust::span;
 use super::spectra::Spectra;
 
@@ -48,20 +49,10 @@ const OF_SPEED: [Differences; 2] = [
 
 /// How the torque is made of differences, `late` samples later: the share of its deviation that they leave, at every `stride`-th sample.
 fn left(t: &[f64], differences: impl Fn(usize) -> f64, late: i32, stride: usize) -> f64 {
-    let pairs =
-        || (LATE..t.len() - LATE).step_by(stride).map(|k| (differences(k.wrapping_add_signed(-late as isize)), t[k]));
-    let n = pairs().count() as f64;
-    let (mx, my) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for (x, y) in pairs() {
-        let (x, y) = (x - mx, y - my);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
-    let slope = xy / xx;
-    let rest: f64 = pairs().map(|(x, y)| (y - my - slope * (x - mx)).powi(2)).sum();
-    if slope.is_finite() && yy > 0.0 { (rest / yy).sqrt() } else { f64::INFINITY }
+    let of = |k: usize| (differences(k.wrapping_add_signed(-late as isize)), t[k]);
+    let line = Line::through(|| (LATE..t.len() - LATE).step_by(stride).map(of));
+    let moves = line.slope.is_finite() && line.squares[1] > 0.0;
+    if moves { (line.left / line.squares[1]).sqrt() } else { f64::INFINITY }
 }
 
 /// Whether a torque rises towards the highest frequency that differences over so many samples pass.

@@ -7,6 +7,7 @@
 //! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: noise, steps and the twist of the coupling part them.
 
 use super::finding::{Finding, Severity, told};
+use super::least::Line;
 use super::{Channel, Input};
 
 /// Share of a column's deviation up to which what another does not explain of it is rounding.
@@ -25,24 +26,11 @@ fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
 
 /// The slope of `y` over `x`, where it is all of `y` at every `stride`-th sample but for a share of its deviation.
 fn slope(x: &[f64], y: &[f64], stride: usize, rounding: f64) -> Option<f64> {
-    let pairs = || x.iter().zip(y).step_by(stride);
-    let n = pairs().count() as f64;
-    let (mx, my) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for (x, y) in pairs() {
-        let (x, y) = (x - mx, y - my);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
+    let line = Line::through(|| x.iter().copied().zip(y.iter().copied()).step_by(stride));
     // What is left of a constant beside its mean is rounding.
-    let moves = |squares: f64, mean: f64| squares > n * (1e-12 * mean).powi(2);
-    if !(moves(xx, mx) && moves(yy, my)) {
-        return None;
-    }
-    let slope = xy / xx;
-    let left: f64 = pairs().map(|(x, y)| (y - my - slope * (x - mx)).powi(2)).sum();
-    (slope.is_finite() && left <= rounding * rounding * yy).then_some(slope)
+    let moves = |i: usize| line.squares[i] > line.count * (1e-12 * line.means[i]).powi(2);
+    let is_all = moves(0) && moves(1) && line.slope.is_finite() && line.left <= rounding * rounding * line.squares[1];
+    is_all.then_some(line.slope)
 }
 
 /// The speed of a position, by central differences.

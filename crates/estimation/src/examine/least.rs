@@ -34,3 +34,32 @@ pub(super) fn bounded(gram: &[Vec<f64>], right: &[f64], low: &[f64], high: &[f64
     let explained = (0..p).map(|i| x[i] * (2.0 * right[i] - (0..p).map(|j| gram[i][j] * x[j]).sum::<f64>())).sum();
     (x, explained)
 }
+/// A straight line through pairs, by least squares.
+pub(super) struct Line {
+    pub(super) slope: f64,
+    /// Sum of the squares that the line leaves of the second values.
+    pub(super) left: f64,
+    /// How many pairs there are, their means, and the sums of squares about those.
+    pub(super) count: f64,
+    pub(super) means: [f64; 2],
+    pub(super) squares: [f64; 2],
+}
+
+impl Line {
+    /// The line through the pairs that `pairs` gives, which is asked for them more than once; its slope is no number where the first values
+    /// are all one.
+    pub(super) fn through<P: Iterator<Item = (f64, f64)>>(pairs: impl Fn() -> P) -> Self {
+        let count = pairs().count() as f64;
+        let (mx, my) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / count, b + y / count));
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for (x, y) in pairs() {
+            let (x, y) = (x - mx, y - my);
+            xx += x * x;
+            xy += x * y;
+            yy += y * y;
+        }
+        let slope = xy / xx;
+        let left = pairs().map(|(x, y)| (y - my - slope * (x - mx)).powi(2)).sum();
+        Self { slope, left, count, means: [mx, my], squares: [xx, yy] }
+    }
+}

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::super::model::Model;
 use super::super::verdict::Verdict;
-use super::determined::{is_simpler, is_steady, is_undetermined};
+use super::determined::{is_simpler, is_undetermined, steadiness};
 use super::fit::Fit;
 use super::search::{ALIKE, Search, is_more};
 use crate::effects::Effect;
@@ -138,7 +138,7 @@ impl Search<'_> {
         let decisive = |i: usize| match is_undetermined(&finished, chosen.terms[i].0, independent) {
             true => 0.0,
             false => {
-                let steady = is_steady(&finished, chosen.terms[i].0, independent);
+                let steady = steadiness(&finished, chosen.terms[i].0, independent);
                 steady * self.decisive(&chosen, i, &parameters, &pool)
             }
         };

@@ -43,7 +43,7 @@ pub fn is_undetermined(fit: &Fit, effect: Effect, independent: f64) -> bool {
 }
 
 /// Probability that an effect of a fit has its size in every stretch of the record: by the best known of its sizes.
-pub fn is_steady(fit: &Fit, effect: Effect, independent: f64) -> f64 {
+pub fn steadiness(fit: &Fit, effect: Effect, independent: f64) -> f64 {
     let known = own(fit, effect).filter(|(c, std)| !c.is_shape() && std.is_finite());
     let errors = known.map(|(c, std)| c.value(&fit.model).abs() * independent.sqrt() / std);
     errors.reduce(f64::max).map_or(1.0, |errors| scatter::steadiness(errors, PRICE))
@@ -119,11 +119,11 @@ mod tests {
             fit.std.push(error);
             fit
         };
-        assert!(is_steady(&of(0.03), term.0, 1.0) > 0.99);
-        assert!(is_steady(&of(0.15), term.0, 1.0) < 0.2);
+        assert!(steadiness(&of(0.03), term.0, 1.0) > 0.99);
+        assert!(steadiness(&of(0.15), term.0, 1.0) < 0.2);
         // A quarter of the values: half as many errors.
-        assert!((is_steady(&of(0.03), term.0, 0.25) - is_steady(&of(0.06), term.0, 1.0)).abs() < 1e-12);
+        assert!((steadiness(&of(0.03), term.0, 0.25) - steadiness(&of(0.06), term.0, 1.0)).abs() < 1e-12);
         // Of one whose error is not known nothing is said.
-        assert_eq!(is_steady(&of(f64::INFINITY), term.0, 1.0), 1.0);
+        assert_eq!(steadiness(&of(f64::INFINITY), term.0, 1.0), 1.0);
     }
 }
