@@ -13,6 +13,16 @@ fn continuous_inputs(p: &Probe) -> Result<Vec<(usize, &Variable)>, Stop> {
     if inputs.is_empty() { not_applicable("there is no continuous Real input") } else { Ok(inputs) }
 }
 
+/// The value of an input where the tested step begins, and a change of it that stays within its bounds; None where there is no such.
+fn change(p: &Probe, v: &Variable, order: usize) -> Option<(f64, f64)> {
+    let r = p.d.resolved(v);
+    let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
+    let value = if p.learned.stimulus { p.input(v, order, p.time(2)) } else { 0.0 };
+    let size = 0.1 * r.nominal.filter(|n| n.is_finite()).unwrap_or(1.0).max(value.abs()).min((high - low).abs());
+    let size = if value + size > high { -size } else { size };
+    (value + size >= low).then_some((value, size))
+}
+
 /// "Calling fmi2SetRealInputDerivatives has an effect" (canInterpolateInputs, section 4.3.1): a slope that brings the
 /// input where a step's result answers to it.
 pub(in super::super) fn effect(p: &Probe) -> Tested {
@@ -33,14 +43,7 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
     let plain = [stepped(None, None)?];
     let (mut silent, mut answered) = (Vec::new(), false);
     for (order, v) in inputs.into_iter().take(10) {
-        let r = p.d.resolved(v);
-        let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
-        let value = if p.learned.stimulus { p.input(v, order, p.time(2)) } else { 0.0 };
-        let size = 0.1 * r.nominal.filter(|n| n.is_finite()).unwrap_or(1.0).max(value.abs()).min((high - low).abs());
-        let size = if value + size > high { -size } else { size };
-        if value + size < low {
-            continue;
-        }
+        let Some((value, size)) = change(p, v, order) else { continue };
         // Without the input itself, and what is computed from it at once, the course of the rest must answer.
         let Ok(moved) = stepped(Some((v, value + size)), None) else { continue };
         if !p.answers(&plain, &[moved], &[v.value_reference]) {
@@ -93,14 +96,7 @@ pub(in super::super) fn course(p: &Probe) -> Tested {
     };
     let mut tested = false;
     for (order, v) in inputs.into_iter().take(10) {
-        let r = p.d.resolved(v);
-        let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
-        let value = if p.learned.stimulus { p.input(v, order, p.time(2)) } else { 0.0 };
-        let size = 0.1 * r.nominal.filter(|n| n.is_finite()).unwrap_or(1.0).max(value.abs()).min((high - low).abs());
-        let rise = if value + size > high { -size } else { size };
-        if value + rise < low {
-            continue;
-        }
+        let Some((value, rise)) = change(p, v, order) else { continue };
         let courses = || -> Result<[Snapshot; 4], HostError> {
             Ok([
                 run(1, v, value, 0.0, false)?,
