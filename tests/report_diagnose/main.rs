@@ -4,7 +4,7 @@ mod contract;
 mod fixture;
 mod words;
 
-use eixo::diagnose::{ClosedLoop, Commands, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Site, Verdict};
+use eixo::diagnose::{ClosedLoop, Commands, Confusable, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Site, Verdict};
 use eixo::effects::{Effect, Place};
 use eixo::report::diagnose::{Findings, report, short};
 use eixo::report::terminal::{self, Layout};
@@ -57,6 +57,22 @@ fn the_other_answers_claim_no_cause() {
         assert!(!page.contains("leaves out"), "{sentence}");
         assert!(!page.contains("with the effect"), "{sentence}");
     }
+}
+
+#[test]
+fn two_causes_that_explain_a_gap_alike_are_what_the_next_record_is_to_tell_apart() {
+    let pair = Confusable { named: Effect::CoulombMotor, other: Effect::LoadMotor, difference: 0.0 };
+    let d =
+        Diagnosis { verdict: Verdict::Unexplained, causes: Vec::new(), confusable: vec![pair], ..friction("x-axis") };
+    let page = html::page(&made(&d));
+    for sentence in [
+        "this record does not tell Coulomb friction of motor and screw from constant torque on the motor",
+        "Change nothing on the machine yet",
+        "slow reversals in both directions",
+    ] {
+        assert!(page.contains(sentence), "{sentence}");
+    }
+    assert!(!page.contains("none of the known effects"));
 }
 
 #[test]

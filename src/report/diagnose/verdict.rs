@@ -2,7 +2,7 @@
 
 use super::naming::{held_out, lower, short_title, title};
 use super::percent;
-use super::words::{REMAINS, in_the_noise};
+use super::words::{REMAINS, either, in_the_noise};
 use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, UNCAUSED, Verdict as Answer};
 use crate::report::{Cell, Tone, Verdict};
 
@@ -52,7 +52,10 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
         }
         Answer::Unexplained => {
             let at = d.location.site.map_or("at no single place".to_owned(), |s| format!("at the {}", s.as_str()));
-            let sentence = format!("There is a gap {at}, and none of the known effects explains it.");
+            let sentence = match either(d) {
+                Some(pair) => format!("There is a gap {at}, and this record does not tell {pair}."),
+                None => format!("There is a gap {at}, and none of the known effects explains it."),
+            };
             (Tone::Unsure, sentence, format!("{}{}", nearest(d), fall(d)))
         }
     };

@@ -57,9 +57,24 @@ pub fn sentence(d: &Diagnosis) -> String {
                 let closed = Some(r.closure_holdout).filter(|c| *c > 0.0).map_or_else(|| "nothing".to_owned(), percent);
                 format!(" The nearest, {}, closes {closed}.", r.hypothesis)
             });
-            format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}")
+            match either(d) {
+                Some(pair) => format!("Unexplained: a gap is there, and this record does not tell {pair}.{nearest}"),
+                None => format!("Unexplained: a gap is there, and nothing in the library closes it.{nearest}"),
+            }
         }
     }
+}
+
+/// Two causes of unlike kind that explain the gap of an unexplained record alike.
+pub fn either(d: &Diagnosis) -> Option<String> {
+    let pair = d.confusable.iter().find(|c| d.verdict == Verdict::Unexplained && !c.is_of_place())?;
+    Some(told_apart(pair))
+}
+
+/// What is to be told from what.
+fn told_apart(c: &Confusable) -> String {
+    let name = |e: Effect| lower(short_title(e.info()));
+    format!("{} from {}", name(c.named), name(c.other))
 }
 
 /// No gap of a record whose noise makes more torque than the model leaves.
@@ -85,7 +100,7 @@ pub fn next_experiment(d: &Diagnosis) -> &'static str {
         Verdict::NoGap => "None needed: drive the axis harder or over more of its travel to look for smaller effects.",
         Verdict::Parameters => "Put the fitted parameters into axis.toml and diagnose a second record.",
         Verdict::Unexplained if is_rounding(d) => "Log the positions with a finer step.",
-        Verdict::Unexplained => {
+        Verdict::Unexplained if d.confusable.is_empty() => {
             "Repeat the record at half and at twice the amplitude with an odd multisine (eixo excite --kind odd): even \
              lines that light up tell asymmetry and offsets, odd ones friction and play; a fixed frequency that stays \
              is an outside disturbance."
@@ -93,21 +108,21 @@ pub fn next_experiment(d: &Diagnosis) -> &'static str {
         Verdict::Effect if d.confusable.is_empty() => {
             "None needed to name the cause. Confirm it with a record at another amplitude, and re-run with it in axis.toml."
         }
-        Verdict::Effect if d.confusable.iter().any(Confusable::is_of_place) => {
+        _ if d.confusable.iter().any(Confusable::is_of_place) => {
             "Log the encoders on both sides of the coupling: which side a force acts on shows in what the two \
              readings do to each other."
         }
-        Verdict::Effect if has(Contrast::Twist) => {
+        _ if has(Contrast::Twist) => {
             "Drive the coupling harder near its resonance, at two amplitudes: play shrinks in relative terms, a cubic \
              spring grows, a loop stays open at any speed."
         }
-        Verdict::Effect if has(Contrast::Phase) => {
+        _ if has(Contrast::Phase) => {
             "Excite a higher band: a delay's phase grows with frequency, a lag's bends and its gain falls."
         }
-        Verdict::Effect if has(Contrast::Reversals) => {
+        _ if has(Contrast::Reversals) => {
             "Use an odd multisine with slow reversals in both directions: an offset lights up even lines, friction odd ones."
         }
-        Verdict::Effect => {
+        _ => {
             "Repeat with an odd multisine at two amplitudes (eixo excite --kind odd); the two causes scale differently."
         }
     }
@@ -253,8 +268,7 @@ pub fn beyond_parameters(d: &Diagnosis) -> Option<String> {
 
 /// What two effects that are not told apart come to.
 pub fn not_told(c: &Confusable) -> String {
-    let name = |e: Effect| lower(short_title(e.info()));
-    format!("These data do not tell {} from {}: {}", name(c.named), name(c.other), alike(c))
+    format!("These data do not tell {}: {}", told_apart(c), alike(c))
 }
 
 /// Whether the drive's loop agrees with the diagnosis.
@@ -287,6 +301,7 @@ pub fn steps(d: &Diagnosis) -> Vec<String> {
         Verdict::Effect => {
             "Put the effect into the model: the table above has its parameters for [effects] of axis.toml."
         }
+        Verdict::Unexplained if either(d).is_some() => "Change nothing on the machine yet: the next record is to tell.",
         Verdict::Unexplained => {
             "Look at the machine at the place marked; compare the pictures of the residual with what moves there."
         }
@@ -298,7 +313,7 @@ pub fn steps(d: &Diagnosis) -> Vec<String> {
 fn tell_apart(d: &Diagnosis) -> Option<String> {
     let name = |e: Effect| lower(short_title(e.info()));
     let pairs: Vec<String> = d.confusable.iter().map(|c| format!("{} or {}", name(c.named), name(c.other))).collect();
-    (d.verdict == Verdict::Effect && !pairs.is_empty()).then(|| {
+    (matches!(d.verdict, Verdict::Effect | Verdict::Unexplained) && !pairs.is_empty()).then(|| {
         format!(
             "Before you change the machine, find out which it is, for these data do not tell: {}.",
             pairs.join("; ")

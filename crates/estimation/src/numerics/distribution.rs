@@ -1,7 +1,13 @@
-//! Tail of the chi-squared distribution.
+//! Tail of the chi-squared distribution, and probability from log odds.
 //!
-//! Own code beside `statrs` (0.19), which gives the same to 7e-14 where this gives it to 3e-15, and would change the last digits of
+//! The tail is own code beside `statrs` (0.19), which gives the same to 7e-14 where this gives it to 3e-15, and would change the last digits of
 //! every p-value in a report.
+
+/// Probability whose log odds are told: the logistic function.
+#[must_use]
+pub fn of_log_odds(log_odds: f64) -> f64 {
+    (1.0 + (-log_odds).exp()).recip()
+}
 
 /// Probability that chi-squared with `dof` degrees of freedom exceeds `x`.
 #[must_use]

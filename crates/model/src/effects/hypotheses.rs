@@ -52,7 +52,8 @@ impl Effect {
     /// Whether it is a constant torque alone: an amplifier's offset, a weight.
     #[must_use]
     pub fn is_bias(self) -> bool {
-        self.info().family == Family::LoadTorque
+        let info = self.info();
+        info.family == Family::LoadTorque && info.parameters.len() == 1
     }
 
     /// The effect that rounds the readings, and the parameter that is its step.

@@ -30,7 +30,8 @@ impl<I: Side> Force for Load<I> {
         memory: 0,
         named: true,
         textbook: [true, false][I::INDEX],
-        odds: 1.0,
+        // Every axis has friction, few carry a weight.
+        odds: 0.6,
         bounds: |p, x| p[0].abs() <= 20.0 * x.torque,
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],

@@ -6,9 +6,10 @@ use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::determined::{is_simpler, is_undetermined, steadiness};
 use super::fit::Fit;
-use super::search::{ALIKE, Search, is_more};
-use crate::effects::Effect;
+use super::search::{ALIKE, MINOR, Search, is_more};
+use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
+use crate::numerics::distribution::of_log_odds;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
@@ -143,8 +144,10 @@ impl Search<'_> {
             }
         };
         let decisive: Vec<f64> = (0..chosen.terms.len()).map(decisive).collect();
+        let twins: Vec<Option<Confusable>> =
+            (0..chosen.terms.len()).map(|i| self.constant_instead(&chosen, i, &pool, independent)).collect();
         let mut ranking = self.weighed(pool, independent);
-        let probabilities: Vec<f64> = chosen
+        let mut probabilities: Vec<f64> = chosen
             .terms
             .iter()
             .zip(&decisive)
@@ -166,6 +169,10 @@ impl Search<'_> {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             let none = plain.clone();
             return self.conclude(given, parameters, none, pool);
+        }
+        // Of two that the record cannot tell apart one explains it.
+        for (p, twin) in probabilities.iter_mut().zip(&twins) {
+            *p = twin.map_or(*p, |t| p.min(of_log_odds(t.difference)));
         }
         if chosen.terms.len() > 1
             && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
@@ -198,7 +205,8 @@ impl Search<'_> {
         };
         let chosen = finished;
         ranking.truncate(40);
-        let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent));
+        let twins = twins.into_iter().flatten().filter(|t| t.difference < ALIKE);
+        let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent), twins);
         let shares = self.shares(&chosen);
         let cut_short = self.cut_short.load(Ordering::Relaxed);
         Decision {
@@ -233,6 +241,34 @@ impl Search<'_> {
             if without > with { (without - with) / without } else { 0.0 }
         };
         (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, plain)
+    }
+
+    /// The constant torque that a friction may be as well, where the motion never goes back: there the law without any shape is one, and
+    /// a shape may follow what else happens as the axis starts, unless it explains next to all that the constant torque leaves.
+    fn constant_instead(&self, chosen: &Fit, i: usize, pool: &[Fit], independent: f64) -> Option<Confusable> {
+        let (effect, _) = chosen.terms[i];
+        let is_dry = |e: Effect| e.info().family == Family::DryFriction;
+        if !is_dry(effect) || self.problem.scales.as_ref()?.goes_back(effect) {
+            return None;
+        }
+        let at_its_place = || self.suspects.iter().copied().filter(|e| e.info().place == effect.info().place);
+        let shapeless = at_its_place().find(|e| is_dry(*e) && e.simpler_at_zero().is_none())?;
+        let constant = at_its_place().find(|e| e.is_bias())?;
+        let with = |e: Effect| {
+            let mut terms = chosen.terms.clone();
+            terms[i] = (e, 0);
+            let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
+            let known = pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+            known.cloned().or_else(|| self.with_another(chosen, i, (e, 0)))
+        };
+        let load = with(constant)?;
+        let next_to_all = (0..self.band().equations()).all(|e| chosen.discrepancy[e] < MINOR * load.discrepancy[e]);
+        if next_to_all && !self.is_negligible(&load) {
+            return None;
+        }
+        let difference =
+            with(shapeless).map_or(0.0, |f| self.evidence(&f, independent) - self.evidence(&load, independent));
+        Some(Confusable { named: effect, other: constant, difference })
     }
 
     /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.
@@ -314,9 +350,14 @@ fn plainer<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
     pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
-/// Named effects that another family explains as well.
-fn confusable(chosen: &Fit, ranking: &[Weighed], evidence: f64) -> Vec<Confusable> {
-    let mut out: Vec<Confusable> = Vec::new();
+/// Named effects that another family explains as well, beside those that are known to be such.
+fn confusable(
+    chosen: &Fit,
+    ranking: &[Weighed],
+    evidence: f64,
+    known: impl Iterator<Item = Confusable>,
+) -> Vec<Confusable> {
+    let mut out: Vec<Confusable> = known.collect();
     for w in ranking.iter().filter(|w| evidence - w.evidence < ALIKE && w.fit.terms.len() == chosen.terms.len()) {
         let gone: Vec<Effect> =
             chosen.terms.iter().map(|t| t.0).filter(|e| w.fit.terms.iter().all(|t| t.0 != *e)).collect();
@@ -412,7 +453,7 @@ mod tests {
             weighed(&[CoulombMotor, ViscousMotor], 100.0 - ALIKE),
             weighed(&[Delay], 99.0),
         ];
-        let found = confusable(&chosen, &ranking, 100.0);
+        let found = confusable(&chosen, &ranking, 100.0, std::iter::empty());
         let pairs: Vec<_> = found.iter().map(|c| (c.named, c.other, c.difference, c.is_of_place())).collect();
         assert_eq!(pairs, [(CoulombMotor, CoulombTable, 1.0, true), (Delay, Latch, 2.0, false)]);
     }

@@ -15,6 +15,7 @@ use std::ops::Range;
 use super::fit::{Fit, PRICE};
 use super::likelihood::{Band, Lacking};
 use super::search::Search;
+use crate::numerics::distribution::of_log_odds;
 
 impl Search<'_> {
     /// Probability that an effect of a fit stands out of such a discrepancy, beside `plain`, the fit without it.
@@ -24,7 +25,7 @@ impl Search<'_> {
         let gained: f64 = with.iter().zip(&without).map(|(with, without)| gain(&band.weight, with, without)).sum();
         let free = fit.coordinates.len() as f64 - plain.coordinates.len() as f64;
         let gained = gained - 0.5 * free * band.values().ln() - PRICE;
-        1.0 / (1.0 + (-gained).exp())
+        of_log_odds(gained)
     }
 }
 

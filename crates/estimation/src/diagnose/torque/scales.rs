@@ -33,6 +33,8 @@ pub struct Scales {
 
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
+/// Share of the travel by which the way is longer where the motion goes back at all.
+const BACK: f64 = 0.01;
 
 /// The way of a motion, and its reversals, those below a threshold left out.
 fn way(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
@@ -151,6 +153,13 @@ impl Scales {
             };
             (info.bounds)(model.effects.of(e), &extent)
         })
+    }
+
+    /// Whether the side of an effect moves both ways: where it does not, friction is a constant torque.
+    pub fn goes_back(&self, effect: Effect) -> bool {
+        let side = usize::from(effect.info().place == Place::Table);
+        let [low, high] = self.travel[side];
+        self.ways[side].0 > (1.0 + BACK) * (high - low)
     }
 
     /// The value that is a fraction of a scale.

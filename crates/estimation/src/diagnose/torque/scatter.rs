@@ -4,6 +4,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::numerics::distribution::of_log_odds;
+
 /// Stretches that are compared.
 const STRETCHES: usize = 8;
 /// By how much the 95 % interval of so few is wider than a normal variable's: Student's 2.365 with seven degrees of freedom over 1.960.
@@ -45,7 +47,7 @@ fn pulls(column: &Series, residual: &Series) -> [f64; STRETCHES] {
 pub fn steadiness(errors: f64, price: f64) -> f64 {
     let stretches = STRETCHES as f64;
     let gained = 0.5 * stretches * (errors * errors / (stretches - 1.0)).ln_1p() - price;
-    1.0 / (1.0 + (-gained).exp())
+    of_log_odds(gained)
 }
 
 fn about_mean(values: [f64; STRETCHES]) -> [f64; STRETCHES] {

@@ -28,7 +28,7 @@ const MATERIAL: f64 = 0.25;
 /// The same of the first: several causes share a gap.
 const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
-const MINOR: f64 = 0.0025;
+pub const MINOR: f64 = 0.0025;
 /// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling with an
 /// encoder on each side shows less of it in its twist.
 pub const NEGLIGIBLE: f64 = 2e-3;
@@ -311,7 +311,7 @@ impl Search<'_> {
     }
 
     /// Whether what a fit leaves is less than a log's torque is true to.
-    fn is_negligible(&self, fit: &Fit) -> bool {
+    pub fn is_negligible(&self, fit: &Fit) -> bool {
         self.band().torque_rms(fit.discrepancy) < self.negligible()
     }
 
@@ -442,22 +442,28 @@ impl Search<'_> {
         best
     }
 
+    /// What an effect is looked for in: the fit without one of its effects, everything else from where it stands.
+    fn beside(&self, fit: &Fit, i: usize) -> Option<Look<'_>> {
+        let mut terms = fit.terms.clone();
+        terms.remove(i);
+        let held = Fit { terms, ..self.problem.given(&self.bare(fit, i))? };
+        Look::beside(&self.problem, &self.problem.freed(&held)?)
+    }
+
+    /// The fit with another effect in the place of one of its own.
+    pub fn with_another(&self, fit: &Fit, i: usize, other: Term) -> Option<Fit> {
+        let look = self.beside(fit, i)?;
+        let start = look.starts(other).into_iter().next()?;
+        self.problem.deepen(&look.fitted(&start, i, fit.discrepancy)?)
+    }
+
     /// The fit with one of its effects in each form that frees more, everything else from where it stands: what the plain form lacks the
     /// others may have taken, and without it they would stand elsewhere.
     fn reformed(&self, fit: &Fit, i: usize) -> Vec<Fit> {
         let (effect, form) = fit.terms[i];
         let info = effect.info();
         let richer: Vec<usize> = (0..info.variants.len()).filter(|v| info.frees_more(*v, form)).collect();
-        let beside = || {
-            if richer.is_empty() {
-                return None;
-            }
-            let mut terms = fit.terms.clone();
-            terms.remove(i);
-            let held = Fit { terms, ..self.problem.given(&self.bare(fit, i))? };
-            Look::beside(&self.problem, &self.problem.freed(&held)?)
-        };
-        let Some(look) = beside() else { return Vec::new() };
+        let Some(look) = (!richer.is_empty()).then(|| self.beside(fit, i)).flatten() else { return Vec::new() };
         let points: Vec<StartPoint> =
             richer.par_iter().flat_map_iter(|v| look.starts((effect, *v)).into_iter().take(2)).collect();
         let probed = points.par_iter().filter_map(|start| look.fitted(start, i, fit.discrepancy)).collect();

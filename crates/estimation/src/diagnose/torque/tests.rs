@@ -39,8 +39,20 @@ fn of_one_encoder(start: f64, torque: Vec<f64>, theta: Vec<f64>) -> Record {
     }
 }
 
-/// A record of moves under a position controller; `foreign` is a torque that no model knows of.
+/// A record of moves to and fro under a position controller; `foreign` is a torque that no model knows of.
 fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn(f64) -> f64, seed: u64) -> Record {
+    let wanted = |t: f64| amplitude * ((0.9 * t).sin() + 0.35 * (2.3 * t).sin() * (1.0 - (-t).exp()));
+    led(wanted, effects, torque_noise, foreign, seed)
+}
+
+/// The same along any way.
+fn led(
+    wanted: impl Fn(f64) -> f64,
+    effects: Settings,
+    torque_noise: f64,
+    foreign: impl Fn(f64) -> f64,
+    seed: u64,
+) -> Record {
     let n = 6000;
     let axis = Axis::new(parameters(INERTIA), Structure::Rigid, effects, Scheme::Exact, DT);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -49,9 +61,8 @@ fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn
     let (mut torque, mut theta) = (Vec::new(), Vec::new());
     for k in 0..n {
         let t = f64::from(k) * DT;
-        let wanted = amplitude * ((0.9 * t).sin() + 0.35 * (2.3 * t).sin() * (1.0 - (-t).exp()));
         let seen = state.theta1() + noise(1e-6);
-        let command = INERTIA * (900.0 * (wanted - seen) - 42.0 * state.omega1());
+        let command = INERTIA * (900.0 * (wanted(t) - seen) - 42.0 * state.omega1());
         theta.push(seen);
         torque.push(command + noise(torque_noise));
         let acts = command + foreign(t);
@@ -100,6 +111,24 @@ fn with(values: &[(Effect, usize, f64)]) -> Settings {
         s.of_mut(*e)[*i] = *v;
     }
     s
+}
+
+#[test]
+fn a_friction_and_a_load_are_not_told_apart_where_the_axis_never_goes_back() {
+    let onwards = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
+    // What a constant torque leaves, slow and small beside it, a friction with a shape follows some of.
+    let wander = |t: f64| 0.05 * (1.3 * t).sin();
+    for effect in [Effect::LoadMotor, Effect::CoulombMotor] {
+        let size = 0.5;
+        // Without its start from rest, where friction holds and a load does not.
+        let record = led(onwards, with(&[(effect, 0, size)]), 1e-4, wander, 5).part(500..6000);
+        let o = diagnosed(&record, INERTIA);
+        let families: Vec<[&str; 2]> =
+            o.decision.confusable.iter().map(|c| [c.named, c.other].map(|e| e.info().family.as_str())).collect();
+        assert_eq!(families, [["dry_friction", "load_torque"]], "{:?} {:?}", named(&o), told(&o));
+        // Every axis has friction, few carry a weight, as the effects' own odds have it.
+        assert!(o.decision.probabilities.iter().all(|p| (0.5..0.8).contains(p)), "{:?}", o.decision.probabilities);
+    }
 }
 
 #[test]
