@@ -214,7 +214,7 @@ impl<'a> Loop<'a> {
         let axis = Axis::new(*p, set.structure, set.effects, Scheme::Exact, dt / per as f64);
         let theta = at / p.rho;
         let state = axis.state(theta, 0.0, theta, 0.0, 0.0);
-        let seen = set.effects.settle_sensors(axis.on(), state.reading(), dt);
+        let seen = set.effects.initial_readings(axis.on(), state.reading(), dt);
         Self {
             axis,
             set,

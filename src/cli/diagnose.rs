@@ -146,7 +146,7 @@ fn examine(
             Some(reference) => {
                 let command = command.as_deref().unwrap_or(&train.torque);
                 let seen = UnderControl { record: &train, reference, command, controller };
-                outcome.diagnosis.closed_loop = Some(seen.judge(&outcome.decision));
+                outcome.diagnosis.closed_loop = Some(seen.verify(&outcome.decision));
             }
             None => warnings.push(format!(
                 "{}: [controller] is given, but the trace has no column of the reference: the loop is not simulated.",

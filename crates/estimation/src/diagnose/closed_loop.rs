@@ -119,7 +119,7 @@ impl UnderControl<'_> {
         let (on, effects) = (axis.on(), &model.effects);
         let [theta, omega] = self.start();
         let mut state = axis.state(theta, omega, theta, omega, record.start);
-        let mut seen = effects.settle_sensors(on, state.reading(), dt);
+        let mut seen = effects.initial_readings(on, state.reading(), dt);
         let mut torques = TorqueHistory::default();
         let mut drive = crate::drive::Drive::default();
         let mut before = theta - omega * dt;
@@ -167,7 +167,7 @@ impl UnderControl<'_> {
 
     /// What the loop says of every hypothesis of a decision.
     #[must_use]
-    pub fn judge(&self, decision: &Decision) -> ClosedLoop {
+    pub fn verify(&self, decision: &Decision) -> ClosedLoop {
         let of = |model: &Model| self.errors(model);
         let commands = Commands {
             time: (0..self.reference.len()).map(|k| self.record.time(k)).collect(),

@@ -21,7 +21,7 @@ fn dominates(noise: &NoiseEstimate) -> bool {
 
 /// Names quantisation where the record is at the floor and the lattice is what the floor is made of; where it may not be
 /// named, rounding is no noise that would explain the record.
-pub fn judge(case: &Case<'_>, diagnosis: &mut Diagnosis) {
+pub fn attribute(case: &Case<'_>, diagnosis: &mut Diagnosis) {
     let Some((effect, parameter)) = Effect::of_rounding() else { return };
     let step = case.noise.quantum.iter().flatten().copied().fold(0.0, f64::max);
     // A model that rounds as the record does has no gap there.

@@ -26,17 +26,17 @@ const STRETCHES: usize = 8;
 const SURE: f64 = 6.0;
 
 /// What the axis felt while its torque stood at an end.
-pub(super) enum Felt {
+pub(super) enum Actual {
     /// That torque.
-    This,
+    AsLogged,
     /// More, by that share of the end.
-    More(f64),
+    Larger(f64),
     /// It cannot be told: too little of the record is off the ends, or no equation explains it.
-    Untold,
+    Unknown,
 }
 
 /// What the axis felt while its torque stood at an end.
-pub(super) fn felt(input: &Input<'_>, torque: &[f64]) -> Felt {
+pub(super) fn actual_torque(input: &Input<'_>, torque: &[f64]) -> Actual {
     let mut best: Option<(f64, Option<f64>)> = None;
     for width in WIDTHS.into_iter().filter(|w| SHORTEST + 8 * w <= torque.len()) {
         for held in [true, false] {
@@ -49,9 +49,9 @@ pub(super) fn felt(input: &Input<'_>, torque: &[f64]) -> Felt {
         }
     }
     match best {
-        None => Felt::Untold,
-        Some((_, None)) => Felt::This,
-        Some((_, Some(share))) => Felt::More(share),
+        None => Actual::Unknown,
+        Some((_, None)) => Actual::AsLogged,
+        Some((_, Some(share))) => Actual::Larger(share),
     }
 }
 

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use super::ceiling::{self, Felt};
+use super::ceiling::{self, Actual};
 use super::finding::{Finding, Severity};
 use super::robust::{self, quantile, span, step};
 use super::{Channel, Input};
@@ -321,8 +321,8 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
     );
     let limit = "A model of the machine needs that limit: see `eixo effects saturation`.";
     let (severity, means, remedy) = if channel.name == "T" {
-        match ceiling::felt(input, x) {
-            Felt::More(share) => {
+        match ceiling::actual_torque(input, x) {
+            Actual::Larger(share) => {
                 let _ = write!(seen, " The axis moves there as under {:.1} % more.", 100.0 * share);
                 (
                     Severity::Refuse,
@@ -330,14 +330,14 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
                     "Widen the range of the column in the logger, or record a motion that needs less torque.",
                 )
             }
-            Felt::This => (Severity::Note, "The drive's limit is reached.", limit),
-            Felt::Untold if share > MOSTLY => (
+            Actual::AsLogged => (Severity::Note, "The drive's limit is reached.", limit),
+            Actual::Unknown if share > MOSTLY => (
                 Severity::Warn,
                 "The drive's limit is reached, or that of the log, most of the time: what more was asked for, or given, this record does not tell.",
                 "Record a motion that needs less torque, or widen the range of the column in the logger; where it is the drive that gives no \
                  more, a model of the machine needs that limit: see `eixo effects saturation`.",
             ),
-            Felt::Untold => (
+            Actual::Unknown => (
                 Severity::Note,
                 "The drive's limit is reached, or that of the log: which of the two, this record does not tell.",
                 limit,

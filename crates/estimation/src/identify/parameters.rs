@@ -126,7 +126,8 @@ impl Rows {
         let relative = report.covariance();
         let unit = DVector::from_column_slice(direct.as_slice());
         let mut covariance = Matrix4::from_fn(|i, j| relative[(i, j)] * unit[i] * unit[j]);
-        if let Some(coloured) = self.coloured.and_then(|five| problem.carried(&report.parameters, &relative, &five)) {
+        if let Some(coloured) = self.coloured.and_then(|five| problem.propagated(&report.parameters, &relative, &five))
+        {
             let coloured = Matrix4::from_fn(|i, j| coloured[(i, j)] * unit[i] * unit[j]);
             covariance = wider(&covariance, &coloured);
         }
@@ -164,7 +165,7 @@ struct Reconciliation<'a> {
 impl Reconciliation<'_> {
     /// The covariance of the five ratios carried to the four parameters (over their units): `A*five*A'` with
     /// `A = inv(J'J)*J'*W`, which is how the parameters move with the ratios.
-    fn carried(&self, q: &DVector<f64>, relative: &DMatrix<f64>, five: &SMatrix<f64, 5, 5>) -> Option<DMatrix<f64>> {
+    fn propagated(&self, q: &DVector<f64>, relative: &DMatrix<f64>, five: &SMatrix<f64, 5, 5>) -> Option<DMatrix<f64>> {
         let jacobian = DMatrix::from_fn(5, 4, {
             let residual = self.residual(q);
             move |i, j| residual[i].eps[j]

@@ -128,7 +128,7 @@ impl Kernel {
             axis,
             state,
             torques: TorqueHistory::default(),
-            readings: axis.effects().settle_sensors(axis.on(), state.reading(), h),
+            readings: axis.effects().initial_readings(axis.on(), state.reading(), h),
         }
     }
 
@@ -186,13 +186,13 @@ impl Kernel {
                 self.torques = TorqueHistory::settled(values.of(Slot::Torque));
             }
             if axis.on().sensors() != self.axis.on().sensors() {
-                self.readings = axis.effects().settle_sensors(axis.on(), self.state.reading(), h);
+                self.readings = axis.effects().initial_readings(axis.on(), self.state.reading(), h);
             }
         } else {
             let [x1, v1, x2, v2] = values.initial();
             self.state = axis.state(x1, v1, x2, v2, self.time);
             self.torques = TorqueHistory::default();
-            self.readings = axis.effects().settle_sensors(axis.on(), self.state.reading(), h);
+            self.readings = axis.effects().initial_readings(axis.on(), self.state.reading(), h);
         }
         self.axis = axis;
         self.stale = false;
@@ -402,11 +402,11 @@ impl Kernel {
         let (state, readings);
         if self.live {
             state = State::lift(&self.state);
-            readings = axis.effects().settle_sensors(axis.on(), state.reading(), h);
+            readings = axis.effects().initial_readings(axis.on(), state.reading(), h);
         } else {
             let [x1, v1, x2, v2] = values.initial();
             state = axis.state(x1, v1, x2, v2, self.time);
-            readings = axis.effects().settle_sensors(axis.on(), state.reading(), h);
+            readings = axis.effects().initial_readings(axis.on(), state.reading(), h);
         }
         let scene = Scene { axis: &axis, state: &state, readings: &readings, rho, torque, time: self.time };
         unknown(&mut |index| scene.output(index, &self.torques).eps[0]);

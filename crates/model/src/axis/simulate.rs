@@ -111,7 +111,7 @@ pub fn simulate<S: Scalar>(
     let axis = Axis::new(*parameters, structure, *effects, options.scheme, h);
     let mut state: State<S> = axis.state(initial[0], initial[1], initial[2], initial[3], options.start);
     let mut history = TorqueHistory::default();
-    let mut seen = effects.settle_sensors(axis.on(), state.reading(), options.dt);
+    let mut seen = effects.initial_readings(axis.on(), state.reading(), options.dt);
     let mut response = Response { readings: Vec::with_capacity(n), accelerations: Vec::with_capacity(n) };
     for k in 0..n {
         let sample: Ramp<S> = options.hold.ramp(torque, k);

@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 impl<S: Scalar> Settings<S> {
     /// A history of the encoders in which the axis has coasted up to `motion`, sampled every `dt` seconds.
     #[must_use]
-    pub fn settle_sensors(&self, on: &ActiveEffects, motion: Reading<S>, dt: f64) -> SensorHistory<S> {
+    pub fn initial_readings(&self, on: &ActiveEffects, motion: Reading<S>, dt: f64) -> SensorHistory<S> {
         SensorHistory::settled(motion, dt, self.filter(on))
     }
 

@@ -6,7 +6,7 @@ use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::determined::{is_simpler, is_undetermined, steadiness};
 use super::fit::Fit;
-use super::search::{ALIKE, MINOR, Search, is_more};
+use super::search::{ALIKE, MINOR, Search, is_extension};
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
 use crate::numerics::distribution::of_log_odds;
@@ -130,7 +130,7 @@ impl Search<'_> {
         // Of accounts that leave next to nothing of the gap the shorter is told.
         let little = self.leaves_little(&chosen);
         let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
-        pool.retain(|f| !(is_more(f, &chosen) || little && longer(f)));
+        pool.retain(|f| !(is_extension(f, &chosen) || little && longer(f)));
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
             return self.conclude(given, parameters, simple, pool);
@@ -183,7 +183,7 @@ impl Search<'_> {
             let pool: Vec<Fit> =
                 ranking.into_iter().map(|w| w.fit).filter(|f| f.terms.len() < chosen.terms.len()).collect();
             // The likeliest of the shorter: where one as good as it takes an effect's place it is another that is told, and no less explained.
-            let known = plainer(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
+            let known = nested_fit(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
             let plain = known.cloned().unwrap_or(refitted);
             let own = self.evidence(&plain, independent);
             let likelier = |f: &&Fit| !f.at_bound && !f.terms.is_empty() && self.evidence(f, independent) > own;
@@ -234,7 +234,7 @@ impl Search<'_> {
     /// without it: what no effect explains may be what explains this one, too. Less of it where the effect hardly stands out of a
     /// remainder of any colour.
     fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
-        let plain = if chosen.terms.len() == 1 { Some(parameters) } else { plainer(chosen, i, pool) };
+        let plain = if chosen.terms.len() == 1 { Some(parameters) } else { nested_fit(chosen, i, pool) };
         let Some(plain) = plain else { return 1.0 };
         let share = |e: usize| {
             let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
@@ -343,7 +343,7 @@ fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
 
 /// The likeliest fit of all effects of another but one, each in its form: another form of one may do what the missing one does, and
 /// which of the two it is the evidence says.
-fn plainer<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
+fn nested_fit<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
     let mut terms = fit.terms.clone();
     terms.remove(i);
     let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
@@ -435,7 +435,7 @@ mod tests {
             fit(&[CoulombMotor, ViscousMotor], 7.0),
             fit(&[Delay], 8.0),
         ];
-        let told = |i: usize| plainer(&all, i, &pool).map(|f| f.log_likelihood);
+        let told = |i: usize| nested_fit(&all, i, &pool).map(|f| f.log_likelihood);
         assert_eq!((told(0), told(1), told(2)), (None, Some(5.0), Some(7.0)));
     }
 

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
-use super::likelihood::{Band, C, Discrepancy, Lacking, Sight};
+use super::likelihood::{Band, C, Discrepancy, Sight, TorqueResidual};
 use super::scatter;
 use super::tracking::Bandwidth;
 use crate::axis::Structure;
@@ -39,7 +39,7 @@ const SHARPENING: usize = 6;
 #[derive(Clone)]
 pub struct Along {
     pub model: Model,
-    pub rows: Lacking,
+    pub rows: TorqueResidual,
     pub s: Discrepancy,
     pub bandwidth: Bandwidth,
 }
@@ -169,7 +169,7 @@ impl<'a> Descent<'a> {
         let share = self.share();
         let normal = self.normal(&x, share)?;
         let (coordinates, at) = (&self.coordinates, &self.at);
-        let cost = |l: &Lacking, s: Discrepancy, x: &[f64]| {
+        let cost = |l: &TorqueResidual, s: Discrepancy, x: &[f64]| {
             -band.log_likelihood(l, s) - problem.log_prior(coordinates, x) / share
         };
         let before = cost(&at.rows, at.s, &x);
@@ -204,7 +204,7 @@ impl<'a> Descent<'a> {
                 continue;
             }
             if let Some(rows) = problem.rows(&model, at.bandwidth) {
-                let s = band.carried(at.s, &at.model, &model);
+                let s = band.rescaled(at.s, &at.model, &model);
                 let after = cost(&rows, s, &y);
                 if after < before {
                     *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
@@ -329,7 +329,7 @@ fn scaled_with_the_table(
     band: &Band,
     coordinates: &[Coordinate],
     x: &[f64],
-    lacking: &Lacking,
+    residual: &TorqueResidual,
     columns: &mut [[Vec<C>; 2]],
 ) {
     if band.sight != Sight::Both {
@@ -337,7 +337,7 @@ fn scaled_with_the_table(
     }
     let of = |i: &usize| coordinates[*i].free == Free::Base(BaseParameter::I2);
     let Some(inertia) = (0..x.len()).find(of) else { return };
-    let mut rest = lacking.rows[1].clone();
+    let mut rest = residual.rows[1].clone();
     for i in (0..x.len()).filter(|&i| i != inertia && coordinates[i].scales_with_the_table()) {
         let rate = if coordinates[i].log { 1.0 } else { x[i] };
         for (rest, column) in rest.iter_mut().zip(&columns[i][1]) {

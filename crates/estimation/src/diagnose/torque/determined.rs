@@ -31,7 +31,7 @@ pub fn is_simpler(fit: &Fit, effect: Effect, independent: f64) -> bool {
     effect.simpler_at_zero().is_some_and(|shape| vanishes(fit, effect, shape, independent))
 }
 
-/// Whether the effect that the plainer lacks is not determined in the richer fit.
+/// Whether the effect that the nested fit lacks is not determined in the richer fit.
 pub fn is_lost(plain: &Fit, rich: &Fit, independent: f64) -> bool {
     rich.terms.iter().filter(|t| !plain.terms.contains(t)).all(|t| is_undetermined(rich, t.0, independent))
 }

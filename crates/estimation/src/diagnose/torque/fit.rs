@@ -10,7 +10,7 @@ use super::super::diagnosis::Hypothesis;
 use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::super::record::Record;
 use super::descent::{Along, Descent, differ};
-use super::likelihood::{Band, C, Discrepancy, Lacking, Motion};
+use super::likelihood::{Band, C, Discrepancy, Motion, TorqueResidual};
 use super::scales::Scales;
 use super::tracking::{Bandwidth, Resolution, Tracked, parts, track};
 use crate::axis::Structure;
@@ -20,7 +20,7 @@ use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 pub const PRIOR: f64 = 0.5;
 /// Largest change of a nominal parameter, in its logarithm: a factor of ten.
 pub const FARTHEST: f64 = 2.3;
-/// What a form that adds to a plainer one costs beside it: as much as an effect of its own, and a little more, so that of two accounts of
+/// What a form that adds to a nested one costs beside it: as much as an effect of its own, and a little more, so that of two accounts of
 /// one thing (an unlike friction either way, a bias) the one by effects of their own is told.
 const RICHER: f64 = 2.2;
 /// Least degrees of freedom that are counted: with fewer any account follows the record.
@@ -48,7 +48,7 @@ pub struct Fit {
     /// Standard error of each free value, in its unit, every value of the record taken as independent.
     pub std: Vec<f64>,
     /// What it lacks.
-    pub rows: Lacking,
+    pub rows: TorqueResidual,
     /// Columns of the coordinates, not whitened.
     pub columns: Vec<[Vec<C>; 2]>,
     /// Variance of what each equation lacks beyond the noise, (N.m)^2 a sample of the band.
@@ -174,9 +174,9 @@ impl Problem<'_> {
         })
     }
 
-    pub fn rows(&self, model: &Model, bandwidth: Bandwidth) -> Option<Lacking> {
+    pub fn rows(&self, model: &Model, bandwidth: Bandwidth) -> Option<TorqueResidual> {
         let tracked = self.track(model, bandwidth)?;
-        Some(PLANNER.with_borrow_mut(|planner| self.band.lacking(model, &tracked, planner)))
+        Some(PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, &tracked, planner)))
     }
 
     /// Step of a coordinate for its column.
@@ -207,7 +207,7 @@ impl Problem<'_> {
         &self,
         model: &Model,
         coordinates: &[Coordinate],
-        lacking: &Lacking,
+        residual: &TorqueResidual,
         bandwidth: Bandwidth,
     ) -> Option<Vec<[Vec<C>; 2]>> {
         let x: Vec<f64> = coordinates.iter().map(|c| c.x(model)).collect();
@@ -232,7 +232,7 @@ impl Problem<'_> {
                 let mut y = x.clone();
                 y[i] += h;
                 let moved = self.rows(&model.at(coordinates, &y), bandwidth)?;
-                Some([0, 1].map(|e| moved.rows[e].iter().zip(&lacking.rows[e]).map(|(a, b)| (a - b) / h).collect()))
+                Some([0, 1].map(|e| moved.rows[e].iter().zip(&residual.rows[e]).map(|(a, b)| (a - b) / h).collect()))
             })
             .collect()
     }
@@ -253,7 +253,7 @@ impl Problem<'_> {
     pub fn nothing(&self) -> Fit {
         let mut tracked = Tracked::nothing(self.record.len());
         tracked.torque[0].copy_from_slice(&self.record.torque);
-        let rows = PLANNER.with_borrow_mut(|planner| self.band.lacking(&self.nominal, &tracked, planner));
+        let rows = PLANNER.with_borrow_mut(|planner| self.band.torque_residual(&self.nominal, &tracked, planner));
         let s = self.band.discrepancy(&rows);
         self.unfitted(Along { model: self.nominal, rows, s, bandwidth: self.bandwidth(s) })
     }
@@ -384,7 +384,7 @@ impl Fit {
             model,
             std: vec![0.0; coordinates.len()],
             coordinates,
-            rows: Lacking::nothing(),
+            rows: TorqueResidual::nothing(),
             columns: Vec::new(),
             discrepancy: [1.0; 2],
             bandwidth: [1.0; 2],

@@ -16,7 +16,7 @@ use super::super::model::Model;
 use super::super::record::{CHANNELS, Record};
 use super::Prepared;
 use super::fit::Fit;
-use super::hidden::settle_all;
+use super::hidden::remove_any_vibration;
 use super::likelihood::Sight;
 use super::tracking::{Resolution, Run, start_states, track};
 use crate::numerics::level::deviation;
@@ -25,7 +25,7 @@ use crate::numerics::level::deviation;
 const WINDOW: usize = 512;
 /// Windows at most: a longer record is sampled by so many, spread evenly.
 const MOST: usize = 32;
-/// Parts of a record at least, for the interval of what is lacking in torque.
+/// Parts of a record at least, for the interval of the residual torque.
 const LEAST_PARTS: usize = 16;
 /// Resamplings of the block bootstrap.
 const RESAMPLINGS: usize = 400;
@@ -158,7 +158,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
     let n = record.len();
     let parts = (n / WINDOW).max(LEAST_PARTS).min(n);
     let ranges: Vec<std::ops::Range<usize>> = (0..parts).map(|p| p * n / parts..(p + 1) * n / parts).collect();
-    let (errors, lacking): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
+    let (errors, residuals): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
         .par_iter()
         .map(|fit| {
             let tracked = track(&fit.model, record, fit.bandwidth, Resolution::Full);
@@ -166,8 +166,8 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
                 return (vec![Errors::from_element(f64::INFINITY); parts], vec![[f64::NAN; 4]; n]);
             };
             let planner = &mut FftPlanner::new();
-            let mut rows = band.lacking(&fit.model, &tracked, planner).rows;
-            settle_all(band, &fits[2].model, &mut rows, planner);
+            let mut rows = band.torque_residual(&fit.model, &tracked, planner).rows;
+            remove_any_vibration(band, &fits[2].model, &mut rows, planner);
             let series = [0, 1].map(|i| band.in_time(&rows[i]));
             let power = |i: usize, r: &std::ops::Range<usize>| -> f64 {
                 series[i].get(r.clone()).map_or(0.0, |s| s.iter().map(|v| v * v).sum())
@@ -201,7 +201,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
         closure: closure(total[0], total[2], floor),
         closure_of_effect: closure(total[1], total[2], floor),
         interval: bootstrap(&ranges, [&errors[0], &errors[2]], &closure_of),
-        runs: [lacking[0].clone(), lacking[2].clone()],
+        runs: [residuals[0].clone(), residuals[2].clone()],
         covered: ranges,
         initial: [0.0; 4],
     }

@@ -2,7 +2,7 @@
 //!
 //! Held at its place, such an inertia swings freely with `I y'' + B y' + K y = 0`, `y` its position relative to the place. How it swung
 //! when the record began is not known: its torque then has two decaying sines in it, whose sizes belong to the record and to no
-//! hypothesis. What the lacking torque has of those is taken out of it (variable projection: Golub, Pereyra, SIAM J. Numer. Anal. 10, 1973).
+//! hypothesis. What the residual torque has of those is taken out of it (variable projection: Golub, Pereyra, SIAM J. Numer. Anal. 10, 1973).
 
 use rustfft::FftPlanner;
 
@@ -86,26 +86,32 @@ impl Hidden {
 
 /// Takes out of the rows of a model what its inertias without an encoder began with. A third inertia is no part of the axis, but an effect:
 /// it swings at most as it does later along the motion, lest the smallest explain anything that dies away.
-pub fn settle(band: &Band, model: &Model, motion: &[[f64; 4]], rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+pub fn remove_vibration(
+    band: &Band,
+    model: &Model,
+    motion: &[[f64; 4]],
+    rows: &mut [Vec<C>; 2],
+    planner: &mut FftPlanner<f64>,
+) {
     if let Some(hidden) = Hidden::across(model, band.sides()) {
-        take_vibration(band, &hidden, f64::INFINITY, rows, planner);
+        project_out(band, &hidden, f64::INFINITY, rows, planner);
     }
     for hidden in Hidden::modes(model, band.sides()) {
         let along: Vec<f64> = motion.iter().map(|m| m[2 * hidden.side]).collect();
         let most = largest(&hidden.pull(&along, band.dt));
-        take_vibration(band, &hidden, most, rows, planner);
+        project_out(band, &hidden, most, rows, planner);
     }
 }
 
 /// The same without bound: on a record that no fit has seen a model may have been swinging in any way.
-pub fn settle_all(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+pub fn remove_any_vibration(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
     for hidden in Hidden::of(model, band.sides()) {
-        take_vibration(band, &hidden, f64::INFINITY, rows, planner);
+        project_out(band, &hidden, f64::INFINITY, rows, planner);
     }
 }
 
 /// Takes out a free vibration from the record's first sample, its torque there at most so large, N.m.
-fn take_vibration(band: &Band, hidden: &Hidden, most: f64, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
+fn project_out(band: &Band, hidden: &Hidden, most: f64, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
     // Faster than the record shows it is no part of the band.
     let Some(of) = hidden.vibration().filter(|of| of.im * band.dt < std::f64::consts::PI) else { return };
     let step = (of * band.dt).exp();

@@ -1,6 +1,6 @@
 //! The likelihood of what a model lacks: sensor noise and model discrepancy, in the band of the motion.
 //!
-//! The lacking torques `r` of [`super::tracking`] are tapered and transformed. At a frequency their covariance is
+//! The residual torques `r` of [`super::tracking`] are tapered and transformed. At a frequency their covariance is
 //!
 //! ```text
 //! C = D N D^H + diag(s1^2, s2^2),   N = diag(n1, n2) + n12 [1 1; 1 1]
@@ -16,7 +16,7 @@ use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::super::model::{BaseParameter, Model};
 use super::super::record::Record;
-use super::hidden::settle;
+use super::hidden::remove_vibration;
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
 use crate::numerics::level::deviation;
@@ -77,7 +77,7 @@ pub struct Weight {
 
 /// What a model lacks, with how its own stiffness shows the noise in it.
 #[derive(Debug, Clone)]
-pub struct Lacking {
+pub struct TorqueResidual {
     /// Spectra of the equations.
     pub rows: [Vec<C>; 2],
     /// What the noise makes in them.
@@ -218,7 +218,7 @@ impl Band {
     pub fn score(
         &self,
         model: &Model,
-        lacking: &Lacking,
+        residual: &TorqueResidual,
         s: Discrepancy,
         base: &[(BaseParameter, f64, usize)],
         columns: &mut [[Vec<C>; 2]],
@@ -235,13 +235,13 @@ impl Band {
             })
             .collect();
         for (m, weight) in self.weight.iter().enumerate() {
-            let (a, b, c, _) = self.factor(lacking.weights[m], s);
+            let (a, b, c, _) = self.factor(residual.weights[m], s);
             let v = self.visible(&model.parameters, m);
             // C^-1 r = L^-H L^-1 r, and the readings' share of it: with N the readings' noise
             // E = V^-1 (V N V^H) C^-1 r = N V^H C^-1 r.
-            let r0 = lacking.rows[0][m];
+            let r0 = residual.rows[0][m];
             let z0 = r0 * a;
-            let z1 = if both { b * r0 + lacking.rows[1][m] * c } else { C::default() };
+            let z1 = if both { b * r0 + residual.rows[1][m] * c } else { C::default() };
             let y = [z0 * a + b.conj() * z1, z1 * c];
             let n = self.seen(m);
             let e = if both {
@@ -301,7 +301,7 @@ impl Band {
     }
 
     /// Spectra of the equations.
-    pub fn lacking(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> Lacking {
+    pub fn torque_residual(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> TorqueResidual {
         let torque = &tracked.torque;
         let mut z: Vec<C> = (0..self.n).map(|k| C::new(torque[0][k], torque[1][k]) * self.taper[k]).collect();
         planner.plan_fft_forward(self.n).process(&mut z);
@@ -323,8 +323,8 @@ impl Band {
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };
-        settle(self, model, &tracked.motion, &mut rows, planner);
-        Lacking { rows, weights: self.weights(model), alike }
+        remove_vibration(self, model, &tracked.motion, &mut rows, planner);
+        TorqueResidual { rows, weights: self.weights(model), alike }
     }
 
     /// Real product of rows, each frequency at its weight.
@@ -402,7 +402,7 @@ impl Band {
     }
 
     /// Half the sum of squares of the whitened rows.
-    pub fn half_squares(&self, l: &Lacking, s: Discrepancy) -> f64 {
+    pub fn half_squares(&self, l: &TorqueResidual, s: Discrepancy) -> f64 {
         0.5 * self.whiten(&l.rows, &l.weights, s).iter().map(|v| v * v).sum::<f64>()
     }
 
@@ -447,7 +447,7 @@ impl Band {
 
     /// The discrepancy of largest likelihood: the best of some sizes of it for both equations alike, then scoring for each as long as
     /// that helps.
-    pub fn discrepancy(&self, l: &Lacking) -> Discrepancy {
+    pub fn discrepancy(&self, l: &TorqueResidual) -> Discrepancy {
         let rows = &l.rows;
         let eqs = self.equations();
         let total: f64 = self.weight.iter().sum();
@@ -482,13 +482,13 @@ impl Band {
     ///
     /// No torque that is known acts on the table, so that its equation tells its parameters up to a common factor, and its discrepancy as a
     /// torque grows with that factor. Held as a torque it would hold the factor, which the motor's equation alone tells.
-    pub fn carried(&self, s: Discrepancy, from: &Model, to: &Model) -> Discrepancy {
+    pub fn rescaled(&self, s: Discrepancy, from: &Model, to: &Model) -> Discrepancy {
         let grown = if self.sight == Sight::Both { to.parameters.i2 / from.parameters.i2 } else { 1.0 };
         [s[0], s[1] * grown * grown]
     }
 
     /// A step of scoring from a discrepancy.
-    fn scored(&self, l: &Lacking, s: Discrepancy) -> Discrepancy {
+    fn scored(&self, l: &TorqueResidual, s: Discrepancy) -> Discrepancy {
         let rows = &l.rows;
         let eqs = self.equations();
         let (mut num, mut den) = ([0.0; 2], [0.0; 2]);
@@ -525,7 +525,7 @@ impl Band {
     }
 
     /// Log likelihood at that discrepancy.
-    pub fn log_likelihood(&self, l: &Lacking, s: Discrepancy) -> f64 {
+    pub fn log_likelihood(&self, l: &TorqueResidual, s: Discrepancy) -> f64 {
         -self.half_squares(l, s) - self.log_det(&l.weights, s)
     }
 
@@ -535,7 +535,7 @@ impl Band {
     }
 
     /// Share of the values that are independent: of a residual whose power is spread unevenly fewer are.
-    pub fn independent(&self, l: &Lacking, s: Discrepancy) -> f64 {
+    pub fn independent(&self, l: &TorqueResidual, s: Discrepancy) -> f64 {
         let z = self.whiten(&l.rows, &l.weights, s);
         let per = 2 * self.equations();
         let mut share = 0.0;
@@ -564,17 +564,17 @@ impl Band {
     }
 
     /// Rms of the residual over that of the noise, each frequency at its weight.
-    pub fn noise_multiple(&self, l: &Lacking) -> f64 {
+    pub fn noise_multiple(&self, l: &TorqueResidual) -> f64 {
         let z = self.whiten(&l.rows, &l.weights, [0.0; 2]);
         (z.iter().map(|v| v * v).sum::<f64>() / self.values()).sqrt()
     }
 
     /// Whether a residual is at the noise's floor, which is an estimate itself.
-    pub fn at_floor(&self, l: &Lacking) -> bool {
+    pub fn at_floor(&self, l: &TorqueResidual) -> bool {
         self.noise_multiple(l).powi(2) < AT_FLOOR
     }
 
-    /// Rms in the band of the torque lacking beyond what the noise makes, N.m; of two equations together.
+    /// Rms in the band of the residual torque beyond what the noise makes, N.m; of two equations together.
     pub fn torque_rms(&self, s: Discrepancy) -> f64 {
         let samples = 2.0 * self.weight.iter().sum::<f64>() / self.n as f64;
         (s.iter().take(self.equations()).sum::<f64>() * samples).sqrt()
@@ -638,7 +638,7 @@ impl Band {
 }
 
 #[cfg(test)]
-impl Lacking {
+impl TorqueResidual {
     /// Nothing lacking in no band.
     pub fn nothing() -> Self {
         Self { rows: [Vec::new(), Vec::new()], weights: Vec::new(), alike: [1.0; 2] }

@@ -32,10 +32,10 @@ use super::assess::{Case, HELD_OUT, Outcome, Replay};
 use super::diagnosis::{
     AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Remainder, Site, Where,
 };
-use super::lattice;
 use super::location::{Location, Residual, along, without_offset};
 use super::model::{BaseParameter, Free, Model};
 use super::overlay::Overlay;
+use super::quantisation;
 use super::record::{CHANNELS, Record, TORQUE};
 use super::repair::bridged;
 use super::verdict::Verdict;
@@ -124,7 +124,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let located = located(&searched, &models[1], decision.parameters.bandwidth);
     let closure = |of, fit: &Fit| gap::closure_by(of, &held, &seen, [fits[0], fits[1], fit]);
     let mut diagnosis = build(case, &decision, &searched, &closure, &on_train, &on_held, located);
-    lattice::judge(case, &mut diagnosis);
+    quantisation::attribute(case, &mut diagnosis);
     let mut overlays = overlays(&held, on_held.shown());
     let of_torque = seen.torque_overlay(on_held.by(ClosureOf::Torque));
     let first = if on_held.headline().of == ClosureOf::Torque { 0 } else { overlays.len() };
@@ -134,7 +134,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
 }
 
 /// What a model lacks along the record, in the band, and where that shows.
-fn lacked(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
+fn residual_torque(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
     let tracked =
         track(model, &p.record, bandwidth, Resolution::Full).unwrap_or_else(|| Tracked::nothing(p.record.len()));
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
@@ -143,7 +143,7 @@ fn lacked(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f6
 }
 
 fn remains(p: &Prepared, fit: &Fit) -> Remainder {
-    let (tracked, series, site) = lacked(p, &fit.model, fit.bandwidth);
+    let (tracked, series, site) = residual_torque(p, &fit.model, fit.bandwidth);
     let shown = &series[usize::from(site == Site::At(Place::Table))];
     Remainder {
         torque_rms: p.band.torque_rms(fit.discrepancy),
@@ -270,7 +270,7 @@ impl Prepared {
 
 /// Where the torque that a model lacks shows along the record.
 fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
-    let (tracked, series, site) = lacked(p, model, bandwidth);
+    let (tracked, series, site) = residual_torque(p, model, bandwidth);
     let mut residual = residual(&series[0], &tracked);
     if model.structure == Structure::TwoInertia {
         let [_, r2] = series;

@@ -13,7 +13,7 @@
 use std::ops::Range;
 
 use super::fit::{Fit, PRICE};
-use super::likelihood::{Band, Lacking};
+use super::likelihood::{Band, TorqueResidual};
 use super::search::Search;
 use crate::numerics::distribution::of_log_odds;
 
@@ -42,9 +42,9 @@ fn gain(weight: &[f64], with: &[f64], without: &[f64]) -> f64 {
 }
 
 /// Power of what lacks at each bin, in units of the noise there, for each equation.
-fn powers(band: &Band, lacking: &Lacking) -> Vec<Vec<f64>> {
+fn powers(band: &Band, residual: &TorqueResidual) -> Vec<Vec<f64>> {
     let equations = band.equations();
-    let white = band.whiten(&lacking.rows, &lacking.weights, [0.0; 2]);
+    let white = band.whiten(&residual.rows, &residual.weights, [0.0; 2]);
     let of = |equation: usize| {
         let bins = white.chunks_exact(2 * equations).zip(&band.weight);
         bins.map(|(z, w)| (z[2 * equation].powi(2) + z[2 * equation + 1].powi(2)) / (2.0 * w)).collect()

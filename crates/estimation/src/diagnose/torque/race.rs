@@ -8,7 +8,7 @@ use super::search::{ALIKE, Search};
 /// Fits that go on.
 const RACING: usize = 4;
 /// Variance of what a few steps leave, over that of the best, from which no further ones are made.
-const HOPELESS: f64 = 30.0;
+const OUT_OF_RACE: f64 = 30.0;
 /// Steps between two looks at how a fit stands beside the others.
 const ROUND: usize = 8;
 /// Times the gain of its last steps that a fit may be behind the best: no further does it come.
@@ -21,8 +21,8 @@ impl Search<'_> {
         let evidence = |f: &Fit| self.evidence(f, share);
         fits.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
         let best = rival.or(fits.first()).map_or([0.0; 2], |f| f.discrepancy);
-        let hopeless = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > HOPELESS * best[i]);
-        let mut racing: Vec<usize> = (0..fits.len().min(RACING)).filter(|i| !hopeless(&fits[*i])).collect();
+        let is_out = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > OUT_OF_RACE * best[i]);
+        let mut racing: Vec<usize> = (0..fits.len().min(RACING)).filter(|i| !is_out(&fits[*i])).collect();
         let mut first = rival.map_or(f64::NEG_INFINITY, evidence);
         for _ in 0..STEPS / ROUND {
             let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);

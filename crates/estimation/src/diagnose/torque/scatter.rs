@@ -18,13 +18,13 @@ pub type Series = Vec<Vec<f64>>;
 /// prior's; `None` where the information is singular.
 pub fn standard_errors(columns: &[Series], residual: &Series, information: &DMatrix<f64>) -> Option<Vec<f64>> {
     let k = columns.len();
-    let pulls: Vec<[f64; STRETCHES]> = columns.iter().map(|column| about_mean(pulls(column, residual))).collect();
+    let scores: Vec<[f64; STRETCHES]> = columns.iter().map(|column| centred(scores(column, residual))).collect();
     let freedom = STRETCHES as f64 / (STRETCHES as f64 - 1.0);
     // In units in which the information has a unit diagonal.
     let scale: Vec<f64> = (0..k).map(|i| information[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = |p: usize, q: usize, value: f64| value / (scale[p] * scale[q]);
     let spread = DMatrix::from_fn(k, k, |p, q| {
-        scaled(p, q, freedom * pulls[p].iter().zip(&pulls[q]).map(|(a, b)| a * b).sum::<f64>())
+        scaled(p, q, freedom * scores[p].iter().zip(&scores[q]).map(|(a, b)| a * b).sum::<f64>())
     });
     let inverse = DMatrix::from_fn(k, k, |p, q| scaled(p, q, information[(p, q)])).cholesky()?.inverse();
     let covariance = &inverse * spread * &inverse;
@@ -32,7 +32,7 @@ pub fn standard_errors(columns: &[Series], residual: &Series, information: &DMat
 }
 
 /// The score's part from each stretch.
-fn pulls(column: &Series, residual: &Series) -> [f64; STRETCHES] {
+fn scores(column: &Series, residual: &Series) -> [f64; STRETCHES] {
     std::array::from_fn(|stretch| {
         let of_equation = |(c, r): (&Vec<f64>, &Vec<f64>)| -> f64 {
             let at = |b: usize| b * r.len() / STRETCHES;
@@ -50,7 +50,7 @@ pub fn steadiness(errors: f64, price: f64) -> f64 {
     of_log_odds(gained)
 }
 
-fn about_mean(values: [f64; STRETCHES]) -> [f64; STRETCHES] {
+fn centred(values: [f64; STRETCHES]) -> [f64; STRETCHES] {
     let mean = values.iter().sum::<f64>() / STRETCHES as f64;
     values.map(|v| v - mean)
 }

@@ -43,7 +43,7 @@ const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
 /// Simulated steps after which what was found is only added to: half a minute to a minute on two cores, on one record in fifty.
-const WORK: u64 = 150_000_000;
+const BUDGET: u64 = 150_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
@@ -86,7 +86,7 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
         // What it is likelier than must be known.
         search.extended(&parameters, 0, &mut pool);
     }
-    let mut chosen = search.climb(known.unwrap_or_else(|| parameters.clone()), &mut pool);
+    let mut chosen = search.stepwise(known.unwrap_or_else(|| parameters.clone()), &mut pool);
     if !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
         // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
@@ -97,25 +97,25 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
         let share = search.independent(&textbook);
         let rivals: Vec<Fit> = textbook.into_iter().filter(|f| f.terms.len() <= most).collect();
         if let Some(first) = search.best(&rivals, share).filter(|f| f.terms != chosen.terms).cloned() {
-            let other = search.climb(first, &mut pool);
+            let other = search.stepwise(first, &mut pool);
             if search.is_likelier(&other, &chosen) {
                 chosen = other;
             }
         }
     }
     // Several at once follow any torque by some way: they are believed where they explain it.
-    let ahead = search.ahead(chosen.clone(), &mut pool);
-    if search.is_exact(&ahead) && search.is_likelier(&ahead, &chosen) {
-        chosen = search.climb(ahead, &mut pool);
+    let forward = search.forward(chosen.clone(), &mut pool);
+    if search.is_exact(&forward) && search.is_likelier(&forward, &chosen) {
+        chosen = search.stepwise(forward, &mut pool);
     }
     // What was fitted along the way, and is likelier than where the way led, is gone on from.
     for _ in 0..AGAIN {
-        if search.is_tired() {
+        if search.is_over_budget() {
             break;
         }
-        let Some(better) = search.overlooked(&chosen, &pool) else { break };
+        let Some(better) = search.better_in_pool(&chosen, &pool) else { break };
         let better = search.pruned(better, &mut pool);
-        let other = search.climb(better, &mut pool);
+        let other = search.stepwise(better, &mut pool);
         if other.terms == chosen.terms {
             break;
         }
@@ -133,10 +133,10 @@ impl Search<'_> {
 
     /// Whether enough was simulated for what was found to be only added to. Asked between two looks alone, where it is the same on any
     /// number of threads.
-    fn is_tired(&self) -> bool {
-        let tired = self.problem.steps() > WORK;
-        self.cut_short.fetch_or(tired, Ordering::Relaxed);
-        tired
+    fn is_over_budget(&self) -> bool {
+        let over = self.problem.steps() > BUDGET;
+        self.cut_short.fetch_or(over, Ordering::Relaxed);
+        over
     }
 
     /// What causes are measured by: what the axis lacks with its parameters alone, but no more than the torque itself, and without a
@@ -213,7 +213,7 @@ impl Search<'_> {
     }
 
     /// Adds, drops and exchanges effects as long as the evidence grows.
-    fn climb(&self, from: Fit, pool: &mut Pool) -> Fit {
+    fn stepwise(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
         let mut passed: Vec<Vec<Term>> = Vec::new();
         for _ in 0..2 * MOST {
@@ -231,7 +231,7 @@ impl Search<'_> {
                 best = self.pruned(next, pool);
                 continue;
             }
-            if self.is_tired() {
+            if self.is_over_budget() {
                 break;
             }
             // What was named first was named without the others, however little they leave together.
@@ -252,21 +252,21 @@ impl Search<'_> {
     }
 
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
-    fn overlooked(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
+    fn better_in_pool(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
         if self.at_floor(chosen) || self.is_negligible(chosen) {
             return None;
         }
         let share = self.independent(std::slice::from_ref(chosen));
         let most = self.longest_beside(chosen);
         let rivals: Vec<Fit> =
-            pool.fits().iter().filter(|f| !is_more(f, chosen) && f.terms.len() <= most).cloned().collect();
+            pool.fits().iter().filter(|f| !is_extension(f, chosen) && f.terms.len() <= most).cloned().collect();
         let best = self.best(&rivals, share)?;
         (self.evidence(best, share) > self.evidence(chosen, share) + ALIKE).then(|| best.clone())
     }
 
     /// The fit with the effect that explains the most beside it; `None` where none is a material cause.
     fn joined(&self, best: &Fit, pool: &mut Pool) -> Option<Fit> {
-        if best.terms.len() >= MOST || self.problem.steps() > 2 * WORK {
+        if best.terms.len() >= MOST || self.problem.steps() > 2 * BUDGET {
             return None;
         }
         let added = self.extended(best, best.terms.len(), pool);
@@ -280,9 +280,9 @@ impl Search<'_> {
 
     /// Effects added as if all that is left were independent, and dropped at the end where it is not: each of several large causes leaves
     /// what the others do, beside which it earns next to nothing on its own.
-    fn ahead(&self, from: Fit, pool: &mut Pool) -> Fit {
+    fn forward(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut at = from;
-        let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_tired();
+        let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_over_budget();
         while at.terms.len() < MOST && !ends(&at) {
             let mut all = self.extended(&at, at.terms.len(), pool);
             all.retain(|f| self.is_material(&at, f));
@@ -351,7 +351,7 @@ impl Search<'_> {
         held.into_iter().chain(freed).collect()
     }
 
-    /// Whether the richer explains a material part of what the plainer leaves, of the gap and of the torque.
+    /// Whether the richer explains a material part of what the nested one leaves, of the gap and of the torque.
     fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
@@ -531,7 +531,7 @@ impl Search<'_> {
 }
 
 /// Whether a fit has all effects of another, and more.
-pub fn is_more(fit: &Fit, than: &Fit) -> bool {
+pub fn is_extension(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
@@ -555,9 +555,9 @@ mod tests {
     #[test]
     fn a_fit_is_more_than_another_when_it_has_all_its_effects_in_any_form_and_further_ones() {
         let (coulomb, viscous) = (Effect::CoulombMotor, Effect::ViscousMotor);
-        assert!(is_more(&fit(&[(coulomb, 1), (viscous, 0)]), &fit(&[(coulomb, 0)])));
-        assert!(!is_more(&fit(&[(coulomb, 1)]), &fit(&[(coulomb, 0)])));
-        assert!(!is_more(&fit(&[(coulomb, 0), (viscous, 0)]), &fit(&[(Effect::Delay, 0)])));
+        assert!(is_extension(&fit(&[(coulomb, 1), (viscous, 0)]), &fit(&[(coulomb, 0)])));
+        assert!(!is_extension(&fit(&[(coulomb, 1)]), &fit(&[(coulomb, 0)])));
+        assert!(!is_extension(&fit(&[(coulomb, 0), (viscous, 0)]), &fit(&[(Effect::Delay, 0)])));
     }
 
     #[test]

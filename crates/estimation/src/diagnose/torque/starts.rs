@@ -83,7 +83,7 @@ impl Regression {
         Self { q, z, s, weights: fit.rows.weights.clone() }
     }
 
-    /// Coefficients of columns for the lacking torque to vanish, and the gain in log likelihood; negative coefficients where not allowed are dropped.
+    /// Coefficients of columns for the residual torque to vanish, and the gain in log likelihood; negative coefficients where not allowed are dropped.
     fn solve(&self, p: &Problem<'_>, columns: &[[Vec<C>; 2]], signed: &[bool]) -> Option<(Vec<f64>, f64)> {
         let j: Vec<Vec<f64>> = columns
             .iter()
@@ -122,7 +122,7 @@ impl Regression {
         Some((c, gain))
     }
 
-    /// Size of one column for the lacking torque to vanish, and the gain in log likelihood.
+    /// Size of one column for the residual torque to vanish, and the gain in log likelihood.
     fn alone(&self, p: &Problem<'_>, column: &[Vec<C>; 2]) -> Option<(f64, f64)> {
         let v = p.band.whiten(column, &self.weights, self.s);
         let own = dot(&v, &v) - self.q.iter().map(|q| dot(q, &v).powi(2)).sum::<f64>();

@@ -21,7 +21,7 @@ use crate::effects::TorqueHistory;
 /// What the model lacks, and the motion it was lacking it along.
 #[derive(Debug, Clone)]
 pub struct Tracked {
-    /// Torque lacking at motor and table, N.m; the second is zero on a rigid axis.
+    /// Residual torque at motor and table, N.m; the second is zero on a rigid axis.
     pub torque: [Vec<f64>; 2],
     /// Motion of the model: `[theta1, omega1, theta2, omega2]`.
     pub motion: Vec<[f64; 4]>,
@@ -104,7 +104,7 @@ fn track_with(
     let mut state = axis.resume(first, &model.memory, record.start + ahead);
     let mut inputs = TorqueHistory::settled(*record.torque.first()?);
     let sensed = !axis.on().sensors().is_empty();
-    let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), dt));
+    let mut history = sensed.then(|| model.effects.initial_readings(axis.on(), state.reading(), dt));
     let mut error = [vec![0.0; n], vec![0.0; n]];
     let mut given = [vec![0.0; n], vec![0.0; n]];
     let mut motion = Vec::with_capacity(n);
@@ -165,14 +165,14 @@ fn track_with(
             return None;
         }
     }
-    let torque = lacking(model, dt, inertia, &sides, &error, given);
+    let torque = torque_residual(model, dt, inertia, &sides, &error, given);
     // Squares of what is larger than this are no numbers.
     let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
     bounded.then_some((Tracked { torque, motion }, memories))
 }
 
 /// Adds `D e` to what was given: along the sides that are measured, what follows them without an encoder goes along.
-fn lacking(
+fn torque_residual(
     model: &Model,
     dt: f64,
     inertia: [f64; 2],
@@ -280,7 +280,7 @@ impl Run {
             }
         }
         let sensed = !axis.on().sensors().is_empty();
-        let mut history = sensed.then(|| model.effects.settle_sensors(axis.on(), state.reading(), record.dt));
+        let mut history = sensed.then(|| model.effects.initial_readings(axis.on(), state.reading(), record.dt));
         let mut out = Vec::with_capacity(range.len());
         for k in range.clone() {
             let r = match &history {
