@@ -148,3 +148,44 @@ fn what_cannot_be_run_says_what_is_missing() {
     says(&["diagnose", "mill", "--output", "out", "--part", "press/2026-03-09.csv"], "--part press/2026-03-09.csv");
     says(&["diagnose", "mill", "--output", "mill/axis.toml"], "cannot make the folder");
 }
+
+#[test]
+fn each_machine_is_told_in_the_unit_of_its_log() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = machines(root.path());
+    for entry in std::fs::read_dir(folder.join("mill")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            let text = String::from_utf8(read(&path)).unwrap().replacen("T [N.m]", "T [A]", 1);
+            std::fs::write(&path, text).unwrap();
+        }
+    }
+    let run = eixo_in(root.path(), &["identify", "machines", "--method", "oe", "--output", "found"]);
+    assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
+    let text = String::from_utf8(read(root.path().join("found/summary.csv"))).unwrap();
+    let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let inertia: Vec<&&str> = head.iter().filter(|name| name.starts_with("I1")).collect();
+    assert_eq!(
+        inertia,
+        [&"I1 [A.s2/rad]", &"I1_std [A.s2/rad]", &"I1 [kg.m2]", &"I1_std [kg.m2]", &"I1_change"],
+        "{text}"
+    );
+    assert_eq!(text.lines().count(), 9, "{text}");
+    let column = |name: &str| head.iter().position(|h| *h == name).unwrap();
+    for row in text.lines().skip(1).filter(|row| row.contains(",done,")) {
+        // A comma within quotes parts no cells.
+        let quoted = |(k, part): (usize, &str)| if k % 2 == 1 { part.replace(',', ";") } else { part.to_owned() };
+        let plain: String = row.split('"').enumerate().map(quoted).collect();
+        let cells: Vec<&str> = plain.split(',').collect();
+        let (own, other) =
+            if row.starts_with("mill") { ("K [A/rad]", "K [N.m/rad]") } else { ("K [N.m/rad]", "K [A/rad]") };
+        assert!(!cells[column(own)].is_empty() && cells[column(other)].is_empty(), "{row}");
+    }
+    let index = String::from_utf8(read(root.path().join("found/index.html"))).unwrap();
+    assert!(index.contains("A·s²/rad") && index.contains("kg·m²"));
+    for entry in std::fs::read_dir(root.path().join("found/results")).unwrap() {
+        let result = String::from_utf8(read(entry.unwrap().path())).unwrap();
+        let (amperes, torques) = (result.contains("\"A.s2/rad\""), result.contains("\"kg.m2\""));
+        assert!(!(amperes && torques), "a result in two units");
+    }
+}

@@ -286,3 +286,48 @@ fn a_foreign_log_goes_from_init_to_a_verdict_without_an_editor() {
     assert_eq!(done.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&done.stderr).contains("--force"));
 }
+
+#[test]
+fn a_number_of_the_drive_without_a_unit_is_in_counts_and_never_in_newton_metres() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("arm")).unwrap();
+    let mut text = String::from("t_s,load_raw,pos_rad\n");
+    for k in 0..4000 {
+        let t = f64::from(k) * 1e-3;
+        let (mut v, mut x, mut a) = (0.0, 0.0, 0.0);
+        for (amplitude, w) in [(0.5, 3.0), (0.1, 11.0), (0.03, 37.0)] {
+            let (s, c) = f64::sin_cos(w * t);
+            x += amplitude * s;
+            v += amplitude * w * c;
+            a -= amplitude * w * w * s;
+        }
+        writeln!(text, "{t:.3},{:.2},{x:.7}", 7.0 * a + 58.0 * v).unwrap();
+    }
+    std::fs::write(folder.path().join("arm/2026-03-01.csv"), text).unwrap();
+    let done = run::eixo_in(folder.path(), &["init", "arm/2026-03-01.csv", "--yes"]);
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert_eq!(done.status.code(), Some(0), "{said}{}", String::from_utf8_lossy(&done.stderr));
+    assert!(said.contains("not given: counts"), "{said}");
+    let axis = std::fs::read_to_string(folder.path().join("arm/axis.toml")).unwrap();
+    assert!(axis.contains("column = \"load_raw\", unit = \"counts\"") && axis.contains("counts.s2/rad"), "{axis}");
+    // The machine of a log that is called by its date is the folder.
+    assert!(axis.contains("name = \"arm\""), "{axis}");
+    let done = run::eixo_in(
+        folder.path(),
+        &[
+            "identify",
+            "arm/2026-03-01.csv",
+            "--axis",
+            "arm/axis.toml",
+            "--report",
+            "found.html",
+            "--json",
+            "found.json",
+        ],
+    );
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(said.contains("counts.s2/rad") && !said.contains("kg.m2"), "{said}");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(read("found.html").contains("counts·s²/rad") && !read("found.html").contains("kg·m²"));
+    assert!(read("found.json").contains("\"counts.s2/rad\"") && !read("found.json").contains("kg.m2"));
+}

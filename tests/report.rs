@@ -323,6 +323,46 @@ fn a_link_leads_to_a_plain_path_beside_the_page_or_is_text() {
 }
 
 #[test]
+fn a_reference_line_is_named_in_the_legend_and_only_far_off_in_the_plot() {
+    let drawn = |at: f64| {
+        let chart = Chart::new("t", Axis::linear("x", ""), Axis::linear("y", ""))
+            .with(Series::line("data", vec![0.0, 1.0], vec![-1.0, 1.0]))
+            .mark(Mark::Y(at, "the noise".into()));
+        let sections = vec![Section::new("", vec![Block::Figure(Figure::new(chart, ""))])];
+        html::page(&Report { sections, ..Report::default() })
+    };
+    let page = drawn(0.5);
+    let legend = page.split("<ul class=\"legend\">").nth(1).and_then(|s| s.split("</ul>").next()).expect("a legend");
+    assert!(legend.contains("the noise") && legend.contains("class=\"mark\""), "{legend}");
+    assert_eq!(legend.matches("data-s=").count(), 1, "a line is not switched off as a series is");
+    let plots = drawings(&page);
+    assert!(plots.iter().all(|svg| !svg.contains("the noise</text>")), "it stands in the data");
+    assert!(drawings(&drawn(1e3)).iter().any(|svg| svg.contains("the noise ↑</text>")));
+}
+
+#[test]
+fn a_figure_that_is_alone_in_its_row_is_drawn_for_the_whole_width() {
+    let chart = Chart::new("t", Axis::linear("x", ""), Axis::linear("y", "")).with(Series::line(
+        "data",
+        vec![0.0, 1.0],
+        vec![-1.0, 1.0],
+    ));
+    let page =
+        |block: Block| html::page(&Report { sections: vec![Section::new("", vec![block])], ..Report::default() });
+    let figure = Figure::new(chart, "");
+    assert_eq!(page(Block::Figures(vec![figure.clone()])), page(Block::Figure(figure)));
+}
+
+#[test]
+fn a_heading_can_be_broken_within_the_name_of_a_parameter() {
+    let mut table = Table::new("t", ["drift of viscous_motor.coefficient"]);
+    table.row(vec![Cell::Percent(0.1)]);
+    let sections = vec![Section::new("", vec![Block::Table(table)])];
+    let page = html::page(&Report { sections, ..Report::default() });
+    assert!(page.contains(">drift of viscous_<wbr>motor.<wbr>coefficient<wbr></th>"), "{page}");
+}
+
+#[test]
 fn the_page_fetches_nothing_and_runs_its_own_script_alone() {
     let page = html::page(&example(200, "axis X"));
     assert!(page.contains("default-src 'none'"));

@@ -187,7 +187,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let inputs = args.traces.iter().map(PathBuf::as_path).chain(args.axis.as_deref()).chain(args.holdout.as_deref());
     outputs::check(inputs, [], [args.json.as_ref(), args.report.as_ref(), args.fmu.as_ref()])?;
     let trace = args.traces.first().context("no trace given")?;
-    let axis = args.axis.as_deref().context("--axis is missing: the nominal axis, as in --axis axis.toml")?;
+    let axis = args
+        .axis
+        .as_deref()
+        .context("--axis is missing: the nominal axis, as in --axis axis.toml; `eixo init` writes one from the log")?;
     let steps = args.progress.steps();
     let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| steps.step(what))?;
     steps.end();
@@ -196,7 +199,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let outcome = &diagnosed.outcome;
     out!("{}", terminal::blocks(&diagnosed.driven.blocks(short(&findings)), layout(WIDTH)))?;
     if let Some(path) = &args.json {
-        let mut text = serde_json::to_string_pretty(&contract::value(&outcome.diagnosis, &diagnosed.warnings))?;
+        let mut text = serde_json::to_string_pretty(
+            &diagnosed.driven.units(contract::value(&outcome.diagnosis, &diagnosed.warnings)),
+        )?;
         text.push('\n');
         write_text(path, text.as_bytes())?;
     }
@@ -236,7 +241,8 @@ fn found(diagnosed: &Diagnosed) -> Found {
         json!(held.after),
         json!(held.noise_floor),
     ];
-    let tracked = |name: String, e: &Estimate| Tracked { name, unit: e.unit.to_owned(), value: e.value, std: e.std };
+    let driven = &diagnosed.driven;
+    let tracked = |name: String, e: &Estimate| Tracked { name, unit: driven.words(e.unit), value: e.value, std: e.std };
     let base = d.parameters.iter().map(|p| tracked(p.parameter.name().to_owned(), &p.fitted));
     let of_causes = d.causes.iter().flat_map(|c| c.named().map(move |(name, e)| (c.effect.info().id, name, e)));
     let of_causes = of_causes.map(|(id, name, e)| tracked(format!("{id}.{name}"), e));
@@ -248,9 +254,10 @@ fn found(diagnosed: &Diagnosed) -> Found {
             .iter()
             .cloned()
             .chain(warnings(d, Some(diagnosed.machine.signals.motion)))
+            .map(|w| driven.words(&w))
             .collect(),
-        result: contract::value(d, &diagnosed.warnings),
-        report: diagnosed.driven.report(report(&diagnosed.findings())),
+        result: driven.units(contract::value(d, &diagnosed.warnings)),
+        report: driven.report(report(&diagnosed.findings())),
     }
 }
 

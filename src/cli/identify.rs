@@ -172,7 +172,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let said = driven.blocks(said);
     out!("{}", terminal::blocks(&said, super::stdout::layout(super::stdout::WIDTH)))?;
     if let Some(path) = &args.json {
-        write_text(path, &serde_json::to_vec_pretty(&result)?)?;
+        write_text(path, &serde_json::to_vec_pretty(&driven.units(json!(result)))?)?;
     }
     if let Some(path) = &args.report {
         let report = crate::report::identify::report(&result, Joined::of(&record).ok().as_ref());
@@ -285,12 +285,12 @@ fn found(result: &Identification, record: Option<&Joined>, driven: &Driven) -> a
         "not_explained"
     };
     let tracked =
-        |e: &Estimate| Tracked { name: e.name.to_owned(), unit: e.unit.to_owned(), value: e.value, std: e.std };
+        |e: &Estimate| Tracked { name: e.name.to_owned(), unit: driven.words(e.unit), value: e.value, std: e.std };
     Ok(Found {
-        facts: vec![json!(verdict), json!(method.method), json!(fit), json!(best.why)],
+        facts: vec![json!(verdict), json!(method.method), json!(fit), json!(driven.words(&best.why))],
         parameters: method.parameters.iter().map(tracked).collect(),
-        warnings: result.warnings.clone(),
-        result: json!(result),
+        warnings: result.warnings.iter().map(|w| driven.words(w)).collect(),
+        result: driven.units(json!(result)),
         report: driven.report(crate::report::identify::report(result, record)),
     })
 }

@@ -213,7 +213,8 @@ fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
 
 /// A name and what it is, within a width.
 pub(super) fn fact(name: &str, value: &str, width: u16) -> String {
-    const NAME: usize = 13;
+    // As wide as "model exchange", and a blank.
+    const NAME: usize = 15;
     let value = wrapped(value, width.saturating_sub(NAME as u16), "");
     let lines: Vec<String> = value
         .lines()

@@ -18,7 +18,7 @@ use crate::report::driven::Driven;
 use crate::report::examine::{Inspected, findings, report, verdict};
 use crate::report::{Block, Cell, Table as Shown, html, terminal};
 use crate::trace::guess::{Guess, Role, SURE, guess};
-use crate::trace::{Machine, Motion, Quantity, Signal, Table, Trace, Unit, from_table, nearest, write_text};
+use crate::trace::{COUNTS, Machine, Motion, Quantity, Signal, Table, Trace, Unit, from_table, nearest, write_text};
 
 /// Arguments of `eixo init`.
 #[derive(Debug, clap::Args)]
@@ -29,7 +29,7 @@ pub struct Args {
     /// The log: CSV, Excel, Parquet, MATLAB, NumPy, JSON Lines, halscope, ...
     log: PathBuf,
     /// The axis file to write; axis.toml beside the log without
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, alias = "axis", value_name = "FILE")]
     output: Option<PathBuf>,
     /// The plot of the log to write; beside the axis file without
     #[arg(long, value_name = "FILE")]
@@ -69,6 +69,15 @@ struct Made {
 impl Made {
     fn of(&self, signal: Signal) -> Option<&Guess> {
         self.guesses.iter().find(|g| g.role == Role::Signal(signal))
+    }
+
+    /// Whether the torque is a number of the drive: no unit, no constant, and no name of a torque.
+    fn counts(&self) -> bool {
+        let named = |column: &str| {
+            let column = column.to_lowercase();
+            column == "t" || ["torque", "force", "moment", "drehm", "kraft"].iter().any(|word| column.contains(word))
+        };
+        self.of(Signal::T).is_some_and(|g| g.unit.is_none() && self.torque_scale == 1.0 && !named(&g.column))
     }
 
     fn is_rigid(&self) -> bool {
@@ -465,16 +474,21 @@ fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
     let mut out = String::new();
     let text = |s: &str| toml::Value::String(s.to_owned()).to_string();
     let plain = |s: &str| s.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
-    let name = Path::new(file).file_stem().map_or_else(|| "axis".to_owned(), |s| plain(&s.to_string_lossy()));
+    let stem = Path::new(file).file_stem().map_or_else(|| "axis".to_owned(), |s| plain(&s.to_string_lossy()));
+    let folder = Path::new(file).parent().and_then(Path::file_name).map(|s| plain(&s.to_string_lossy()));
+    // A log that is called by its date is one of a machine that its folder is called by.
+    let name = if stem.chars().any(char::is_alphabetic) { stem } else { folder.unwrap_or(stem) };
     let linear = made.motion == Motion::Linear;
     let [inertia, damping, stiffness, torque] =
         if linear { ["kg", "N.s/m", "N/m", "N"] } else { ["kg.m2", "N.m.s/rad", "N.m/rad", "N.m"] };
     // A current without its torque constant, or a number of the drive, has units of its own.
     let own =
         made.of(Signal::T).filter(|g| made.torque_scale == 1.0 && g.unit.is_none_or(|u| u.quantity == Quantity::Drive));
-    let own = own
-        .filter(|g| g.column != Signal::T.name())
-        .map(|g| g.unit.map_or_else(|| plain(&g.column), |u| u.symbol.to_owned()));
+    let own = own.filter(|g| g.column != Signal::T.name()).map(|g| match g.unit {
+        Some(unit) => unit.symbol.to_owned(),
+        None if made.counts() => COUNTS.to_owned(),
+        None => plain(&g.column),
+    });
     let angle = if linear { "m" } else { "rad" };
     let of_own =
         |si: &str, times: &str| own.as_ref().map_or_else(|| si.to_owned(), |own| format!("{own}{times}/{angle}"));
@@ -532,8 +546,12 @@ fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
             continue;
         }
         let scale = if signal == Signal::T { made.torque_scale } else { 1.0 };
-        let hold = if signal == Signal::T { ", hold = \"zoh\"" } else { "" };
-        let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, hold));
+        let hold = match signal {
+            Signal::T if made.counts() => format!(", unit = \"{COUNTS}\", hold = \"zoh\""),
+            Signal::T => ", hold = \"zoh\"".to_owned(),
+            _ => String::new(),
+        };
+        let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, &hold));
         if signal == Signal::T && g.unit.is_none_or(|u| u.quantity == Quantity::Drive) && scale == 1.0 {
             let _ = writeln!(
                 out,
@@ -568,7 +586,8 @@ fn chosen(made: &Made, table: &Table) -> Shown {
             Role::Signal(s) => s.name(),
         };
         used.push(g.column.as_str());
-        let unit = g.unit.map_or("not given: SI", |u| u.symbol);
+        let counts = g.role == Role::Signal(Signal::T) && made.counts();
+        let unit = g.unit.map_or(if counts { "not given: counts" } else { "not given: SI" }, |u| u.symbol);
         let sure = if g.score >= SURE { "" } else { "please check" };
         shown.row(vec![Cell::text(name), Cell::text(g.column.as_str()), Cell::text(unit), Cell::text(sure)]);
     }

@@ -82,11 +82,11 @@ commands! {
     Demo => demo,
     /// Make an excitation: Schroeder, random-phase or odd multisine
     Excite => excite,
-    /// Export the axis as an FMI 2.0 co-simulation FMU
+    /// Export the axis as a co-simulation FMU of FMI 2.0 or 3.0
     Export => export,
     /// Drive an FMU, or the axis of an axis.toml, with an input trace and record the outputs
     Simulate => simulate,
-    /// Validate any FMI 2.0 FMU, by what its XML says and by what its binary does
+    /// Validate any FMU of FMI 2.0 or 3.0, by what its XML says and by what its binary does
     Validate => validate,
     /// List platforms, capabilities, variables and units of any FMU
     Info => info,

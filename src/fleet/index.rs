@@ -10,6 +10,8 @@ use crate::report::{Axis, Block, Cell, Chart, Colour, Figure, Report, Section, S
 
 /// Most plots of drifts, those that stand out first.
 const PLOTS: usize = 24;
+/// Most parameters with a column of their own: with more the tables are cut on paper and run out of the screen.
+const COLUMNS: usize = 4;
 
 /// The report of a run.
 pub(super) fn report(plan: &Plan, rows: &[Placed]) -> Report {
@@ -19,7 +21,12 @@ pub(super) fn report(plan: &Plan, rows: &[Placed]) -> Report {
     if !trends.is_empty() {
         sections.push(Section::new("Drift of the parameters", drifts(&trends)));
     }
-    sections.push(Section::new("Traces", vec![Block::Table(traces(plan, rows, &trends))]));
+    let mut of_traces = vec![Block::Table(traces(plan, rows, &trends))];
+    if trends.iter().any(|t| !names(&trends).contains(&t.parameter.name.as_str())) {
+        let rest = "The other parameters did not drift, or had no room here: each with its change since the first is in the summary.";
+        of_traces.push(Block::Paragraph(rest.to_owned()));
+    }
+    sections.push(Section::new("Traces", of_traces));
     if let Some(table) = failures(rows) {
         sections.push(Section::new("What could not be used", vec![Block::Table(table)]));
     }
@@ -84,7 +91,7 @@ fn verdict(rows: &[Placed], trends: &[Trend]) -> Verdict {
         String::new()
     } else {
         let more = if out.len() > 6 { format!(" and {} more", out.len() - 6) } else { String::new() };
-        format!("Beyond four standard errors of their scatter: {}{more}.", out[..out.len().min(6)].join(", "))
+        format!("Beyond four standard errors: {}{more}.", out[..out.len().min(6)].join(", "))
     };
     let figures = counts.into_iter().map(|(name, n)| (wording(name).to_owned(), Cell::Count(n))).collect();
     Verdict { tone, sentence, detail, figures }
@@ -126,15 +133,25 @@ fn shown<'a>(plan: &'a Plan) -> impl Iterator<Item = (usize, &'static str)> + 'a
     plan.facts.iter().copied().enumerate().filter(move |(_, name)| on_page(name))
 }
 
-/// The names of the parameters, in the order of their first appearance.
+/// The names of the parameters that have a column, in the order of their first appearance: all, or where they are many those that
+/// drift.
 fn names<'a>(trends: &'a [Trend]) -> Vec<&'a str> {
-    let mut names: Vec<&str> = Vec::new();
-    for t in trends {
-        if !names.contains(&t.parameter.name.as_str()) {
-            names.push(&t.parameter.name);
+    let named = |of: &mut dyn Iterator<Item = &'a Trend<'a>>| {
+        let mut names: Vec<&str> = Vec::new();
+        for t in of {
+            if !names.contains(&t.parameter.name.as_str()) {
+                names.push(&t.parameter.name);
+            }
         }
+        names
+    };
+    let all = named(&mut trends.iter());
+    if all.len() <= COLUMNS {
+        return all;
     }
-    names
+    let mut drifting = named(&mut trends.iter().filter(|t| t.stands_out()));
+    drifting.truncate(COLUMNS);
+    drifting
 }
 
 /// One row a machine; the drift of each parameter where there is room for it.

@@ -247,7 +247,7 @@ fn one(
                 trace: item.name(),
                 facts: found.facts,
                 parameters: found.parameters.into_iter().filter(|p| p.value.is_finite()).collect(),
-                message: found.warnings.join(" "),
+                message: sentences(&found.warnings),
                 done: true,
             };
             (row, found.result, Some(html::page(&found.report)))
@@ -255,6 +255,12 @@ fn one(
     };
     store.keep(item, &key, &row, &result, page.as_deref())?;
     Ok((row, false))
+}
+
+/// Warnings one after the other, each with its stop.
+fn sentences(all: &[String]) -> String {
+    let stopped = all.iter().map(|w| if w.ends_with('.') { w.clone() } else { format!("{w}.") });
+    stopped.collect::<Vec<_>>().join(" ")
 }
 
 fn failed(item: &Item, message: String) -> Row {

@@ -47,13 +47,16 @@ fn columns(facts: &[&str], rows: &[Placed]) -> Vec<(String, Column)> {
         };
         columns.push(((*fact).to_owned(), column));
     }
-    let mut names: Vec<(&str, &str)> = Vec::new();
+    // A parameter of machines that log torques and of others that log currents has a column in each unit.
+    let mut names: Vec<(&str, Vec<&str>)> = Vec::new();
     for parameter in rows.iter().flat_map(|p| &p.row.parameters) {
-        if !names.iter().any(|(name, _)| *name == parameter.name) {
-            names.push((&parameter.name, &parameter.unit));
+        match names.iter_mut().find(|(name, _)| *name == parameter.name) {
+            None => names.push((&parameter.name, vec![&parameter.unit])),
+            Some((_, units)) if !units.contains(&parameter.unit.as_str()) => units.push(&parameter.unit),
+            Some(_) => {}
         }
     }
-    for (name, unit) in names {
+    for (name, units) in names {
         let of = |p: &Placed| p.row.parameters.iter().find(|t| t.name == name).cloned();
         // The first of each machine: the rows stand in the order of time.
         let mut firsts: BTreeMap<&str, f64> = BTreeMap::new();
@@ -66,9 +69,16 @@ fn columns(facts: &[&str], rows: &[Placed]) -> Vec<(String, Column)> {
             let first = *firsts.get(p.machine.as_str())?;
             (first != 0.0).then_some(of(p)?.value / first - 1.0)
         };
-        let title = if unit.is_empty() || unit == "1" { name.to_owned() } else { format!("{name} [{unit}]") };
-        columns.push((title, Column::Number(rows.iter().map(|p| of(p).map(|t| t.value)).collect())));
-        columns.push((format!("{name}_std"), Column::Number(rows.iter().map(|p| of(p)?.std).collect())));
+        for unit in &units {
+            let own = |p: &Placed| of(p).filter(|t| t.unit == *unit);
+            let titled = |name: &str| {
+                if unit.is_empty() || *unit == "1" { name.to_owned() } else { format!("{name} [{unit}]") }
+            };
+            let std = format!("{name}_std");
+            let std = if units.len() > 1 { titled(&std) } else { std };
+            columns.push((titled(name), Column::Number(rows.iter().map(|p| own(p).map(|t| t.value)).collect())));
+            columns.push((std, Column::Number(rows.iter().map(|p| own(p)?.std).collect())));
+        }
         columns.push((format!("{name}_change"), Column::Number(rows.iter().map(change).collect())));
     }
     columns.push(("message".to_owned(), text(&|p| Some(p.row.message.clone()).filter(|m| !m.is_empty()))));

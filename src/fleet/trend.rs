@@ -53,8 +53,8 @@ impl<'a> Trend<'a> {
         (first != 0.0).then(|| last / first - 1.0)
     }
 
-    /// Rise of the line over the period, relative to the mean, and its standard error from the scatter about the line; needs
-    /// three records.
+    /// Rise of the line over the period, relative to the mean, and its standard error: from the scatter about the line, and no less
+    /// than the estimates' own standard errors make it, as a few records lie on a line by chance. Needs three records.
     pub fn drift(&self) -> Option<(f64, f64)> {
         let n = self.at.len() as f64;
         let mean = |of: &dyn Fn(usize) -> f64| (0..self.at.len()).map(of).sum::<f64>() / n;
@@ -66,7 +66,8 @@ impl<'a> Trend<'a> {
         }
         let slope = sum(&|k| (self.at[k] - t) * (self.values[k].0 - y)) / spread;
         let rest = sum(&|k| (self.values[k].0 - y - slope * (self.at[k] - t)).powi(2));
-        let std = (rest / (n - 2.0) / spread).sqrt();
+        let own = sum(&|k| ((self.at[k] - t) * self.values[k].1.unwrap_or_default()).powi(2)) / spread;
+        let std = ((rest / (n - 2.0)).max(own) / spread).sqrt();
         let span = self.at.last()? - self.at.first()?;
         Some((slope * span / y.abs(), std * span / y.abs()))
     }
@@ -74,5 +75,25 @@ impl<'a> Trend<'a> {
     /// Whether the drift stands out of the scatter: four standard errors.
     pub fn stands_out(&self) -> bool {
         self.drift().is_some_and(|(drift, std)| drift.abs() > 4.0 * std && drift.abs() > 1e-6)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three records a day apart.
+    fn drifts(values: [f64; 3], std: Option<f64>) -> bool {
+        let parameter = Tracked { name: "K".into(), unit: String::new(), value: values[0], std };
+        let values = values.iter().map(|v| (*v, std)).collect();
+        Trend { machine: "press", parameter: &parameter, at: vec![0.0, 1.0, 2.0], values, days: true }.stands_out()
+    }
+
+    #[test]
+    fn three_records_that_lie_on_a_line_within_their_errors_are_no_drift() {
+        // A friction as it was estimated from three parts of one record of a ball screw, N.
+        assert!(!drifts([20.97, 20.67, 19.91], Some(0.5)));
+        assert!(drifts([20.97, 20.44, 19.91], Some(0.05)));
+        assert!(drifts([20.97, 20.44, 19.91], None));
     }
 }

@@ -348,7 +348,7 @@ pub(super) fn shown(a: &Analysis, model: Option<&Analysis>) -> Vec<Section> {
     let steps = steps(a);
     let mut sections = Vec::new();
     blocks.push(Block::Figures(unrolled(a)));
-    sections.push(Section::new("What the trace shows", blocks));
+    sections.push(Section::new("Deviations, ranked", blocks));
     if !steps.is_empty() {
         sections.push(Section::new("What to do", vec![Block::Steps(steps)]));
     }

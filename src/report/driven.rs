@@ -1,6 +1,8 @@
 //! What drives the axis, in the words and units of the record: a force along a linear axis, and a current where no torque constant is
 //! given. The findings speak of a torque in N.m, as the model does; here a report is brought to what the user logged.
 
+use serde_json::Value;
+
 use super::{Block, Cell, Drawing, Figure, Report, Table};
 use crate::trace::Motion;
 
@@ -31,6 +33,35 @@ impl Driven {
             section.blocks = self.blocks(std::mem::take(&mut section.blocks));
         }
         report
+    }
+
+    /// A result for programs, its units those of the log: keys and names are the contract's, and stay.
+    #[must_use]
+    pub fn units(&self, mut result: Value) -> Value {
+        fn walk(driven: &Driven, value: &mut Value) {
+            match value {
+                Value::Object(fields) => {
+                    for (key, field) in fields {
+                        match field {
+                            Value::String(unit) if key == "unit" => *unit = driven.words(unit),
+                            Value::String(unit) if key == "against_unit" => {
+                                *unit = driven.words(unit);
+                                if driven.motion == Motion::Linear {
+                                    *unit = unit.replacen("rad", "m", 1);
+                                }
+                            }
+                            other => walk(driven, other),
+                        }
+                    }
+                }
+                Value::Array(all) => all.iter_mut().for_each(|v| walk(driven, v)),
+                _ => {}
+            }
+        }
+        if self.unit.is_some() || self.motion == Motion::Linear {
+            walk(self, &mut result);
+        }
+        result
     }
 
     /// A sentence in these words.
@@ -128,6 +159,9 @@ impl Driven {
                     return Some(linear.to_owned());
                 }
             }
+            if matches!(word, "N.m" | "N·m") {
+                return Some(self.unit.clone().unwrap_or_else(|| "N".to_owned()));
+            }
         }
         let unit = self.unit.as_deref()?;
         let typeset = word.contains(['·', '²', '³']);
@@ -158,6 +192,18 @@ mod tests {
             Block::Paragraph(text) => text,
             other => panic!("{other:?}"),
         }
+    }
+
+    #[test]
+    fn a_result_for_programs_has_the_units_of_the_log_and_the_names_of_the_contract() {
+        let driven = Driven { motion: Motion::Rotary, unit: Some("A".into()) };
+        let result = serde_json::json!({ "closure_of": "torque", "all": [{ "name": "K", "unit": "N.m/rad" }, { "unit": "rad/s" }] });
+        let own = serde_json::json!({ "closure_of": "torque", "all": [{ "name": "K", "unit": "A/rad" }, { "unit": "rad/s" }] });
+        assert_eq!(driven.units(result.clone()), own);
+        assert_eq!(Driven { motion: Motion::Rotary, unit: None }.units(result.clone()), result);
+        let linear = Driven { motion: Motion::Linear, unit: None };
+        let curve = serde_json::json!({ "unit": "N.m", "against_unit": "rad/s" });
+        assert_eq!(linear.units(curve), serde_json::json!({ "unit": "N", "against_unit": "m/s" }));
     }
 
     #[test]

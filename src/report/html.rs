@@ -8,7 +8,7 @@
 use maud::{DOCTYPE, Markup, html};
 use sha2::{Digest, Sha256};
 
-use super::chart::{Colour, Dash, Shape, When};
+use super::chart::{Colour, Dash, Mark, Shape, When};
 use super::format::{self, Medium};
 use super::plot::{self, Size};
 use super::{Block, Cell, Drawing, Figure, Report, Section, Table, Tone, Verdict, chain, polar};
@@ -104,12 +104,14 @@ fn block(block: &Block) -> Markup {
         Block::Verdict(v) => verdict(v),
         Block::Paragraph(text) => html! { p { (text) } },
         Block::Warning(text) => {
-            html! { p class="warning" role="note" { span class="sign" aria-hidden="true" { "!" } span { (text) } } }
+            html! { p class="warning" role="note" { span class="sign" aria-hidden="true" { "!" } span { (text) @if text.ends_with(char::is_alphanumeric) { "." } } } }
         }
         Block::Steps(steps) => html! { ol class="steps" { @for s in steps { li { (s) } } } },
         Block::KeyValues(pairs) => key_values(pairs),
         Block::Table(t) => table(t),
         Block::Figure(f) => html! { div class="full" { (figure(f, Size { width: 1040.0, height: 330.0 })) } },
+        // One alone has the whole width, and is drawn for it: scaled up, its letters were twice those of the page.
+        Block::Figures(all) if all.len() == 1 => html! { @for f in all { (self::block(&Block::Figure(f.clone()))) } },
         Block::Figures(all) => {
             html! { div class="grid2" { @for f in all { (figure(f, Size { width: 510.0, height: 310.0 })) } } }
         }
@@ -163,7 +165,7 @@ fn table(t: &Table) -> Markup {
         div class={ "scroll" (room) } role="region" tabindex="0" aria-label=(t.caption) {
             table {
                 @if !t.caption.is_empty() { caption { (t.caption) } }
-                thead { tr { @for (c, name) in t.columns.iter().enumerate() { th scope="col" class=[class(c)] { (heading(name)) } } } }
+                thead { tr { @for (c, name) in t.columns.iter().enumerate() { th scope="col" class=[class(c)] { (broken(&heading(name))) } } } }
                 tbody {
                     @for r in &t.rows {
                         tr class=[r.strong.then_some("strong")] {
@@ -184,6 +186,11 @@ fn heading(name: &str) -> String {
         (Some(at), true) => format!("{}[{}]", &name[..at], format::unit(&name[at + 1..name.len() - 1], Medium::Page)),
         _ => name.to_owned(),
     }
+}
+
+/// A heading that may be broken within a parameter's name, so that no column is as wide as `viscous_motor.coefficient`.
+fn broken(name: &str) -> Markup {
+    html! { @for part in name.split_inclusive(['.', '_']) { (part) wbr; } }
 }
 
 fn cell_markup(cell: &Cell) -> Markup {
@@ -220,15 +227,19 @@ fn figure(f: &Figure, wide: Size) -> Markup {
                     @if !c.title.is_empty() { h3 { (c.title) } }
                     (legend(c.series.iter().enumerate().map(|(i, s)| {
                         let sign = match s.shape { Shape::Points => Sign::Dot, Shape::Band { .. } => Sign::Patch, _ => Sign::Line(s.dash) };
-                        Entry { index: i, name: &s.name, colour: s.colour.unwrap_or(Colour::nth(i)), sign, when: s.when }
-                    })))
+                        Entry { index: Some(i), name: &s.name, colour: s.colour.unwrap_or(Colour::nth(i)), sign, when: s.when }
+                    }).chain(c.marks.iter().filter_map(|m| {
+                        // The name of a line across the plot would stand in the middle of the data.
+                        let Mark::Y(_, name) = m else { return None };
+                        Some(Entry { index: None, name, colour: Colour::Grey, sign: Sign::Mark, when: None })
+                    }))))
                     div class="wide" { (plot::svg(c, wide)) }
                     div class="narrow" { (plot::svg(c, narrow)) }
                 }
                 Drawing::Polar(p) => {
                     @if !p.title.is_empty() { h3 { (p.title) } }
                     (legend(p.traces.iter().enumerate().map(|(i, t)| {
-                        Entry { index: i, name: &t.name, colour: t.colour.unwrap_or(Colour::nth(i)), sign: Sign::Line(t.dash), when: None }
+                        Entry { index: Some(i), name: &t.name, colour: t.colour.unwrap_or(Colour::nth(i)), sign: Sign::Line(t.dash), when: None }
                     })))
                     div class="square" { (polar::svg(p, square)) }
                 }
@@ -248,11 +259,12 @@ enum Sign {
     Line(Dash),
     Dot,
     Patch,
+    Mark,
 }
 
-/// A line of the legend: which series it is of.
+/// A line of the legend: which series it is of; none of a reference line.
 struct Entry<'a> {
-    index: usize,
+    index: Option<usize>,
     name: &'a str,
     colour: Colour,
     sign: Sign,
@@ -265,11 +277,12 @@ fn legend<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Markup {
         @if !named.is_empty() {
             ul class="legend" {
                 @for e in &named {
-                    li data-s=(e.index) data-when=[e.when.map(When::name)] {
+                    li data-s=[e.index] data-when=[e.when.map(When::name)] {
                         svg class=(e.colour.class()) viewBox="0 0 28 12" width="28" height="12" aria-hidden="true" {
                             @match &e.sign {
                                 Sign::Line(dash) => { path class=(dash.class()) stroke-dasharray=[dash.pattern()] d="M1 6H27" {} }
                                 Sign::Dot => { path class="dots" d="M7 6h0M14 6h0M21 6h0" {} }
+                                Sign::Mark => { path class="mark" d="M1 6H27" {} }
                                 Sign::Patch => { path class="band" d="M1 1H27V11H1Z" {} }
                             }
                         }

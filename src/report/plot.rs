@@ -266,7 +266,7 @@ fn mark_labels(
             Mark::Span(a, b, label) => (sx(a.min(*b)).max(0.0) + 4.0, 13.0, label),
             Mark::Y(at, label) => ((w - text_width(label) - 4.0).max(0.0), sy(*at) - 5.0, label),
         };
-        // A line that is too far off to be drawn is told at the edge it lies beyond.
+        // A line across the plot is named in the legend; one that is too far off to be drawn, at the edge it lies beyond.
         let beyond = match m {
             Mark::Y(at, _) if sy(*at) < -1e-6 => Some(("↑", 13.0)),
             Mark::Y(at, _) if sy(*at) > h + 1e-6 => Some(("↓", h - 5.0)),
@@ -274,6 +274,7 @@ fn mark_labels(
         };
         let (label, y) = match beyond {
             Some((sign, y)) if !label.is_empty() => (format!("{label} {sign}"), y),
+            _ if matches!(m, Mark::Y(..)) => continue,
             _ => (label.clone(), y),
         };
         let label = &label;

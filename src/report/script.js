@@ -130,7 +130,8 @@
       this.dots.replaceChildren();
       if (this.link && !told) {
         const from = this.xAt(this.view[0]), to = this.xAt(this.view[0] + w);
-        for (const p of links[this.link]) if (p !== this) p.window(from, to);
+        // Whole is whole for all, though one record is shorter than the other.
+        for (const p of links[this.link]) if (p !== this) zoomed ? p.window(from, to) : p.set(p.home, true);
       }
     }
     // The same stretch of time as another plot shows.

@@ -52,7 +52,7 @@ use eixo_model::{axis, drive, effects};
 pub use crate::axis::Hold;
 pub use error::TraceError;
 pub use error::nearest;
-pub use load::{Column, Loaded, LoadedPieces, Mapping, from_table, load, load_pieces};
+pub use load::{COUNTS, Column, Loaded, LoadedPieces, Mapping, from_table, load, load_pieces};
 pub use lost::bridge;
 pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};

@@ -194,16 +194,22 @@ fn trace(
     Ok(trace)
 }
 
+/// The unit that [signals] gives to a drive's number of no unit, as a servo's bus or a controller's trace has it.
+pub const COUNTS: &str = "counts";
+
 /// The unit of a current, a voltage or a percentage that stands for the torque one to one; it may be all that the column's name ends in.
 pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> Option<String> {
     let index = table.position(&column.column)?;
     let header = &table.headers[index];
+    #[allow(clippy::float_cmp, reason = "the scale that nobody gave")]
+    let plain = column.scale == 1.0;
+    if header.unit.is_none() && column.unit.as_deref() == Some(COUNTS) {
+        return (signal == Signal::T && plain).then(|| COUNTS.to_owned());
+    }
     let given = header.unit.as_deref().or(column.unit.as_deref()).and_then(Unit::parse);
     // The unit that a mapped column's name ends in is told, but not converted from.
     let converted = given.is_some() || table.own(signal) == Some(index);
     let unit = given.or_else(|| guess::suffix(&header.name).map(|(_, unit)| unit))?;
-    #[allow(clippy::float_cmp, reason = "the scale that nobody gave")]
-    let plain = column.scale == 1.0;
     let base = if converted { unit.symbol.trim_start_matches('m') } else { unit.symbol };
     (signal == Signal::T && unit.quantity == Quantity::Drive && plain).then(|| base.to_owned())
 }
@@ -292,7 +298,8 @@ pub(super) fn scale(
         || (signal == "time" && time_name(&table.headers[index].name));
     let behind = || guess::suffix(&table.headers[index].name).filter(|_| own).map(|(_, unit)| unit.symbol.to_owned());
     let written = table.headers[index].unit.clone().or_else(|| column.unit.clone()).or_else(behind);
-    if let Some(text) = &written {
+    let counts = matches!(quantity, Quantity::Torque | Quantity::Force) && written.as_deref() == Some(COUNTS);
+    if let Some(text) = written.as_ref().filter(|_| !counts) {
         let unit = Unit::parse(text).ok_or_else(|| TraceError::UnknownUnit {
             file: table.file.clone(),
             column: column.column.clone(),
@@ -417,6 +424,22 @@ mod tests {
         let said = warnings(1.0).join("\n");
         assert!(said.contains("column current is in A, and no torque constant is given"), "{said}");
         assert_eq!(warnings(0.5), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_torque_in_counts_keeps_them_until_a_constant_is_given_and_no_other_signal_has_them() {
+        let table = csv("time [s],load,theta1", |k| format!("{k},{},{k}", 100 * k));
+        let read = |scale: f64, theta1: Column| {
+            let load = Column { unit: Some(COUNTS.into()), scale, ..Column::named("load") };
+            let signals = vec![(Signal::T, load), (Signal::Theta1, theta1)];
+            from_table(&table, &Mapping { signals, ..Mapping::default() })
+        };
+        let loaded = read(1.0, Column::named("theta1")).unwrap();
+        assert_eq!((loaded.drive.as_deref(), loaded.trace.get(Signal::T).unwrap()[3]), (Some("counts"), 300.0));
+        let loaded = read(0.5, Column::named("theta1")).unwrap();
+        assert_eq!((loaded.drive, loaded.trace.get(Signal::T).unwrap()[3]), (None, 150.0));
+        let error = read(1.0, Column { unit: Some(COUNTS.into()), ..Column::named("theta1") }).unwrap_err().to_string();
+        assert!(error.contains("counts"), "{error}");
     }
 
     #[test]
