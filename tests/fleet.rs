@@ -153,7 +153,7 @@ fn what_cannot_be_run_says_what_is_missing() {
 fn each_machine_is_told_in_the_unit_of_its_log() {
     let root = tempfile::tempdir().unwrap();
     let folder = machines(root.path());
-    for entry in std::fs::read_dir(folder.join("mill")).unwrap() {
+    for entry in std::fs::read_dir(folder.join("press")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "csv") {
             let text = String::from_utf8(read(&path)).unwrap().replacen("T [N.m]", "T [A]", 1);
@@ -167,7 +167,7 @@ fn each_machine_is_told_in_the_unit_of_its_log() {
     let inertia: Vec<&&str> = head.iter().filter(|name| name.starts_with("I1")).collect();
     assert_eq!(
         inertia,
-        [&"I1 [A.s2/rad]", &"I1_std [A.s2/rad]", &"I1 [kg.m2]", &"I1_std [kg.m2]", &"I1_change"],
+        [&"I1 [kg.m2]", &"I1_std [kg.m2]", &"I1 [A.s2/rad]", &"I1_std [A.s2/rad]", &"I1_change"],
         "{text}"
     );
     assert_eq!(text.lines().count(), 9, "{text}");
@@ -178,11 +178,12 @@ fn each_machine_is_told_in_the_unit_of_its_log() {
         let plain: String = row.split('"').enumerate().map(quoted).collect();
         let cells: Vec<&str> = plain.split(',').collect();
         let (own, other) =
-            if row.starts_with("mill") { ("K [A/rad]", "K [N.m/rad]") } else { ("K [N.m/rad]", "K [A/rad]") };
+            if row.starts_with("press") { ("K [A/rad]", "K [N.m/rad]") } else { ("K [N.m/rad]", "K [A/rad]") };
         assert!(!cells[column(own)].is_empty() && cells[column(other)].is_empty(), "{row}");
     }
     let index = String::from_utf8(read(root.path().join("found/index.html"))).unwrap();
-    assert!(index.contains("A·s²/rad") && index.contains("kg·m²"));
+    // Of the mill, which has friction that nothing tried explains, no parameter is told over time.
+    assert!(index.contains("A·s²/rad") && !index.contains("kg·m²") && !index.contains("N·m"), "{index}");
     for entry in std::fs::read_dir(root.path().join("found/results")).unwrap() {
         let result = String::from_utf8(read(entry.unwrap().path())).unwrap();
         let (amperes, torques) = (result.contains("\"A.s2/rad\""), result.contains("\"kg.m2\""));
