@@ -194,7 +194,7 @@ fn trace(
     Ok(trace)
 }
 
-/// The unit that [signals] gives to a drive's number of no unit, as a servo's bus or a controller's trace has it.
+/// The unit that `[signals]` gives to a drive's number of no unit, as a servo's bus or a controller's trace has it.
 pub const COUNTS: &str = "counts";
 
 /// The unit of a current, a voltage or a percentage that stands for the torque one to one; it may be all that the column's name ends in.
