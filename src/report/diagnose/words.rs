@@ -65,9 +65,10 @@ pub fn sentence(d: &Diagnosis) -> String {
     }
 }
 
-/// Two causes of unlike kind that explain the gap of an unexplained record alike.
+/// Two causes of unlike families that explain the gap of an unexplained record alike.
 pub fn either(d: &Diagnosis) -> Option<String> {
-    let pair = d.confusable.iter().find(|c| d.verdict == Verdict::Unexplained && !c.is_of_place())?;
+    let unlike = |c: &&Confusable| c.named.info().family != c.other.info().family;
+    let pair = d.confusable.iter().filter(|_| d.verdict == Verdict::Unexplained).find(unlike)?;
     Some(told_apart(pair))
 }
 
@@ -100,7 +101,7 @@ pub fn next_experiment(d: &Diagnosis) -> &'static str {
         Verdict::NoGap => "None needed: drive the axis harder or over more of its travel to look for smaller effects.",
         Verdict::Parameters => "Put the fitted parameters into axis.toml and diagnose a second record.",
         Verdict::Unexplained if is_rounding(d) => "Log the positions with a finer step.",
-        Verdict::Unexplained if d.confusable.is_empty() => {
+        Verdict::Unexplained if either(d).is_none() => {
             "Repeat the record at half and at twice the amplitude with an odd multisine (eixo excite --kind odd): even \
              lines that light up tell asymmetry and offsets, odd ones friction and play; a fixed frequency that stays \
              is an outside disturbance."
@@ -313,7 +314,7 @@ pub fn steps(d: &Diagnosis) -> Vec<String> {
 fn tell_apart(d: &Diagnosis) -> Option<String> {
     let name = |e: Effect| lower(short_title(e.info()));
     let pairs: Vec<String> = d.confusable.iter().map(|c| format!("{} or {}", name(c.named), name(c.other))).collect();
-    (matches!(d.verdict, Verdict::Effect | Verdict::Unexplained) && !pairs.is_empty()).then(|| {
+    (!pairs.is_empty() && (d.verdict == Verdict::Effect || either(d).is_some())).then(|| {
         format!(
             "Before you change the machine, find out which it is, for these data do not tell: {}.",
             pairs.join("; ")
