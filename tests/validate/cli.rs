@@ -319,7 +319,7 @@ fn info_reads_fmi_3_with_arrays_and_all_types() {
     };
     let out = info(&[]);
     for part in [
-        "FMI          3.0",
+        "FMI            3.0",
         "hasEventMode, fixedInternalStepSize 0.5\n",
         "x86_64-linux: three.so (2 kB)",
         "Float64[n, 1]  parameter            tunable      1 0 0",
