@@ -34,6 +34,7 @@ pub(super) fn bounded(gram: &[Vec<f64>], right: &[f64], low: &[f64], high: &[f64
     let explained = (0..p).map(|i| x[i] * (2.0 * right[i] - (0..p).map(|j| gram[i][j] * x[j]).sum::<f64>())).sum();
     (x, explained)
 }
+
 /// A straight line through pairs, by least squares.
 pub(super) struct Line {
     pub(super) slope: f64,

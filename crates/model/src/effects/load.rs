@@ -30,7 +30,8 @@ impl<I: Side> Force for Load<I> {
         memory: 0,
         named: true,
         textbook: [true, false][I::INDEX],
-        // Every axis has friction, few carry a weight.
+        // Every axis has friction, few carry a weight. Above a half: an equal friction beside a weight would be told as one friction
+        // that is unlike either way, which is rarer still.
         odds: 0.6,
         bounds: |p, x| p[0].abs() <= 20.0 * x.torque,
         example: &[3e-3],

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::determined::{is_simpler, is_undetermined, steadiness};
-use super::fit::Fit;
+use super::fit::{Fit, Term};
 use super::search::{ALIKE, MINOR, Search, is_extension};
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
@@ -257,9 +257,7 @@ impl Search<'_> {
         let with = |e: Effect| {
             let mut terms = chosen.terms.clone();
             terms[i] = (e, 0);
-            let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
-            let known = pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
-            known.cloned().or_else(|| self.with_another(chosen, i, (e, 0)))
+            likeliest_of(&terms, pool).cloned().or_else(|| self.with_another(chosen, i, (e, 0)))
         };
         let load = with(constant)?;
         let next_to_all = (0..self.band().equations()).all(|e| chosen.discrepancy[e] < MINOR * load.discrepancy[e]);
@@ -346,6 +344,11 @@ fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
 fn nested_fit<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
     let mut terms = fit.terms.clone();
     terms.remove(i);
+    likeliest_of(&terms, pool)
+}
+
+/// The likeliest fit of these effects in these forms, in any order.
+fn likeliest_of<'f>(terms: &[Term], pool: &'f [Fit]) -> Option<&'f Fit> {
     let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
     pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }

@@ -33,7 +33,8 @@ pub struct Scales {
 
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
-/// Share of the travel by which the way is longer where the motion goes back at all.
+/// Share of the travel by which the way is longer where the motion goes back at all: the hundredth from which the examination of a
+/// record counts a direction as one.
 const BACK: f64 = 0.01;
 
 /// The way of a motion, and its reversals, those below a threshold left out.
