@@ -49,7 +49,7 @@ pub use fit::Fit;
 use fit::{Problem, largest};
 use gap::{Gap, Gaps};
 use likelihood::Band;
-use search::{NEGLIGIBLE, Search, decide};
+use search::{NEGLIGIBLE, Search, decide, decide_further};
 use tracking::{Resolution, Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
@@ -57,9 +57,9 @@ const SEARCHED: usize = 16_384;
 
 /// Noises that an account at the rate of the band may leave for it to be settled at the record's own.
 const NEAR: f64 = 30.0;
-/// Share of the torque that an account of a rigid axis leaves where the band that its motion rules is understood, and a cause may lie
-/// beyond it: less than what any drive's measured current is true to.
-const UNDERSTOOD: f64 = 0.02;
+/// Share of the torque that an account of a rigid axis leaves at most where the band that its motion rules is understood so far that what
+/// it lacks may be the edge of a cause that lies beyond.
+const UNDERSTOOD: f64 = 0.1;
 /// Steps of the fit through which a band sees its noise.
 const REFERRED: usize = 24;
 
@@ -88,29 +88,28 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
-    let decided = |p: &Prepared, suspects: Vec<Effect>, known: Option<&Fit>| {
-        let problem = Problem::of(&p.record, &p.band, case.nominal, p.peak);
-        decide(Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress }, known)
-    };
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
     let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
-    let settled = |(searched, own): (Prepared, Option<Prepared>)| {
-        let decision = decided(&searched, suspects.clone(), None);
+    let settled = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
         let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
-        let decision = decided(&own, likely(&decision), Some(&decision.chosen));
+        let decision = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
         (own, decision)
     };
     // A rigid axis is taken to be under control.
     let rigid = case.nominal.structure == Structure::Rigid;
-    let reach = if rigid { Reach::Ruled } else { Reach::Shown };
-    let (mut searched, mut decision) = settled(prepared(&train, &case.nominal, reach));
+    let (searched, own) = prepared(&train, &case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
+    let decision = decide(searched.search(case, suspects.clone(), progress), None);
+    let (mut searched, mut decision) = settled(searched, own, decision);
     let left = searched.left(&decision.chosen);
     if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
         progress("beyond the band that the motion rules");
-        let (wide, other) = settled(prepared(&train, &case.nominal, Reach::Whole));
-        // More to explain and less left of it: what was missing is there.
-        if wide.left(&other.chosen) < left {
+        let (wide, own) = prepared(&train, &case.nominal, Reach::Whole);
+        let further = decide_further(wide.search(case, suspects, progress), &decision.chosen);
+        if let Some((wide, other)) = further.map(|d| settled(wide, own, d))
+            // More to explain and less left of it: what was missing is there.
+            && wide.left(&other.chosen) < left
+        {
             (searched, decision) = (wide, other);
         }
     }
@@ -228,6 +227,17 @@ fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate, peak: f64) 
 }
 
 impl Prepared {
+    /// A search in it for some effects.
+    fn search<'a>(
+        &'a self,
+        case: &Case<'_>,
+        suspects: Vec<Effect>,
+        progress: &'a (dyn Fn(&str) + Sync),
+    ) -> Search<'a> {
+        let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak);
+        Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
+    }
+
     /// Share of the torque that a fit leaves.
     fn left(&self, fit: &Fit) -> f64 {
         self.band.torque_share(fit.discrepancy, &self.record)

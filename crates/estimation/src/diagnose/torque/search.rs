@@ -72,16 +72,30 @@ pub struct Search<'a> {
 /// Finds the hypothesis of largest evidence; from the one that is `known` from another look at the record, where there is one.
 #[must_use]
 pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
-    (search.progress)("the model as given");
-    let nominal = search.problem.nominal;
-    let given = search.problem.given(&nominal).unwrap_or_else(|| search.problem.nothing());
-    let parameters = search.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
-    search.problem.scales = Scales::new(&search.problem, &parameters);
-    let mut pool = Pool::default();
-    pool.extend([given.clone(), parameters.clone()]);
-    search.gap = search.dynamic_gap(&parameters);
-    let known = known.and_then(|k| search.problem.fit(&k.model, &k.terms, k.discrepancy, STEPS));
-    let known = known.and_then(|k| search.problem.deepen(&k)).map(|k| search.pruned(k, &mut pool));
+    let begun = search.begun();
+    let known = known.and_then(|k| search.resumed(k));
+    decide_from(search, begun, known)
+}
+
+/// The same where a cause joins those of the hypothesis that is `known` from another look; `None` where none does.
+#[must_use]
+pub fn decide_further(mut search: Search<'_>, known: &Fit) -> Option<Decision> {
+    let mut begun = search.begun();
+    let known = search.resumed(known)?;
+    search.joined(&known, &mut begun.pool)?;
+    Some(decide_from(search, begun, Some(known)))
+}
+
+/// The axis without any effect.
+struct Begun {
+    given: Fit,
+    parameters: Fit,
+    pool: Pool,
+}
+
+fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision {
+    let Begun { given, parameters, mut pool } = begun;
+    let known = known.map(|k| search.pruned(k, &mut pool));
     if known.is_some() {
         // What it is likelier than must be known.
         search.extended(&parameters, 0, &mut pool);
@@ -127,6 +141,25 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
 }
 
 impl Search<'_> {
+    /// Fits the axis without any effect, which everything else is measured by.
+    fn begun(&mut self) -> Begun {
+        (self.progress)("the model as given");
+        let nominal = self.problem.nominal;
+        let given = self.problem.given(&nominal).unwrap_or_else(|| self.problem.nothing());
+        let parameters = self.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
+        self.problem.scales = Scales::new(&self.problem, &parameters);
+        let mut pool = Pool::default();
+        pool.extend([given.clone(), parameters.clone()]);
+        self.gap = self.dynamic_gap(&parameters);
+        Begun { given, parameters, pool }
+    }
+
+    /// A fit from another look at the record, made to its end.
+    fn resumed(&self, known: &Fit) -> Option<Fit> {
+        let fit = self.problem.fit(&known.model, &known.terms, known.discrepancy, STEPS)?;
+        self.problem.deepen(&fit)
+    }
+
     pub fn band(&self) -> &Band {
         self.problem.band
     }
