@@ -1,36 +1,40 @@
 //! Samples that a log lost: spikes of a disturbed line, and samples that repeat the one before.
 //!
-//! A position runs smoothly from sample to sample, at a blow with a kink that stays; lost is one, or two in a row, that its neighbours,
-//! which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry 36(8),
+//! A position runs smoothly from sample to sample, at a blow with a kink that stays; lost is one, or two near each other, that their
+//! neighbours, which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry 36(8),
 //! 1964).
 
-/// Samples lost in a row and neighbours on each side of them, pass by pass: a lost sample hides another near it until it is bridged, and
-/// of two the nearer neighbours may be free.
-const PASSES: [(usize, usize); 6] = [(1, 6), (1, 6), (1, 3), (1, 3), (2, 6), (2, 3)];
+/// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
+/// hides another near it until it is bridged, and two that hide each other are found together.
+const PASSES: [(usize, usize); 8] = [(0, MANY), (0, MANY), (0, 3), (0, 3), (1, MANY), (1, 3), (2, MANY), (3, MANY)];
+/// Neighbours on each side whose residual tells by itself how far they agree: fewer agree by chance.
+const MANY: usize = 6;
 /// Neighbours on each side that a motion of the record's highest frequencies is told by.
 const NEAREST: usize = 3;
-/// Most samples lost in a row that are bridged.
-const ROW: usize = 2;
 /// Error of the cubic, in rms of its residual here and about and in noise of the channel, from which a sample is lost: Gaussian noise
 /// makes one in five hundred million.
 const FAR: f64 = 6.0;
 /// Residual of the cubic over the usual one about it up to which the neighbours agree with each other.
 const AGREE: f64 = 2.5;
+/// Error of the cubic over the residual of many neighbours from which a sample is lost however they agree: a blow, which they do not agree
+/// about, leaves as much at them as at the sample between them.
+const CLEAR: f64 = 20.0;
 /// Samples in which the residual is a usual one.
 const BLOCK: usize = 256;
 /// Share of the samples that may be lost: more are the signal.
 const MOST: f64 = 0.02;
 
-/// The cubic through the neighbours of `row` samples from `k`: what it expects at them, and the rms of its residual.
-fn cubic(y: &[f64], k: usize, (row, reach): (usize, usize)) -> ([f64; ROW], f64) {
-    // Even powers about the middle of the row tell the value there, odd ones belong to the slope.
+/// The cubic through the neighbours of a sample `k` and of the one `span` intervals on: what it expects at the two, and the rms of its
+/// residual.
+fn cubic(y: &[f64], k: usize, (span, reach): (usize, usize)) -> ([f64; 2], f64) {
+    // Even powers about the middle tell the value there, odd ones belong to the slope.
     let (mut s, mut s2, mut s4, mut s6) = (0.0, 0.0, 0.0, 0.0);
     let (mut a, mut a2, mut b, mut b3) = (0.0, 0.0, 0.0, 0.0);
-    let middle = 0.5 * (row as f64 - 1.0);
+    let middle = 0.5 * span as f64;
     let mut squares = 0.0;
-    for j in 1..=reach {
-        let (before, after) = (y[k - j] - y[k], y[k + row - 1 + j] - y[k]);
-        let x = j as f64 + middle;
+    let mut pair = |before: usize, after: usize| {
+        let x = 0.5 * (after - before) as f64;
+        let (before, after) = (y[before] - y[k], y[after] - y[k]);
         let (even, odd) = (before + after, after - before);
         s += 2.0;
         s2 += 2.0 * x * x;
@@ -41,40 +45,39 @@ fn cubic(y: &[f64], k: usize, (row, reach): (usize, usize)) -> ([f64; ROW], f64)
         b += odd * x;
         b3 += odd * x.powi(3);
         squares += before * before + after * after;
-    }
+    };
+    (1..=reach).for_each(|j| pair(k - j, k + span + j));
+    // Those between the two; of an odd number the one in the middle is left out, which has no other.
+    (1..).take_while(|j| 2 * j < span).for_each(|j| pair(k + j, k + span - j));
     let even = s * s4 - s2 * s2;
     let (c0, c2) = ((s4 * a - s2 * a2) / even, (s * a2 - s2 * a) / even);
     let odd = s2 * s6 - s4 * s4;
     let (c1, c3) = ((s6 * b - s4 * b3) / odd, (s2 * b3 - s4 * b) / odd);
     let left = squares - c0 * a - c2 * a2 - c1 * b - c3 * b3;
-    let freedom = 2.0 * reach as f64 - 4.0;
-    let expected = std::array::from_fn(|i| {
-        let x = i as f64 - middle;
-        y[k] + c0 + x * (c1 + x * (c2 + x * c3))
-    });
-    (expected, (left.max(0.0) / freedom).sqrt())
+    let expected = [-middle, middle].map(|x| y[k] + c0 + x * (c1 + x * (c2 + x * c3)));
+    (expected, (left.max(0.0) / (s - 4.0)).sqrt())
 }
 
-/// Lost samples of a position whose noise has a standard deviation of `noise`: rows of them, each with what its neighbours expect and the
-/// rms by which these disagree.
-fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; ROW], f64)> {
-    let (row, reach) = pass;
+/// Lost samples of a position whose noise has a standard deviation of `noise`: the first of each pass' two, with what the neighbours
+/// expect and the rms by which these disagree.
+fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f64)> {
+    let (span, reach) = pass;
     if y.len() < BLOCK {
         return Vec::new();
     }
-    let inside: Vec<usize> = (reach..=y.len() - reach - row).collect();
-    let mut out: Vec<(usize, [f64; ROW], f64)> = Vec::new();
+    let inside: Vec<usize> = (reach..y.len() - reach - span).collect();
+    let mut out: Vec<(usize, [f64; 2], f64)> = Vec::new();
     for block in inside.chunks(BLOCK) {
-        let cubics: Vec<([f64; ROW], f64)> = block.iter().map(|k| cubic(y, *k, pass)).collect();
+        let cubics: Vec<([f64; 2], f64)> = block.iter().map(|k| cubic(y, *k, pass)).collect();
         let mut residuals: Vec<f64> = cubics.iter().map(|c| c.1).collect();
         let usual = *residuals.select_nth_unstable_by(block.len() / 2, f64::total_cmp).1;
         for (&k, (expected, residual)) in block.iter().zip(&cubics) {
             // A fast motion is no cubic: what it leaves now and then is measured by what it leaves as a rule.
-            let agree = *residual <= AGREE * usual.max(noise);
-            let off = y[k..k + row].iter().zip(expected).map(|(y, e)| (y - e).abs()).fold(0.0, f64::max);
+            let off = (y[k] - expected[0]).abs().min((y[k + span] - expected[1]).abs());
+            let agree = *residual <= AGREE * usual.max(noise) || reach == MANY && off > CLEAR * residual;
             if agree
                 && off > FAR * residual.max(usual).max(noise)
-                && out.last().is_none_or(|(last, ..)| last + row <= k)
+                && out.last().is_none_or(|(last, ..)| last + span < k)
             {
                 out.push((k, *expected, *residual));
             }
@@ -88,16 +91,17 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; ROW], 
 pub fn bridge(y: &mut [f64], noise: f64) -> usize {
     let mut count = 0;
     for pass in PASSES {
-        let (row, found) = (pass.0, lost(y, noise, pass));
-        if (count + row * found.len()) as f64 > MOST * y.len() as f64 {
+        let (span, found) = (pass.0, lost(y, noise, pass));
+        let each = if span == 0 { 1 } else { 2 };
+        if (count + each * found.len()) as f64 > MOST * y.len() as f64 {
             break;
         }
-        count += row * found.len();
+        count += each * found.len();
         for (k, expected, residual) in found {
             // The nearest neighbours tell a fast motion best, where they are sound.
-            let (nearer, left) = cubic(y, k, (row, NEAREST));
+            let (nearer, left) = cubic(y, k, (span, NEAREST));
             let expected = if left < residual { nearer } else { expected };
-            y[k..k + row].copy_from_slice(&expected[..row]);
+            (y[k], y[k + span]) = (expected[0], expected[1]);
         }
     }
     count

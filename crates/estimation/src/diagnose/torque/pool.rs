@@ -1,13 +1,18 @@
 //! What a search has fitted so far, so that nothing is fitted twice.
 
 use super::fit::{Fit, Term};
+use super::likelihood::Discrepancy;
+
+/// Share of the variance that a fit leaves at most, over that of another fit of the same effects, for effects to be looked for beside it
+/// anew: what the other left was not what they would have to explain.
+const POORER: f64 = 0.75;
 
 /// Hypotheses fitted, in the order they were.
 #[derive(Default)]
 pub struct Pool {
     fits: Vec<Fit>,
-    /// Sets of effects beside which every one that may join was looked for.
-    extended: Vec<Vec<Term>>,
+    /// Sets of effects beside which every one that may join was looked for, and what they left then.
+    extended: Vec<(Vec<Term>, Discrepancy)>,
 }
 
 impl Pool {
@@ -21,15 +26,17 @@ impl Pool {
         self.fits.extend(fits);
     }
 
-    /// Adds every effect looked for beside these, in the fits with it.
-    pub fn extend_all(&mut self, terms: &[Term], fits: &[Fit]) {
-        self.extended.push(sorted(terms));
+    /// Adds every effect looked for beside a fit, in the fits with it.
+    pub fn extend_all(&mut self, beside: &Fit, fits: &[Fit]) {
+        self.extended.push((sorted(&beside.terms), beside.discrepancy));
         self.fits.extend_from_slice(fits);
     }
 
-    /// The fits with one effect more than these, where all of them were looked for.
-    pub fn extensions(&self, terms: &[Term]) -> Option<Vec<Fit>> {
-        self.extended.contains(&sorted(terms)).then(|| {
+    /// The fits with one effect more than this one, where all of them were looked for beside one that is not poorer.
+    pub fn extensions(&self, fit: &Fit) -> Option<Vec<Fit>> {
+        let terms = sorted(&fit.terms);
+        let is_poorer = |s: &Discrepancy| (0..2).any(|i| fit.discrepancy[i] < POORER * s[i]);
+        self.extended.iter().any(|(t, s)| *t == terms && !is_poorer(s)).then(|| {
             let is = |f: &&Fit| f.terms.len() == terms.len() + 1 && terms.iter().all(|t| f.terms.contains(t));
             self.fits.iter().filter(is).cloned().collect()
         })

@@ -329,12 +329,12 @@ impl Search<'_> {
 
     /// The fits with one effect more, each looked for once.
     fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
-        if let Some(known) = pool.extensions(&fit.terms) {
+        if let Some(known) = pool.extensions(fit) {
             return known;
         }
         let mut added = self.added(fit, keep);
         added.extend(self.put_back(fit).iter().flat_map(|f| self.added(f, keep)));
-        pool.extend_all(&fit.terms, &added);
+        pool.extend_all(fit, &added);
         added
     }
 
