@@ -16,17 +16,12 @@ use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::super::model::{BaseParameter, Model};
 use super::super::record::Record;
+use super::discrepancy::Discrepancy;
 use super::hidden::remove_vibration;
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
 use crate::numerics::level::deviation;
 
-/// Decades of variance below the residual's that a discrepancy is looked for in.
-const DECADES: i32 = 12;
-/// Steps of scoring.
-const SCORINGS: usize = 30;
-/// Least variance of one equation's discrepancy over that of the other's, as accelerations.
-const CORNER: f64 = 2.5e-3;
 /// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor.
 const AT_FLOOR: f64 = 1.15;
 /// Bins over which the window spreads the noise.
@@ -83,7 +78,7 @@ pub struct TorqueResidual {
     /// What the noise makes in them.
     pub weights: Vec<Weight>,
     /// Square of the inertia of each equation over the larger one's: torques of one acceleration.
-    alike: [f64; 2],
+    pub(super) alike: [f64; 2],
 }
 
 /// Spectra of the motion as measured: accelerations, twist and its rate.
@@ -92,9 +87,6 @@ pub struct Motion {
     twist: Vec<C>,
     rate: Vec<C>,
 }
-
-/// Variances of the discrepancy of each equation.
-pub type Discrepancy = [f64; 2];
 
 /// Dynamic stiffness in central differences: torque on each side over position of each, N.m/rad.
 pub fn stiffness(p: &Parameters, structure: Structure, w: f64, dt: f64) -> [[C; 2]; 2] {
@@ -407,7 +399,7 @@ impl Band {
     }
 
     /// Inverse of the covariance's Cholesky factor at each bin: `z0 = a r1`, `z1 = b r1 + c r2`; and log det.
-    fn factor(&self, weight: Weight, s: Discrepancy) -> (f64, C, f64, f64) {
+    pub(super) fn factor(&self, weight: Weight, s: Discrepancy) -> (f64, C, f64, f64) {
         let (n11, n22, n12) = weight.noise;
         let c11 = n11 + s[0];
         if self.sight != Sight::Both {
@@ -443,85 +435,6 @@ impl Band {
     /// Log determinant of the covariance, less the density of readings.
     fn log_det(&self, weights: &[Weight], s: Discrepancy) -> f64 {
         weights.iter().zip(&self.weight).map(|(n, w)| w * (self.factor(*n, s).3 - n.density)).sum()
-    }
-
-    /// The discrepancy of largest likelihood: the best of some sizes of it for both equations alike, then scoring for each as long as
-    /// that helps.
-    pub fn discrepancy(&self, l: &TorqueResidual) -> Discrepancy {
-        let rows = &l.rows;
-        let eqs = self.equations();
-        let total: f64 = self.weight.iter().sum();
-        let power = |i: usize| rows[i].iter().zip(&self.weight).map(|(r, w)| w * r.norm_sqr()).sum::<f64>() / total;
-        let most = (0..eqs).map(|i| power(i) / l.alike[i]).fold(f64::MIN_POSITIVE, f64::max);
-        let alike = |v: f64| l.alike.map(|a| a * v);
-        let mut s = alike(most);
-        let mut value = self.log_likelihood(l, s);
-        for i in 1..DECADES {
-            let t = alike(most * 0.1_f64.powi(i));
-            let v = self.log_likelihood(l, t);
-            if v > value {
-                (s, value) = (t, v);
-            }
-        }
-        for _ in 0..SCORINGS {
-            let next = self.scored(l, s);
-            let v = self.log_likelihood(l, next);
-            if v.is_nan() || v <= value {
-                break;
-            }
-            let gain = v - value;
-            (s, value) = (next, v);
-            if gain < 1e-3 {
-                break;
-            }
-        }
-        s
-    }
-
-    /// The discrepancy of a model at another one: the table's, where both sides are measured, is that of an acceleration.
-    ///
-    /// No torque that is known acts on the table, so that its equation tells its parameters up to a common factor, and its discrepancy as a
-    /// torque grows with that factor. Held as a torque it would hold the factor, which the motor's equation alone tells.
-    pub fn rescaled(&self, s: Discrepancy, from: &Model, to: &Model) -> Discrepancy {
-        let grown = if self.sight == Sight::Both { to.parameters.i2 / from.parameters.i2 } else { 1.0 };
-        [s[0], s[1] * grown * grown]
-    }
-
-    /// A step of scoring from a discrepancy.
-    fn scored(&self, l: &TorqueResidual, s: Discrepancy) -> Discrepancy {
-        let rows = &l.rows;
-        let eqs = self.equations();
-        let (mut num, mut den) = ([0.0; 2], [0.0; 2]);
-        for (m, (&first, &w)) in rows[0].iter().zip(&self.weight).enumerate() {
-            let (a, b, c, _) = self.factor(l.weights[m], s);
-            let z0 = first * a;
-            if eqs == 1 {
-                let p = a * a;
-                num[0] += w * (z0.norm_sqr() * p - p);
-                den[0] += w * p * p;
-            } else {
-                let z1 = b * first + rows[1][m] * c;
-                // P R = L^-H z, P = L^-H L^-1
-                let pr = [z0 * a + b.conj() * z1, z1 * c];
-                let p = [a * a + b.norm_sqr(), c * c];
-                for i in 0..2 {
-                    num[i] += w * (pr[i].norm_sqr() - p[i]);
-                    den[i] += w * p[i] * p[i];
-                }
-            }
-        }
-        let mut next = s;
-        for i in 0..eqs {
-            if den[i] > 0.0 {
-                next[i] = (s[i] + num[i] / den[i]).clamp(0.1 * s[i], 10.0 * s[i]);
-            }
-        }
-        // An equation without any discrepancy beside one with much is a corner of the likelihood, not a finding.
-        let most = (0..eqs).map(|i| next[i] / l.alike[i]).fold(0.0, f64::max);
-        for (v, alike) in next.iter_mut().zip(&l.alike).take(eqs) {
-            *v = v.max(CORNER * most * alike);
-        }
-        next
     }
 
     /// Log likelihood at that discrepancy.
@@ -589,51 +502,6 @@ impl Band {
     pub fn noise_rms(&self) -> f64 {
         let noise = [0, 1].map(|i| if i < self.equations() { self.noise_power(i) } else { 0.0 });
         self.torque_rms(noise)
-    }
-
-    /// Whitened rows of each equation as series in time, whose products over the whole record are those of the rows.
-    pub fn whitened_in_time(&self, whitened: &[f64]) -> Vec<Vec<f64>> {
-        let n = 2 * self.omega.len();
-        let equations = self.equations();
-        let series = |i: usize| {
-            let mut z = vec![C::default(); n];
-            for (z, row) in z.iter_mut().zip(whitened.chunks_exact(2 * equations)) {
-                *z = C::new(row[2 * i], row[2 * i + 1]);
-            }
-            FftPlanner::new().plan_fft_inverse(n).process(&mut z);
-            let scale = (n as f64).sqrt();
-            z.iter().flat_map(|v| [v.re / scale, v.im / scale]).collect()
-        };
-        (0..equations).map(series).collect()
-    }
-
-    /// A spectrum of an equation as a series in time; nothing of an equation that the record has not.
-    pub fn in_time(&self, row: &[C]) -> Vec<f64> {
-        if row.is_empty() {
-            return Vec::new();
-        }
-        let mut z = vec![C::default(); self.n];
-        for (m, v) in row.iter().enumerate() {
-            z[m] = *v;
-            z[(self.n - m) % self.n] = v.conj();
-        }
-        FftPlanner::new().plan_fft_inverse(self.n).process(&mut z);
-        z.iter().map(|v| v.re / (self.n as f64).sqrt()).collect()
-    }
-
-    /// A series in the band, in time.
-    pub fn filtered(&self, series: &[f64]) -> Vec<f64> {
-        let mut planner = FftPlanner::new();
-        let mut z: Vec<C> = series.iter().zip(&self.taper).map(|(r, w)| C::new(r * w, 0.0)).collect();
-        planner.plan_fft_forward(self.n).process(&mut z);
-        let count = self.omega.len();
-        for (m, v) in z.iter_mut().enumerate() {
-            if m >= count && self.n - m >= count {
-                *v = C::default();
-            }
-        }
-        planner.plan_fft_inverse(self.n).process(&mut z);
-        z.iter().map(|v| v.re / self.n as f64).collect()
     }
 }
 

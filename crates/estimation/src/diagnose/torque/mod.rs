@@ -11,6 +11,7 @@ mod band;
 mod conclusion;
 mod descent;
 mod determined;
+mod discrepancy;
 mod fit;
 mod gap;
 mod hidden;
@@ -21,6 +22,7 @@ mod race;
 mod scales;
 mod scatter;
 mod search;
+mod series;
 mod starts;
 #[cfg(test)]
 mod tests;
@@ -228,12 +230,7 @@ fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate, peak: f64) 
 
 impl Prepared {
     /// A search in it for some effects.
-    fn search<'a>(
-        &'a self,
-        case: &Case<'_>,
-        suspects: Vec<Effect>,
-        progress: &'a (dyn Fn(&str) + Sync),
-    ) -> Search<'a> {
+    fn search<'a>(&'a self, case: &Case<'_>, suspects: Vec<Effect>, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
         let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak);
         Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
     }

@@ -1,7 +1,7 @@
 //! What a search has fitted so far, so that nothing is fitted twice.
 
+use super::discrepancy::Discrepancy;
 use super::fit::{Fit, Term};
-use super::likelihood::Discrepancy;
 
 /// Share of the variance that a fit leaves at most, over that of another fit of the same effects, for effects to be looked for beside it
 /// anew: what the other left was not what they would have to explain.

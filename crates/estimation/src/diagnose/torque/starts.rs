@@ -2,8 +2,9 @@
 
 use super::super::model::Model;
 use super::descent::{Descent, First};
+use super::discrepancy::Discrepancy;
 use super::fit::{Fit, Problem, Term};
-use super::likelihood::{C, Discrepancy, Weight};
+use super::likelihood::{C, Weight};
 use super::scales::Scales;
 use super::search::PROBE;
 use crate::axis::Structure;
