@@ -403,7 +403,7 @@ rules! { static {
     "log-categories" Warning Quality "2.2.4" "2.4.5" Loaded(effects::log_categories);
         "Log messages are of declared categories", "Declare the category in LogCategories, so that users can choose it.";
     "log-chosen" Note Conformance "2.1.5" "2.3.1" Indirect(effects::log_chosen);
-        "The log categories that are chosen are those logged", "Log every category after fmi2SetDebugLogging(fmi2True) with nCategories = 0, and otherwise only those of the list.";
+        "Debug messages are of the log categories that are chosen", "After fmi2SetDebugLogging(fmi2True) log debug messages of every category where nCategories = 0, and otherwise only those of the categories in the list.";
     "log-unknown" Warning Robustness "2.1.5" "2.3.1" Loaded(effects::log_unknown);
         "A log category that is not declared is survived", "Return fmi2Error for a category that the FMU does not know, or leave it aside; users mistype them.";
     SIDE_DIRECTORY = "side-directory" Error Robustness "2.3" "2.5.1" Raw(effects::directory);
