@@ -1,5 +1,5 @@
-//! The course of an input whose first derivative is set with `fmi2SetRealInputDerivatives`: "the sum of u(j) h^j / j!" for all
-//! derivatives j that are given (FMI 2.0.4, section 4.1.2), so value + slope * (t - tc).
+//! The course of an input whose first derivative is set with `fmi2SetRealInputDerivatives`: with the derivatives u(j) at tc the
+//! state equations see at tc + h the input sum over j of u(j) h^j / j! (FMI 2.0.4, section 4.1.2), so value + slope * (t - tc).
 
 use super::super::description::Variable;
 use super::super::host::{HostError, Instance};

@@ -107,7 +107,7 @@ fn skips_calls<'a>(p: &Probe, variables: &[(&'a str, u32)]) -> Option<(&'a str, 
         let (one, other) = (still(&whole), still(&half));
         // Not a rest at one end, but a standstill between moves.
         let between = one.windows(2).filter(|pair| pair[1] > pair[0] + 1).count() + 1;
-        (one == other && between >= FEW && CALLS - one.len() >= FEW).then(|| (*name, one))
+        (one == other && between >= FEW && CALLS - one.len() >= FEW).then_some((*name, one))
     })
 }
 
