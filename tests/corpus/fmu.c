@@ -44,7 +44,9 @@ enum {
     LOG_ALWAYS, LOG_STAYS, PARAMETERS_LOST, PARAMETERS_REFUSED, PARAMETERS_LATE, RESOURCES_URI, STRING_SHORT,
     STRING_OVERFLOW, STRING_FREED, STRING_STACK, DAEMON,
     STRING_LONG, STRING_LONG_FREED, LOG_UNFILTERED, LOG_NEEDS_CATEGORY, LOG_UNKNOWN,
-    RESET_SOLVER, STATE_SOLVER, STATE_PROMISED, INITIAL_STATIC, DIRECTIONAL_SEVERAL, SLOPE_DOUBLED, SERIALISE_PARAMETER
+    RESET_SOLVER, STATE_SOLVER, STATE_PROMISED, INITIAL_STATIC, DIRECTIONAL_SEVERAL, SLOPE_DOUBLED, SERIALISE_PARAMETER,
+    SLOPE_STATE, SLOPE_AGAINST, SLOPE_FEEDTHROUGH, INTEGER_BEHIND, BOOLEAN_BEHIND, ENUMERATION_BEHIND, STATE_DROPPED,
+    STATE_REDONE, STATE_FALSE_IGNORED, STEP_ALTERNATE, START_CLOCK
 };
 #ifndef DEFECT
 #define DEFECT NONE
@@ -72,6 +74,8 @@ typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8 
 typedef struct {
     double x, v, w, F, k, d, g, time, last_step, noise, slope, stop, elapsed, shown, offset, spare, first_k;
     int mode, on, calls, sets;
+    /* Integer, Boolean and Enumeration output at the beginning of the step. */
+    int before[3];
     Phase phase;
     char label[1024];
     /* Of FMI 3.0 alone. */
@@ -95,6 +99,9 @@ typedef struct {
     /* What a solver remembers, and whether it was promised that no state is set. */
     double warm;
     int promised;
+    /* Steps after which no state before them is set, and the beginning of the last step. */
+    int promises;
+    double begun;
 } Instance;
 
 static double global_w;
@@ -278,6 +285,17 @@ EXPORT Status fmi2SetDebugLogging(Component c, int on, size_t count, const char 
     return OK;
 }
 
+static int count_of(const Values *s) { return (int)floor(s->time * 10 + 1e-6); }
+/* Faster than 1 m/s, which begins and ends within the second of the default experiment. */
+static int moving(const Values *s) { return fabs(s->v) > 1; }
+static int level(const Values *s) { return s->x > 0.5 ? 3 : s->x > 0 ? 2 : 1; }
+
+static void remember(Values *s) {
+    s->before[0] = count_of(s);
+    s->before[1] = moving(s);
+    s->before[2] = level(s);
+}
+
 static Status in(Instance *i, int phases, const char *call) {
     if (!i && !IS(NULL_CRASH)) return ERROR;
     return i->values.phase & phases ? OK : fail(i, call);
@@ -322,6 +340,7 @@ EXPORT Status fmi2ExitInitializationMode(Component c) {
     i->first_x = i->values.x;
     i->initialised = 1;
     i->values.shown = i->values.v;
+    remember(&i->values);
     log_text(i, OK, IS(LOG_CATEGORY) ? "logChatter" : "logEvents", "initialised", i->values.x);
     i->values.phase = STEPPING;
     return OK;
@@ -365,7 +384,7 @@ static double acceleration(const Instance *i, double x, double v, double w) {
 
 static void rate(const Instance *i, const double s[3], double after, double d[3]) {
     d[0] = s[1];
-    d[1] = acceleration(i, s[0], s[1], s[2]) + i->values.slope * after;
+    d[1] = acceleration(i, s[0], s[1], s[2]) + (IS(SLOPE_STATE) ? 2 : IS(SLOPE_AGAINST) ? -1 : 1) * i->values.slope * after;
     d[2] = s[1] - s[2];
 }
 
@@ -458,6 +477,9 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
         }
     }
     if (no_set_prior) i->promised = 1;
+    if (no_set_prior) i->promises++;
+    i->begun = point;
+    remember(s);
     /* Within the tolerance: what a solver does otherwise that goes on with an old derivative. */
     s->v += 1e-7 * i->warm;
     i->warm = 0;
@@ -465,12 +487,13 @@ EXPORT Status fmi2DoStep(Component c, double point, double step, int no_set_prio
     s->elapsed += step;
     double span = step;
     if (IS(STEP_IGNORED)) span = 0.01;
+    if (IS(STEP_ALTERNATE)) span = s->calls % 2 ? 0 : 2 * step;
     if (IS(VARIABLE) && s->last_step > 0 && step > 0.1 * s->last_step) span = s->last_step;
     s->last_step = step;
     if (!IS(HANDOVER) || pthread_equal(i->thread, pthread_self())) integrate(i, span);
     if (!IS(OUTPUT_BEHIND)) s->shown = s->v;
     if (IS(DEPENDENCY_STEP)) s->shown = s->v + 0.05 * s->F;
-    s->F += s->slope * step;
+    s->F += (IS(SLOPE_FEEDTHROUGH) ? 2 : 1) * s->slope * step;
     s->slope = 0;
     s->calls++;
     s->sets = 0;
@@ -510,6 +533,7 @@ EXPORT Status fmi2GetReal(Component c, const uint32_t r[], size_t count, double 
             value[n] = s->v;
             if ((IS(OUTPUT_BEHIND) || IS(DEPENDENCY_STEP)) && s->phase != INITIALIZING) value[n] = s->shown;
             if (IS(TIME_HIDDEN)) value[n] += sin(s->time);
+            if (IS(START_CLOCK)) value[n] += sin(s->elapsed);
             if (IS(CONVERGENCE)) value[n] += 1e-2 * s->calls;
             if (IS(DEPENDENCY)) value[n] += 0.05 * s->F;
             if (IS(NAN_OUTPUT) && s->time > 0.05) value[n] = NAN;
@@ -533,9 +557,12 @@ EXPORT Status fmi2GetInteger(Component c, const uint32_t r[], size_t count, int 
     if (in(i, INITIALIZING | STEPPING | TERMINATED, "fmi2GetInteger")) return ERROR;
     for (n = 0; n < count; n++) {
         switch (r[n]) {
-        case 0: value[n] = (int)floor(s->time * 10 + 1e-6); break;
+        case 0: value[n] = IS(INTEGER_BEHIND) && s->phase != INITIALIZING ? s->before[0] : count_of(s); break;
         case 1: value[n] = s->mode; break;
-        case 2: value[n] = IS(RANGE) || IS(ENUMERATION) && s->F > 0.01 ? 7 : s->x > 0.5 ? 3 : s->x > 0 ? 2 : 1; break;
+        case 2:
+            value[n] = IS(ENUMERATION_BEHIND) && s->phase != INITIALIZING ? s->before[2] : level(s);
+            if (IS(RANGE) || IS(ENUMERATION) && s->F > 0.01) value[n] = 7;
+            break;
         default: return fail(i, "unknown reference");
         }
     }
@@ -550,14 +577,17 @@ EXPORT Status fmi2GetBoolean(Component c, const uint32_t r[], size_t count, int 
     for (n = 0; n < count; n++) {
         switch (r[n]) {
         case 0: value[n] = s->on; break;
-        case 1: value[n] = fabs(s->v) > 1e-3 ? IS(BOOLEAN) || IS(BOOLEAN_LATE) && s->time > 0.5 ? -1 : 1 : 0; break;
+        case 1:
+            value[n] = IS(BOOLEAN_BEHIND) && s->phase != INITIALIZING ? s->before[1] : moving(s);
+            if (value[n] && (IS(BOOLEAN) || IS(BOOLEAN_LATE) && s->time > 0.5)) value[n] = -1;
+            break;
         default: return fail(i, "unknown reference");
         }
     }
     return OK;
 }
 
-static const char *text_of(const Values *s) { return fabs(s->v) > 1e-3 ? "moving" : "at rest"; }
+static const char *text_of(const Values *s) { return moving(s) ? "moving" : "at rest"; }
 
 /* A text that is longer than a host makes room for ahead. */
 static const char *long_text(const Values *s) {
@@ -689,6 +719,7 @@ EXPORT Status fmi2SetString(Component c, const uint32_t r[], size_t count, const
 typedef struct {
     Values values;
     double w;
+    int promises, restored;
 } Saved;
 
 EXPORT Status fmi2GetFMUstate(Component c, State *state) {
@@ -698,6 +729,7 @@ EXPORT Status fmi2GetFMUstate(Component c, State *state) {
     Saved *saved = *state;
     if (IS(STATE_EFFECT)) i->values.v *= 0.9;
     saved->values = i->values;
+    if (!IS(STATE_SHARED)) saved->promises = i->promises, saved->restored = 0;
     if (!IS(STATE_SHARED)) saved->w = W(i);
     return OK;
 }
@@ -710,6 +742,9 @@ EXPORT Status fmi2SetFMUstate(Component c, State state) {
     if (IS(STATE_SOLVER)) i->warm = i->values.v;
     i->values = saved->values;
     if (IS(STATE_PROMISED) && i->promised) i->values.w = w;
+    if (IS(STATE_DROPPED) && i->promises > saved->promises) i->values.w = w;
+    if (IS(STATE_REDONE) && i->promises > saved->promises && saved->restored++) i->values.w = w;
+    if (IS(STATE_FALSE_IGNORED) && saved->values.time < i->begun) i->values.w = w;
     if (IS(STATE_LATE)) i->values.elapsed = elapsed;
     if (IS(STATE_PROMISE) && spare) i->values.w = w;
     if (IS(STATE_ONCE)) saved->values.v = 0;

@@ -163,6 +163,16 @@ pub const DEFECTS: &[(&str, &str)] = &[
     ("DIRECTIONAL_SEVERAL", "directional-derivative"),
     ("SLOPE_DOUBLED", "input-derivatives-course"),
     ("SERIALISE_PARAMETER", "state-serialise"),
+    ("SLOPE_STATE", "input-derivatives-course"),
+    ("SLOPE_AGAINST", "input-derivatives-course"),
+    ("SLOPE_FEEDTHROUGH", "input-derivatives-course"),
+    ("INTEGER_BEHIND", "output-delay"),
+    ("BOOLEAN_BEHIND", "output-delay"),
+    ("ENUMERATION_BEHIND", "output-delay"),
+    ("STATE_DROPPED", "state-restore"),
+    ("STATE_REDONE", "state-restore"),
+    ("STATE_FALSE_IGNORED", "state-restore"),
+    ("STEP_ALTERNATE", "step-size"),
     ("PARAMETERS_LOST", "parameters-initial"),
     ("PARAMETERS_REFUSED", "parameters-initial"),
     ("PARAMETERS_LATE", "parameters-initial"),
@@ -173,6 +183,12 @@ pub const DEFECTS: &[(&str, &str)] = &[
     ("STRING_STACK", "string-values"),
     ("STRING_LONG_FREED", "string-values"),
 ];
+
+/// Makes the output z depend on the time.
+pub const TIME_DECLARED: (&str, &str) = (
+    "<Unknown index=\"8\" dependencies=\"3\" dependenciesKind=\"constant\"/>",
+    "<Unknown index=\"8\" dependencies=\"1 3\" dependenciesKind=\"dependent constant\"/>",
+);
 
 pub fn mutants() -> Vec<Mutant> {
     let mutant = |&(defect, rule): &(&'static str, &'static str)| {
@@ -186,7 +202,11 @@ pub fn mutants() -> Vec<Mutant> {
         )]);
         pack(&corpus::running(&text, "NONE"))
     });
-    DEFECTS.iter().map(mutant).chain([understated]).collect()
+    // An excitation that is counted from the beginning of the run shows where it is declared to depend on the time.
+    let clock = Mutant::new("START_CLOCK", "start-time-effect", || {
+        pack(&corpus::running(&corpus::description(&[TIME_DECLARED]), "START_CLOCK"))
+    });
+    DEFECTS.iter().map(mutant).chain([understated, clock]).collect()
 }
 
 #[test]
@@ -196,7 +216,7 @@ fn every_defect_of_the_c_source_is_in_the_list() {
     let switches: Vec<&str> = list
         .split(',')
         .map(str::trim)
-        .filter(|name| !["NONE", "DAEMON", "LOG_FOREIGN", "STRING_LONG"].contains(name))
+        .filter(|name| !["NONE", "DAEMON", "LOG_FOREIGN", "STRING_LONG", "START_CLOCK"].contains(name))
         .collect();
     assert_eq!(switches.len(), DEFECTS.len());
     for switch in switches {

@@ -15,12 +15,15 @@ const BINARY: &str = "binaries/x86_64-linux/corpus.so";
 
 /// Defects of what FMI 3.0 does not have, or has otherwise: input derivatives, allocation callbacks, a callbacks structure,
 /// the types platform, pending steps to cancel.
-const NOT_OF_3: [&str; 21] = [
+const NOT_OF_3: [&str; 24] = [
     "PLATFORM",
     "CANCEL",
     "INPUT_DERIVATIVE",
     "SLOPE_IGNORED",
     "SLOPE_DOUBLED",
+    "SLOPE_STATE",
+    "SLOPE_AGAINST",
+    "SLOPE_FEEDTHROUGH",
     "CALLBACKS",
     "NAME_KEPT",
     "ALLOCATION",
@@ -333,7 +336,14 @@ pub fn running_mutants() -> Vec<Mutant> {
         )]);
         running(&text, "NONE", "")
     });
-    shared.chain(own).chain([understated]).collect()
+    let clock = Mutant::new("3.0: START_CLOCK", "start-time-effect", || {
+        let text = description(&[(
+            "<Output valueReference=\"7\" dependencies=\"2\" dependenciesKind=\"constant\"/>",
+            "<Output valueReference=\"7\" dependencies=\"0 2\" dependenciesKind=\"dependent constant\"/>",
+        )]);
+        running(&text, "START_CLOCK", "")
+    });
+    shared.chain(own).chain([understated, clock]).collect()
 }
 
 /// All mutants of FMI 3.0.

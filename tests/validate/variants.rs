@@ -259,6 +259,8 @@ pub fn variants() -> Vec<Variant> {
     files.push(("documentation/licenses/".to_owned(), vec![]));
     add("other files", pack(&files));
     add("a text longer than a host makes room for", pack(&running(DESCRIPTION, "STRING_LONG")));
+    let timed = description(&[super::defects::TIME_DECLARED]);
+    add("an output that depends on the time", pack(&running(&timed, "TIME_HIDDEN")));
     all.push(empty_structure());
     all
 }

@@ -226,8 +226,9 @@ fn logged(p: &Probe, options: &InstanceOptions, on: Option<&[&str]>) -> Result<B
 }
 
 /// "If loggingOn = fmi2True and nCategories = 0, then all debug messages shall be output. If loggingOn = fmi2True and
-/// nCategories > 0, then only debug messages according to the categories argument shall be output" (section 2.1.5). What
-/// loggingOn of fmi2Instantiate lets through the standard leaves open: some of all.
+/// nCategories > 0, then only debug messages according to the categories argument shall be printed via the logger function"
+/// (section 2.1.5). A debug message is here one with fmi2OK: what is logged with fmi2Warning and worse is due whatever was
+/// chosen. Which categories loggingOn of fmi2Instantiate lets through is the vendor's choice: they are some of all.
 pub(in super::super) fn log_chosen(p: &Probe) -> Tested {
     /// Each category takes an instance.
     const MOST: usize = 8;
@@ -242,7 +243,7 @@ pub(in super::super) fn log_chosen(p: &Probe) -> Tested {
     let mut problems = Vec::new();
     if !missing.is_empty() {
         problems.push(format!(
-            "with loggingOn of fmi2Instantiate there are messages of the categories {missing:?}, after fmi2SetDebugLogging(fmi2True) of no category, which is all of them, there are none"
+            "a run made with loggingOn = fmi2True logs messages with fmi2OK of the categories {missing:?}, one after fmi2SetDebugLogging(fmi2True) with nCategories = 0, which asks for all debug messages, logs none of them"
         ));
     }
     let declared: BTreeSet<&String> = p.d.log_categories.iter().map(|c| &c.0).collect();
@@ -251,7 +252,9 @@ pub(in super::super) fn log_chosen(p: &Probe) -> Tested {
         let other = |name: &&String| name != category && declared.contains(name) && !off.contains(*name);
         let others: Vec<&String> = others.iter().filter(other).collect();
         if !others.is_empty() {
-            problems.push(format!("of the category {category:?} alone, messages of {others:?} are logged as well"));
+            problems.push(format!(
+                "after fmi2SetDebugLogging(fmi2True) of the category {category:?} alone, messages with fmi2OK of {others:?} are logged as well"
+            ));
             break;
         }
     }

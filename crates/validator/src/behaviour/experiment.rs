@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::super::description::{BaseType, Causality, Value, Variable};
-use super::super::host::{HostError, Instance, Status};
+use super::super::host::{HostError, Status};
 use super::lifecycle::last_words;
 use super::probe::{Learned, Probe, Snapshot, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
@@ -82,39 +82,6 @@ fn default_run(p: &Probe) -> Result<Run, super::Stop> {
         }
     }
     Ok(Run::Done(cost(steps)))
-}
-
-/// "startTime" is the initial value of the independent variable (section 2.1.6): a run from another one.
-pub(in super::super) fn start_time(p: &Probe) -> Tested {
-    let start = p.start + 10.0 * p.step;
-    let mut instance = p.instantiate()?;
-    if let Err(error) = instance.initialize(start, None) {
-        return not_tested(format!("the FMU does not start at {start} s: {error}"));
-    }
-    let time = p.d.variables.iter().find(|v| v.causality == Causality::Independent && v.base() == BaseType::Real);
-    let read = |instance: &mut Instance| match time {
-        Some(v) => instance.get_real(&[v.value_reference]).map(|values| Some(values[0])),
-        None => Ok(None),
-    };
-    let close = |found: f64, expected: f64| (found - expected).abs() <= 1e-6 * p.step + 1e-9 * expected.abs();
-    let before = read(&mut instance)?;
-    let status = instance.do_step_status(start, p.step, true)?;
-    if matches!(status, Status::Error | Status::Fatal) {
-        let said = last_words(&instance);
-        return Ok(vec![format!(
-            "a step from the start time {start} s returned {status}, one from {} s does not{said}",
-            p.start
-        )]);
-    }
-    // Some FMUs tell the time only after a step; those with a step of their own, longer than this one, at its end only.
-    if let (Some(before), Some(after), Some(v)) = (before, read(&mut instance)?, time)
-        && !close(before, start)
-        && !close(after, start + p.step)
-    {
-        let found = format!("\"{}\" is {before} after initialisation at {start}", v.name);
-        return Ok(vec![format!("the start time is ignored: {found}, and {after} a step of {} later", p.step)]);
-    }
-    Ok(vec![])
 }
 
 /// "If the environment tries to compute past stopTime the FMU has to return fmi2Error" (section 2.1.6).

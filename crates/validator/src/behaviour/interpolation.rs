@@ -4,7 +4,7 @@ use super::super::description::{BaseType, Causality, Variability, Variable};
 use super::super::host::HostError;
 use super::probe::{Probe, Snapshot, Stop, Tested, not_applicable, not_tested};
 
-fn continuous_inputs(p: &Probe) -> Result<Vec<(usize, &Variable)>, Stop> {
+pub(super) fn continuous_inputs(p: &Probe) -> Result<Vec<(usize, &Variable)>, Stop> {
     if !p.interface().can_interpolate_inputs {
         return not_applicable("canInterpolateInputs is false");
     }
@@ -14,7 +14,7 @@ fn continuous_inputs(p: &Probe) -> Result<Vec<(usize, &Variable)>, Stop> {
 }
 
 /// The value of an input where the tested step begins, and a change of it that stays within its bounds; None where there is no such.
-fn change(p: &Probe, v: &Variable, order: usize) -> Option<(f64, f64)> {
+pub(super) fn change(p: &Probe, v: &Variable, order: usize) -> Option<(f64, f64)> {
     let r = p.d.resolved(v);
     let (low, high) = (r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY));
     let value = if p.learned.stimulus { p.input(v, order, p.time(2)) } else { 0.0 };
@@ -65,70 +65,6 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
     }
 }
 
-/// A slope set with `fmi2SetRealInputDerivatives` against the same course in small steps, each with the value in its middle:
-/// "u(t) = u(tc) + du/dt (t - tc)" (fmi2SetRealInputDerivatives, section 4.2.1).
-pub(in super::super) fn course(p: &Probe) -> Tested {
-    /// Small steps for one.
-    const PARTS: usize = 8;
-    /// What goes further from the course than this is another slope: by its factor, or its sign.
-    const FITS: std::ops::RangeInclusive<f64> = 0.6..=1.6;
-    let inputs = continuous_inputs(p)?;
-    if !p.interface().can_handle_variable_step_size {
-        return not_applicable("canHandleVariableCommunicationStepSize is false");
-    }
-    if !effect(p)?.is_empty() {
-        return not_tested("input derivatives have no effect");
-    }
-    let run = |parts: usize, v: &Variable, value: f64, rise: f64, sloped: bool| -> Result<Snapshot, HostError> {
-        let (r, part) = ([v.value_reference], p.step / parts as f64);
-        let mut instance = p.ready()?;
-        p.run(&mut instance, 0, 2)?;
-        p.drive(&mut instance, p.time(2))?;
-        for k in 0..parts {
-            let middle = if sloped { 0.0 } else { (k as f64 + 0.5) / parts as f64 };
-            instance.set_real(&r, &[value + middle * rise])?;
-            if sloped {
-                instance.set_input_derivatives(&r, &[1], &[rise / p.step])?;
-            }
-            instance.do_step(p.time(2) + k as f64 * part, part)?;
-        }
-        p.observe(&mut instance)
-    };
-    let mut tested = false;
-    for (order, v) in inputs.into_iter().take(10) {
-        let Some((value, rise)) = change(p, v, order) else { continue };
-        let courses = || -> Result<[Snapshot; 4], HostError> {
-            Ok([
-                run(1, v, value, 0.0, false)?,
-                run(1, v, value, rise, true)?,
-                run(PARTS, v, value, 0.0, false)?,
-                run(PARTS, v, value, rise, false)?,
-            ])
-        };
-        let Ok([plain, sloped, flat, stairs]) = courses() else { continue };
-        let mut ratios = Vec::new();
-        for (at, o) in
-            p.observed[0].iter().enumerate().filter(|(_, o)| o.calculated && o.reference != v.value_reference)
-        {
-            let (given, due) = (sloped.reals[at] - plain.reals[at], stairs.reals[at] - flat.reals[at]);
-            let size = stairs.reals[at].abs().max(plain.reals[at].abs());
-            if due.is_finite() && due.abs() > (3.0 * p.tolerance() * size).max(1e-12) {
-                ratios.push((o.name.as_str(), given / due));
-            }
-        }
-        tested |= !ratios.is_empty();
-        // Where some of the variables go along, the others may be computed otherwise.
-        if let Some((name, ratio)) = ratios.first().filter(|_| ratios.iter().all(|(_, ratio)| !FITS.contains(ratio))) {
-            return Ok(vec![format!(
-                "with a slope of the input \"{}\" set with fmi2SetRealInputDerivatives \"{name}\" moves {ratio:.2} times as far as in {PARTS} \
-                 small steps along that slope",
-                v.name
-            )]);
-        }
-    }
-    if tested { Ok(vec![]) } else { not_tested("nothing answers to an input within a step") }
-}
-
 pub(in super::super) fn input_derivatives(p: &Probe) -> Tested {
     let inputs: Vec<u32> = continuous_inputs(p)?.into_iter().map(|(_, v)| v.value_reference).collect();
     let mut instance = p.ready()?;
@@ -157,6 +93,7 @@ pub(in super::super) fn output_derivatives(p: &Probe) -> Tested {
     if outputs.is_empty() {
         return not_applicable("there is no continuous Real output");
     }
+    super::steps::size_counts(p)?;
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();

@@ -1,5 +1,6 @@
 //! Behavioural rules: each loads the FMU in a process of its own (see [`super::isolation`]) and looks what it does.
 
+pub(super) mod delay;
 pub(super) mod dependencies;
 pub(super) mod effects;
 pub(super) mod experiment;
@@ -10,9 +11,12 @@ pub(super) mod lifecycle;
 mod measure;
 pub(super) mod partial;
 pub(crate) mod probe;
+mod promise;
 pub(super) mod references;
 pub(super) mod rounded;
 pub(super) mod settings;
+pub(super) mod slope;
+pub(super) mod start;
 pub(super) mod state;
 pub(super) mod steps;
 pub(super) mod surroundings;

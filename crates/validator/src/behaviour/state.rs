@@ -3,6 +3,7 @@
 use super::super::description::{Causality, Variability};
 use super::super::host::{HostError, Instance};
 use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
+use super::promise;
 use super::settable_real;
 use super::values::get_consistent;
 
@@ -102,30 +103,9 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     instance.free_state(early)?;
     instance.free_state(late)?;
     if problems.is_empty() {
-        problems.extend(after_a_promise(p)?);
+        problems.extend(promise::kept(p)?);
     }
     Ok(problems)
-}
-
-/// "fmi2SetFMUstate will not be called for time instants prior to currentCommunicationPoint" (noSetFMUStatePriorToCurrentPoint,
-/// section 4.2.2): steps of which that was said are behind; from the state at their end the run may be had again.
-fn after_a_promise(p: &Probe) -> Result<Option<String>, HostError> {
-    if p.interface().only_once {
-        return Ok(None);
-    }
-    let (n, cut) = (p.steps(), p.steps() / 3);
-    let mut instance = p.ready()?;
-    p.run(&mut instance, 0, cut)?;
-    instance.may_go_back = true;
-    let state = instance.get_state()?;
-    let expected = p.run(&mut instance, cut, n)?;
-    instance.set_state(&state)?;
-    let found = p.run(&mut instance, cut, n)?;
-    instance.free_state(state)?;
-    let what = p.difference_beyond_tolerance(&expected, &found, cut);
-    Ok(what.map(|what| {
-        format!("a state got after steps with noSetFMUStatePriorToCurrentPoint = fmi2True is not restored: {what}")
-    }))
 }
 
 /// A run in which no state is ever got; none where there can be but one instance.

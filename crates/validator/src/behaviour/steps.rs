@@ -44,9 +44,9 @@ fn try_course(p: &Probe, references: &[u32], sizes: &[f64], count: usize) -> Res
 }
 
 /// The variables, and their courses at `h` and `h/2`, when both can be run.
-type Courses<'a> = (Vec<(&'a str, u32)>, Vec<Vec<f64>>, Vec<Vec<f64>>);
+pub(super) type Courses<'a> = (Vec<(&'a str, u32)>, Vec<Vec<f64>>, Vec<Vec<f64>>);
 
-fn two_sizes(p: &Probe, count: usize) -> Result<Courses<'_>, super::Stop> {
+pub(super) fn two_sizes(p: &Probe, count: usize) -> Result<Courses<'_>, super::Stop> {
     let variables = courses(p);
     if variables.is_empty() {
         return not_applicable("there is no continuous Real output");
@@ -80,33 +80,71 @@ fn ignores_size<'a>((variables, whole, half): &Courses<'a>) -> Option<&'a str> {
     first
 }
 
-/// Stops a rule that makes no sense when the step size is ignored.
-pub(super) fn size_counts(p: &Probe) -> Result<(), super::Stop> {
-    match two_sizes(p, 10) {
-        Ok(courses) if ignores_size(&courses).is_some() => not_tested("the step size is ignored"),
-        _ => Ok(()),
-    }
+/// A moving variable that stands still in the same calls whatever their size, and these calls, from 1: an FMU with a fixed step of
+/// its own stands still by the time, so in other calls where they are shorter. With inputs that vary, for an FMU may be at rest
+/// with its start values. Nothing where it does not run so.
+fn skips_calls<'a>(p: &Probe, variables: &[(&'a str, u32)]) -> Option<(&'a str, Vec<usize>)> {
+    const CALLS: usize = 10;
+    /// Of the calls that stand still, and of those that do not.
+    const FEW: usize = 3;
+    let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
+    let driven = |size: f64| -> Result<Vec<Vec<f64>>, HostError> {
+        let mut instance = p.ready()?;
+        let mut rows = vec![instance.get_real(&references)?];
+        for k in 0..CALLS {
+            let time = p.start + k as f64 * size * p.step;
+            p.drive(&mut instance, time)?;
+            instance.do_step(time, size * p.step)?;
+            rows.push(instance.get_real(&references)?);
+        }
+        Ok(rows)
+    };
+    let (whole, half) = (driven(1.0).ok()?, driven(0.5).ok()?);
+    variables.iter().enumerate().find_map(|(at, (name, _))| {
+        let still = |rows: &[Vec<f64>]| -> Vec<usize> {
+            (1..=CALLS).filter(|&k| rows[k][at].to_bits() == rows[k - 1][at].to_bits()).collect()
+        };
+        let (one, other) = (still(&whole), still(&half));
+        // Not a rest at one end, but a standstill between moves.
+        let between = one.windows(2).filter(|pair| pair[1] > pair[0] + 1).count() + 1;
+        (one == other && between >= FEW && CALLS - one.len() >= FEW).then_some((*name, one))
+    })
 }
 
-pub(in super::super) fn ignored(p: &Probe) -> Tested {
-    let courses = two_sizes(p, 10)?;
-    Ok(match ignores_size(&courses) {
-        Some(name) => {
-            let (h, half) = (p.step, p.step / 2.0);
-            vec![format!(
-                "fmi2DoStep ignores communicationStepSize: \"{name}\" takes the same values in steps of {half} as in steps of {h}"
-            )]
-        }
-        None => vec![],
+/// What there is to say of an FMU that does not go by the step size; none where it does.
+fn other_size(p: &Probe, courses: &Courses<'_>) -> Option<String> {
+    let (h, half) = (p.step, p.step / 2.0);
+    if let Some(name) = ignores_size(courses) {
+        return Some(format!(
+            "fmi2DoStep ignores communicationStepSize: \"{name}\" takes the same values in steps of {half} as in steps of {h}"
+        ));
+    }
+    skips_calls(p, &courses.0).map(|(name, still)| {
+        format!(
+            "fmi2DoStep does not integrate to the end of each step: \"{name}\" stands still in the calls {still:?} and moves in the others, in steps of {h} and of {half} alike"
+        )
     })
+}
+
+/// Stops a rule that makes no sense when the step size is not honoured.
+pub(super) fn by_size(p: &Probe, courses: &Courses<'_>) -> Result<(), super::Stop> {
+    if other_size(p, courses).is_some() { not_tested("the step size is not honoured") } else { Ok(()) }
+}
+
+/// See [`by_size`].
+pub(super) fn size_counts(p: &Probe) -> Result<(), super::Stop> {
+    two_sizes(p, 10).map_or(Ok(()), |courses| by_size(p, &courses))
+}
+
+/// "The slave must integrate until time instant tc(i+1) = tc(i) + hc(i)" (fmi2DoStep, section 4.2.2).
+pub(in super::super) fn honoured(p: &Probe) -> Tested {
+    Ok(other_size(p, &two_sizes(p, 10)?).into_iter().collect())
 }
 
 pub(in super::super) fn convergence(p: &Probe) -> Tested {
     let count = 8;
     let courses = two_sizes(p, count)?;
-    if ignores_size(&courses).is_some() {
-        return not_tested("the step size is ignored");
-    }
+    by_size(p, &courses)?;
     let (variables, whole, half) = courses;
     let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
     let quarter = try_course(p, &references, &[0.25], 4 * count)?;
@@ -127,43 +165,8 @@ pub(in super::super) fn convergence(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// Outputs that are those of the step before: then a course in steps of h, looked at one step later, is that in steps of
-/// h/2, looked at one of its steps later.
-pub(in super::super) fn delay(p: &Probe) -> Tested {
-    let count = 10;
-    let courses = two_sizes(p, count)?;
-    if ignores_size(&courses).is_some() {
-        return not_tested("the step size is ignored");
-    }
-    let (variables, whole, half) = courses;
-    let mut problems = Vec::new();
-    for (at, (name, _)) in variables.iter().enumerate() {
-        let scale = range(&half, at);
-        // The first step changes nothing yet, of either size.
-        if whole[1][at] != whole[0][at] || half[1][at] != half[0][at] || scale <= 1e-9 * whole[0][at].abs() {
-            continue;
-        }
-        let apart = |later: bool| {
-            let pairs = (1..count).map(|k| match later {
-                false => (whole[k][at], half[2 * k][at]),
-                true => (whole[k + 1][at], half[2 * k + 1][at]),
-            });
-            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-        };
-        if apart(false) > 1e-4 * scale && apart(true) < 0.01 * apart(false) {
-            problems.push(format!(
-                "\"{name}\" is one step late: it stays {} over the first step, and in steps of {} and {} it differs by one \
-                 step's worth each time",
-                whole[0][at],
-                p.step,
-                p.step / 2.0
-            ));
-        }
-    }
-    Ok(problems)
-}
-
-fn range(rows: &[Vec<f64>], at: usize) -> f64 {
+/// How far a variable goes.
+pub(super) fn range(rows: &[Vec<f64>], at: usize) -> f64 {
     let low = rows.iter().map(|row| row[at]).fold(f64::INFINITY, f64::min);
     let high = rows.iter().map(|row| row[at]).fold(f64::NEG_INFINITY, f64::max);
     high - low
@@ -243,9 +246,7 @@ pub(in super::super) fn variable(p: &Probe) -> Tested {
     }
     let count = 8;
     let courses = two_sizes(p, count)?;
-    if ignores_size(&courses).is_some() {
-        return not_tested("the step size is ignored");
-    }
+    by_size(p, &courses)?;
     let (variables, whole, half) = courses;
     let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
     let quarter = try_course(p, &references, &[0.25], 4 * count)?;

@@ -11,8 +11,8 @@
 
 use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
 use super::super::behaviour::{
-    dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, rounded,
-    settings, state, steps, surroundings, three, values,
+    delay, dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, rounded,
+    settings, slope, start, state, steps, surroundings, three, values,
 };
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
@@ -254,8 +254,10 @@ rules! { static {
         "Resources are found in a folder with blanks and umlauts", "fmuResourceLocation is a URI (RFC 3986): decode %20 and the like before opening files.";
     "resources-uri" Warning Conformance "2.1.5" "-" Raw(surroundings::short_uri);
         "Resources are found by a URI without an authority, file:/path", "Take both file:/path and file:///path for fmuResourceLocation: the standard asks for both, and importers in Java write the first.";
-    START_TIME = "start-time" Error Conformance "2.1.6" "2.3.2" Loaded(experiment::start_time);
+    START_TIME = "start-time" Error Conformance "2.1.6" "2.3.2" Loaded(start::start_time);
         "The start time is where the run begins", "Take startTime of fmi2SetupExperiment for the initial time.";
+    "start-time-effect" Note Robustness "2.1.6" "2.3.2" Indirect(start::effect);
+        "What depends on the time starts at the start time", "Count the time of excitations from startTime, not from the beginning of the run; or leave the independent variable out of the dependencies of what does not depend on it.";
     "stop-time" Note Conformance "2.1.6" "2.3.2" Loaded(experiment::stop_time);
         "A step past the stop time is refused", "Return fmi2Error when stopTimeDefined is true and a step would end after stopTime.";
     "start-values" Error Conformance "2.2.7" "2.4.7" Loaded(values::start_values);
@@ -324,11 +326,11 @@ rules! { static {
         "A state serialised and read back is the same, in another instance too", "Serialise the whole state, and no pointers.";
     "state-leak" Warning Robustness "2.1.8" "2.2.6.4" Indirect(leaks::state_leak);
         "States that are freed leave no memory behind", "Free in fmi2FreeFMUstate all that fmi2GetFMUstate and fmi2DeSerializeFMUstate took.";
-    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(steps::ignored);
+    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(steps::honoured);
         "communicationStepSize is honoured", "Integrate to currentCommunicationPoint + communicationStepSize.";
     "step-convergence" Warning Robustness "4.2.2" "4.2.1" Loaded(steps::convergence);
         "Results converge as the step shrinks", "Scale whatever happens once a call with the step size, or sub-step internally.";
-    "output-delay" Warning Robustness "4.2.2" "4.2.1" Indirect(steps::delay);
+    "output-delay" Warning Robustness "4.2.2" "4.2.1" Indirect(delay::delay);
         "Outputs are those at the end of the step", "Compute outputs after the integration, from the new states.";
     "step-variable" Error Conformance "4.3.1" "4.4" Loaded(steps::variable);
         "Steps of varying size give the results of equal ones", "Use the size of the present step, or clear canHandleVariableCommunicationStepSize.";
@@ -358,7 +360,7 @@ rules! { static {
         "Input derivatives are taken, and zero ones change nothing", "Implement fmi2SetRealInputDerivatives or clear canInterpolateInputs.";
     "input-derivatives-effect" Error Conformance "4.3.1" "-" Indirect(interpolation::effect);
         "Input derivatives have an effect", "Let the input run along its slope during the step, or clear canInterpolateInputs.";
-    "input-derivatives-course" Warning Robustness "4.2.1" "-" Indirect(interpolation::course);
+    "input-derivatives-course" Warning Robustness "4.2.1" "-" Indirect(slope::course);
         "The input runs along its derivative", "Let the input be value + derivative * (t - currentCommunicationPoint) during the step.";
     OUTPUT_DERIVATIVES = "output-derivatives" Error Conformance "4.2.1" "2.2.12" Loaded(interpolation::output_derivatives);
         "Output derivatives are given", "Implement fmi2GetRealOutputDerivatives or set maxOutputDerivativeOrder to 0.";
@@ -403,7 +405,7 @@ rules! { static {
     "log-categories" Warning Quality "2.2.4" "2.4.5" Loaded(effects::log_categories);
         "Log messages are of declared categories", "Declare the category in LogCategories, so that users can choose it.";
     "log-chosen" Note Conformance "2.1.5" "2.3.1" Indirect(effects::log_chosen);
-        "The log categories that are chosen are those logged", "Log every category after fmi2SetDebugLogging(fmi2True) with nCategories = 0, and otherwise only those of the list.";
+        "Debug messages are of the log categories that are chosen", "After fmi2SetDebugLogging(fmi2True) log debug messages of every category where nCategories = 0, and otherwise only those of the categories in the list.";
     "log-unknown" Warning Robustness "2.1.5" "2.3.1" Loaded(effects::log_unknown);
         "A log category that is not declared is survived", "Return fmi2Error for a category that the FMU does not know, or leave it aside; users mistype them.";
     SIDE_DIRECTORY = "side-directory" Error Robustness "2.3" "2.5.1" Raw(effects::directory);
