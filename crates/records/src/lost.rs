@@ -16,8 +16,8 @@ const NEAREST: usize = 3;
 const FAR: f64 = 6.0;
 /// Residual of the cubic over the usual one about it up to which the neighbours agree with each other.
 const AGREE: f64 = 2.5;
-/// Error of the cubic over the residual of many neighbours from which a sample is lost however they agree: a blow, which they do not agree
-/// about, leaves as much at them as at the sample between them.
+/// Error of the cubic over the residual of many neighbours from which a held sample is lost however they agree: a blow, which they do not
+/// agree about, leaves as much at them as at the sample between them.
 const CLEAR: f64 = 20.0;
 /// Samples in which the residual is a usual one.
 const BLOCK: usize = 256;
@@ -73,9 +73,12 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f6
         let usual = *residuals.select_nth_unstable_by(block.len() / 2, f64::total_cmp).1;
         for (&k, (expected, residual)) in block.iter().zip(&cubics) {
             // A fast motion is no cubic: what it leaves now and then is measured by what it leaves as a rule.
-            let off = (y[k] - expected[0]).abs().min((y[k + span] - expected[1]).abs());
-            let agree = *residual <= AGREE * usual.max(noise) || reach == MANY && off > CLEAR * residual;
-            if agree
+            let off = (y[k] - expected[0]).abs().max((y[k + span] - expected[1]).abs());
+            // A reading with noise in it repeats only where it is held.
+            let held = y[k] == y[k - 1] && y[k + span] == y[k + span - 1];
+            let clear = reach == MANY && held && off > CLEAR * residual;
+            let agree = *residual <= AGREE * usual.max(noise);
+            if (clear || agree && span < 2)
                 && off > FAR * residual.max(usual).max(noise)
                 && out.last().is_none_or(|(last, ..)| last + span < k)
             {
