@@ -1,8 +1,8 @@
 //! Samples that a log lost: spikes of a disturbed line, and samples that repeat the one before.
 //!
 //! A position runs smoothly from sample to sample, at a blow with a kink that stays; lost is one, or two near each other, that their
-//! neighbours, which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry 36(8),
-//! 1964).
+//! neighbours, which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry
+//! 36(8), 1964).
 
 /// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
 /// hides another near it until it is bridged, and two that hide each other are found together.

@@ -67,9 +67,10 @@ pub fn sentence(d: &Diagnosis) -> String {
 
 /// Two causes of unlike families that explain the gap of an unexplained record alike.
 pub fn either(d: &Diagnosis) -> Option<String> {
-    let unlike = |c: &&Confusable| c.named.info().family != c.other.info().family;
-    let pair = d.confusable.iter().filter(|_| d.verdict == Verdict::Unexplained).find(unlike)?;
-    Some(told_apart(pair))
+    if d.verdict != Verdict::Unexplained {
+        return None;
+    }
+    d.confusable.iter().find(|c| c.named.info().family != c.other.info().family).map(told_apart)
 }
 
 /// What is to be told from what.

@@ -5,7 +5,8 @@ use std::sync::atomic::Ordering;
 use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::determined::{is_simpler, is_undetermined, steadiness};
-use super::fit::{Fit, Term};
+use super::fit::Fit;
+use super::pool::likeliest_of;
 use super::search::{ALIKE, MINOR, Search, is_extension};
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
@@ -345,12 +346,6 @@ fn nested_fit<'f>(fit: &Fit, i: usize, pool: &'f [Fit]) -> Option<&'f Fit> {
     let mut terms = fit.terms.clone();
     terms.remove(i);
     likeliest_of(&terms, pool)
-}
-
-/// The likeliest fit of these effects in these forms, in any order.
-fn likeliest_of<'f>(terms: &[Term], pool: &'f [Fit]) -> Option<&'f Fit> {
-    let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
-    pool.iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 /// Named effects that another family explains as well, beside those that are known to be such.

@@ -3,10 +3,6 @@
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, Term};
 
-/// Share of the variance that a fit leaves at most, over that of another fit of the same effects, for effects to be looked for beside it
-/// anew: what the other left was not what they would have to explain.
-const POORER: f64 = 0.75;
-
 /// Hypotheses fitted, in the order they were.
 #[derive(Default)]
 pub struct Pool {
@@ -32,11 +28,10 @@ impl Pool {
         self.fits.extend_from_slice(fits);
     }
 
-    /// The fits with one effect more than this one, where all of them were looked for beside one that is not poorer.
-    pub fn extensions(&self, fit: &Fit) -> Option<Vec<Fit>> {
-        let terms = sorted(&fit.terms);
-        let is_poorer = |s: &Discrepancy| (0..2).any(|i| fit.discrepancy[i] < POORER * s[i]);
-        self.extended.iter().any(|(t, s)| *t == terms && !is_poorer(s)).then(|| {
+    /// The fits with one effect more than these, where all of them were looked for beside a fit that left what counts `as_good`.
+    pub fn extensions(&self, terms: &[Term], as_good: impl Fn(&Discrepancy) -> bool) -> Option<Vec<Fit>> {
+        let sorted = sorted(terms);
+        self.extended.iter().any(|(t, s)| *t == sorted && as_good(s)).then(|| {
             let is = |f: &&Fit| f.terms.len() == terms.len() + 1 && terms.iter().all(|t| f.terms.contains(t));
             self.fits.iter().filter(is).cloned().collect()
         })
@@ -44,9 +39,7 @@ impl Pool {
 
     /// The likeliest fit of these effects in these forms that was made to its end.
     pub fn settled(&self, terms: &[Term]) -> Option<&Fit> {
-        let terms = sorted(terms);
-        let is = |f: &&Fit| f.settled && f.terms.len() == terms.len() && sorted(&f.terms) == terms;
-        self.fits.iter().filter(is).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+        likeliest_of(terms, self.fits.iter().filter(|f| f.settled))
     }
 
     /// All of them.
@@ -58,6 +51,12 @@ impl Pool {
     pub fn into_fits(self) -> Vec<Fit> {
         self.fits
     }
+}
+
+/// The likeliest fit of these effects in these forms, in any order.
+pub fn likeliest_of<'f>(terms: &[Term], fits: impl IntoIterator<Item = &'f Fit>) -> Option<&'f Fit> {
+    let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
+    fits.into_iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 fn sorted(terms: &[Term]) -> Vec<Term> {

@@ -328,9 +328,12 @@ impl Search<'_> {
         self.pruned(at, pool)
     }
 
-    /// The fits with one effect more, each looked for once.
+    /// The fits with one effect more, each looked for once; anew beside a fit that leaves materially less than the one beside which they
+    /// were looked for, which is not what they would have to explain.
     fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
-        if let Some(known) = pool.extensions(fit) {
+        let as_good =
+            |s: &Discrepancy| (0..self.band().equations()).all(|i| fit.discrepancy[i] >= (1.0 - MATERIAL) * s[i]);
+        if let Some(known) = pool.extensions(&fit.terms, as_good) {
             return known;
         }
         let mut added = self.added(fit, keep);
