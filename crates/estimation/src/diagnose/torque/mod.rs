@@ -1,7 +1,8 @@
 //! A rigid axis diagnosed by the torque that its model lacks to follow the record.
 //!
-//! [`search`] is the procedure, top to bottom, [`conclusion`] its end; [`likelihood`] the one evidence, with sensor noise and model
-//! discrepancy in it; [`tracking`] what a model lacks; [`fit`] a hypothesis fitted; [`gap`] how far the gap shrinks on data that no fit has seen. A
+//! [`search`] is the procedure, top to bottom, [`material`] what counts as a cause in it, [`conclusion`] its end; [`likelihood`] the one
+//! evidence, with sensor noise and model discrepancy in it; [`tracking`] what a model lacks; [`fit`] a hypothesis fitted; [`gap`] how far
+//! the gap shrinks on data that no fit has seen. A
 //! machine's log is made under control, its model never complete: its verdict must not be sought at the noise floor of a simulation
 //! (Gautier, Khalil, and the inverse dynamics of robot identification; Kennedy, O'Hagan, JRSS B 63(3), 2001, for the discrepancy).
 //!
@@ -16,6 +17,7 @@ mod fit;
 mod gap;
 mod hidden;
 mod likelihood;
+mod material;
 mod octaves;
 mod pool;
 mod race;
@@ -51,7 +53,8 @@ pub use fit::Fit;
 use fit::{Problem, largest};
 use gap::{Gap, Gaps};
 use likelihood::Band;
-use search::{NEGLIGIBLE, Search, decide, decide_further};
+use material::NEGLIGIBLE;
+use search::{Search, decide, decide_further};
 use tracking::{Resolution, Tracked, track};
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.

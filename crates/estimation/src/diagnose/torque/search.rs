@@ -17,26 +17,12 @@ use super::conclusion::Decision;
 use super::determined::{is_lost, is_simpler};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, Problem, STEPS, Term};
-use super::likelihood::{Band, Sight};
+use super::likelihood::Band;
 use super::pool::Pool;
 use super::scales::Scales;
 use super::starts::{Look, StartPoint};
 use crate::effects::Effect;
-use crate::numerics::level::rms;
 
-/// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.
-const MATERIAL: f64 = 0.25;
-/// The same of the first: several causes share a gap.
-const FIRST: f64 = 0.1;
-/// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
-pub const MINOR: f64 = 0.0025;
-/// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling with an
-/// encoder on each side shows less of it in its twist.
-pub const NEGLIGIBLE: f64 = 2e-3;
-const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
-/// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
-/// remainder is that small.
-const TELLING: f64 = 5e-3;
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
 /// Effects whose richer forms are looked at, too.
@@ -173,19 +159,6 @@ impl Search<'_> {
         over
     }
 
-    /// What causes are measured by: what the axis lacks with its parameters alone, but no more than the torque itself, and without a
-    /// constant torque: beside a weight of many times the moving part everything else would be small.
-    fn dynamic_gap(&self, parameters: &Fit) -> Discrepancy {
-        let over = self.left(parameters).max(1.0);
-        let mut gap = parameters.discrepancy.map(|s| s / (over * over));
-        for bias in self.suspects.iter().filter(|e| e.is_bias()) {
-            let fit = self.problem.fit(&parameters.model, &[(*bias, 0)], parameters.discrepancy, STEPS);
-            let left = fit.map_or(gap, |f| f.discrepancy);
-            gap = [gap[0].min(left[0]), gap[1].min(left[1])];
-        }
-        gap
-    }
-
     pub fn evidence(&self, fit: &Fit, independent: f64) -> f64 {
         self.problem.evidence(fit, independent)
     }
@@ -205,10 +178,6 @@ impl Search<'_> {
     fn best<'f>(&self, fits: &'f [Fit], independent: f64) -> Option<&'f Fit> {
         let admitted = fits.iter().filter(|f| !f.at_bound);
         admitted.max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
-    }
-
-    pub fn at_floor(&self, fit: &Fit) -> bool {
-        self.band().at_floor(&fit.rows)
     }
 
     /// Every combination of the textbook's effects at the motor, each from its own regression.
@@ -331,46 +300,13 @@ impl Search<'_> {
     /// The fits with one effect more, each looked for once; anew beside a fit that leaves materially less than the one beside which they
     /// were looked for, which is not what they would have to explain.
     fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
-        let as_good =
-            |s: &Discrepancy| (0..self.band().equations()).all(|i| fit.discrepancy[i] >= (1.0 - MATERIAL) * s[i]);
-        if let Some(known) = pool.extensions(&fit.terms, as_good) {
+        if let Some(known) = pool.extensions(&fit.terms, |left| !self.is_material_beside(left, fit)) {
             return known;
         }
         let mut added = self.added(fit, keep);
         added.extend(self.put_back(fit).iter().flat_map(|f| self.added(f, keep)));
         pool.extend_all(fit, &added);
         added
-    }
-
-    /// Whether what a fit leaves is too little of the gap for any further cause in it.
-    pub fn leaves_little(&self, fit: &Fit) -> bool {
-        (0..self.band().equations()).all(|i| fit.discrepancy[i] < MINOR * self.gap[i])
-    }
-
-    /// Whether what a fit leaves is less than a log's torque is true to.
-    pub fn is_negligible(&self, fit: &Fit) -> bool {
-        self.band().torque_rms(fit.discrepancy) < self.negligible()
-    }
-
-    /// Torque below which nothing is a cause, N.m: what a drive is true to goes with all of its torque, a weight's with the rest.
-    fn negligible(&self) -> f64 {
-        let share = if self.band().sight == Sight::Both { NEGLIGIBLE_IN_TWIST } else { NEGLIGIBLE };
-        share * rms(&self.problem.record.torque)
-    }
-
-    /// Whether what a fit leaves holds no further cause.
-    fn is_enough(&self, fit: &Fit) -> bool {
-        self.leaves_little(fit) || self.is_negligible(fit)
-    }
-
-    /// Whether a fit leaves so little of the torque that another account may be told from it.
-    fn is_exact(&self, fit: &Fit) -> bool {
-        self.left(fit) < TELLING
-    }
-
-    /// Share of the torque that a fit leaves.
-    pub fn left(&self, fit: &Fit) -> f64 {
-        self.band().torque_share(fit.discrepancy, self.problem.record)
     }
 
     /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what
@@ -386,16 +322,6 @@ impl Search<'_> {
         let held = back.map(|given| Fit { terms: fit.terms.clone(), ..given });
         let freed = held.as_ref().filter(|f| f.terms.is_empty()).and_then(|f| self.problem.freed(f));
         held.into_iter().chain(freed).collect()
-    }
-
-    /// Whether the richer explains a material part of what the nested one leaves, of the gap and of the torque.
-    fn is_material(&self, plain: &Fit, rich: &Fit) -> bool {
-        let (before, after) = (plain.discrepancy, rich.discrepancy);
-        let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
-        let explained = [0, 1].map(|i| (before[i] - after[i]).max(0.0));
-        self.band().torque_rms(explained) >= self.negligible()
-            && (0..self.band().equations())
-                .any(|i| after[i] <= (1.0 - share) * before[i] && explained[i] >= MINOR * self.gap[i])
     }
 
     /// The fit with each effect that may join it, the best starts of all fitted.
