@@ -7,7 +7,7 @@
 /// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
 /// hides another near it until it is bridged, and two that hide each other are found together.
 const PASSES: [(usize, usize); 8] = [(0, MANY), (0, MANY), (0, 3), (0, 3), (1, MANY), (1, 3), (2, MANY), (3, MANY)];
-/// Neighbours on each side whose residual tells by itself how far they agree: fewer agree by chance.
+/// Neighbours on each side that tell a slow motion.
 const MANY: usize = 6;
 /// Neighbours on each side that a motion of the record's highest frequencies is told by.
 const NEAREST: usize = 3;
@@ -16,8 +16,8 @@ const NEAREST: usize = 3;
 const FAR: f64 = 6.0;
 /// Residual of the cubic over the usual one about it up to which the neighbours agree with each other.
 const AGREE: f64 = 2.5;
-/// Error of the cubic over the residual of many neighbours from which a held sample is lost however they agree: a blow, which they do not
-/// agree about, leaves as much at them as at the sample between them.
+/// Error of the cubic over its residual from which a held sample is lost however far its neighbours agree: a blow, which they do not agree
+/// about, leaves as much at them as at the sample between them.
 const CLEAR: f64 = 20.0;
 /// Samples in which the residual is a usual one.
 const BLOCK: usize = 256;
@@ -76,7 +76,7 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f6
             let off = (y[k] - expected[0]).abs().max((y[k + span] - expected[1]).abs());
             // A reading with noise in it repeats only where it is held.
             let held = y[k] == y[k - 1] && y[k + span] == y[k + span - 1];
-            let clear = reach == MANY && held && off > CLEAR * residual;
+            let clear = held && off > CLEAR * residual;
             let agree = *residual <= AGREE * usual.max(noise);
             if (clear || agree && span < 2)
                 && off > FAR * residual.max(usual).max(noise)
