@@ -467,7 +467,9 @@ fn balance(
     let here = best(&|s| s.1, 1);
     let turned = best(&|s| s.2, 1);
     let turned_anywhere = best(&|s| s.2, DELAYS);
-    if turned.1 > CLEAR && 1.0 - turned.1 < 0.5 * (1.0 - plus.1) {
+    let backwards = turned.1 > CLEAR && 1.0 - turned.1 < 0.5 * (1.0 - plus.1);
+    // On a hinge a weight above the axis pushes away from rest, as no spring does; its torque is told in time, over the angle.
+    if backwards && !rigid::follows(input) {
         // A table that swings against its motor under control can pass for an axis turned round: where the torque as it is explains the
         // most of the motion, too, that is a doubt.
         let sure = plus.1 < CLEAR;

@@ -100,7 +100,7 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     for width in widths(n) {
         if let Some(found) = in_time(input, torque, x, width)
             && found.left < MOST_LEFT
-            && found.mass > 3.0 * found.error
+            && found.mass > SURELY * found.error
             && found.mass.is_finite()
             && best.as_ref().is_none_or(|best| found.left < 0.98 * best.left)
         {
@@ -110,12 +110,15 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     best.map(|found| found.mass)
 }
 
-/// Whether the same balance explains most of the torque with a friction that brakes: of slow moves, where friction is nearly all of the
-/// torque, spectra show a few lines alone, and noise in those.
+/// Whether the same balance explains most of the torque with a friction that brakes or, where there is next to none, an inertia that is
+/// one: of slow moves, where friction or a weight is nearly all of the torque, spectra show a few lines alone, and noise in those.
 pub(super) fn follows(input: &Input<'_>) -> bool {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    let brakes = |found: InTime| found.left < MOST_LEFT && found.friction > 0.0 && found.mass > -3.0 * found.error;
-    widths(x.len()).any(|width| in_time(input, torque, x, width).is_some_and(brakes))
+    let found = widths(x.len()).filter_map(|width| in_time(input, torque, x, width));
+    found.min_by(|a, b| a.left.total_cmp(&b.left)).is_some_and(|found| {
+        let (friction, mass) = (found.friction / found.friction_error, found.mass / found.error);
+        found.left < MOST_LEFT && (friction > 0.0 && mass > -SURELY || friction > -SURELY && mass > SURELY)
+    })
 }
 
 /// Widths of the smoothing that are tried of a record of `n` samples.
@@ -146,6 +149,9 @@ const TURNS: f64 = 1e4;
 /// Most samples that one solution looks at.
 pub(super) const SAMPLES: usize = 20_000;
 
+/// Standard errors from which a value is surely not zero.
+const SURELY: f64 = 3.0;
+
 /// The balance in the time domain.
 struct InTime {
     /// Share of the torque's power about its mean that is left.
@@ -153,8 +159,9 @@ struct InTime {
     /// Inertia and its standard error.
     mass: f64,
     error: f64,
-    /// Friction at nine tenths of the speeds.
+    /// Friction at the ninth decile of the speeds and its standard error.
     friction: f64,
+    friction_error: f64,
 }
 
 /// The balance by a smoothing of a width.
@@ -183,10 +190,16 @@ fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option
     let mean = rows.iter().map(|k| t[*k]).sum::<f64>() / rows.len() as f64;
     let total: f64 = rows.iter().map(|k| (t[*k] - mean).powi(2)).sum();
     // Smoothed samples are not independent: one in a width is.
-    let error = (solution.variance(0) * solution.inverse[(0, 0)] * (2 * width + 1) as f64).sqrt();
+    let variance = |i: usize, k: usize| solution.variance(0) * solution.inverse[(i, k)] * (2 * width + 1) as f64;
     let left = solution.residual[(0, 0)] / total;
     let of = |i: usize| solution.phi[(i, 0)];
-    left.is_finite().then(|| InTime { left, mass: of(0), error, friction: of(1) * fast + of(2) })
+    left.is_finite().then(|| InTime {
+        left,
+        mass: of(0),
+        error: variance(0, 0).sqrt(),
+        friction: of(1) * fast + of(2),
+        friction_error: (fast * fast * variance(1, 1) + 2.0 * fast * variance(1, 2) + variance(2, 2)).sqrt(),
+    })
 }
 
 fn against(turned: f64, own: f64) -> Finding {

@@ -576,6 +576,23 @@ fn a_torque_that_friction_and_inertia_explain_in_time_is_followed_and_another_is
 }
 
 #[test]
+fn a_weight_that_pushes_away_from_rest_is_followed_without_friction_and_one_turned_round_is_not() {
+    // On a hinge, half a turn about where the weight stands above the axis.
+    let (inertia, weight) = (0.1, 2.0);
+    let parts = [(0.6, 3.0, 0.0), (0.3, 7.0, 1.0)];
+    let time = |k: usize| k as f64 * 2e-3;
+    let mut e = noise(29, 3e-4);
+    let at = |k: usize| parts.iter().map(|(a, w, p)| a * (w * time(k) + p).sin()).sum::<f64>();
+    let rate = |k: usize| -parts.iter().map(|(a, w, p)| a * w * w * (w * time(k) + p).sin()).sum::<f64>();
+    let torque = (0..1024).map(|k| inertia * rate(k) - weight * at(k).sin()).collect();
+    let x1 = (0..1024).map(|k| at(k) + e()).collect();
+    let mut columns = Columns { dt: 2e-3, v: [torque, x1, Vec::new(), Vec::new(), Vec::new()] };
+    assert!(rigid::follows(&columns.motor_only()));
+    columns.v[0].iter_mut().for_each(|t| *t = -*t);
+    assert!(!rigid::follows(&columns.motor_only()), "its inertia is none");
+}
+
+#[test]
 fn slow_moves_under_friction_tell_sign_and_unit_of_torque_and_table() {
     let looked_at = |change: &dyn Fn(&mut Columns)| {
         let mut columns = slow_moves();
