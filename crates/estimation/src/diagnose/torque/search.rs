@@ -33,6 +33,9 @@ const MOST: usize = 5;
 const BUDGET: u64 = 150_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
+/// Hypotheses of each size that are gone on from beside the chosen way, and the steps from which no further one is.
+const BESIDE: usize = 4;
+const BUDGET_BESIDE: u64 = 40_000_000;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
 /// The same beside effects, which let most parameters be what they are: a factor of two.
@@ -114,6 +117,7 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
         if search.is_over_budget() {
             break;
         }
+        search.look_beside(&chosen, &mut pool);
         let Some(better) = search.better_in_pool(&chosen, &pool) else { break };
         let better = search.pruned(better, &mut pool);
         let other = search.stepwise(better, &mut pool);
@@ -297,6 +301,36 @@ impl Search<'_> {
         self.pruned(at, pool)
     }
 
+    /// Looks for one effect more beside the likeliest hypotheses that the chosen way passed by, as long as that is cheap: two causes that
+    /// are each a poor account alone are found beside one another only.
+    fn look_beside(&self, chosen: &Fit, pool: &mut Pool) {
+        if self.at_floor(chosen) || self.is_negligible(chosen) {
+            return;
+        }
+        let share = self.independent(std::slice::from_ref(chosen));
+        for size in 1..chosen.terms.len().max(2) {
+            for fit in self.likeliest(size, share, pool) {
+                if self.problem.steps() > BUDGET_BESIDE {
+                    return;
+                }
+                self.extended(&fit, size, pool);
+            }
+        }
+    }
+
+    /// The likeliest hypotheses of so many effects, in one form each.
+    fn likeliest(&self, size: usize, share: f64, pool: &Pool) -> Vec<Fit> {
+        let mut of_size: Vec<&Fit> = pool.fits().iter().filter(|f| f.terms.len() == size && !f.at_bound).collect();
+        of_size.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
+        let mut likeliest: Vec<Fit> = Vec::new();
+        for fit in of_size {
+            if likeliest.len() < BESIDE && likeliest.iter().all(|l| !is_alike(l, fit)) {
+                likeliest.push(fit.clone());
+            }
+        }
+        likeliest
+    }
+
     /// The fits with one effect more, each looked for once; anew beside a fit that leaves materially less than the one beside which they
     /// were looked for, which is not what they would have to explain.
     fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
@@ -305,6 +339,7 @@ impl Search<'_> {
         }
         let mut added = self.added(fit, keep);
         added.extend(self.put_back(fit).iter().flat_map(|f| self.added(f, keep)));
+        let added = self.raced(added, None);
         pool.extend_all(fit, &added);
         added
     }
@@ -324,7 +359,7 @@ impl Search<'_> {
         held.into_iter().chain(freed).collect()
     }
 
-    /// The fit with each effect that may join it, the best starts of all fitted.
+    /// The fit with each effect that may join it, a few steps from the best starts of all.
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
         let Some(look) = Look::beside(&self.problem, fit) else { return Vec::new() };
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
@@ -353,8 +388,7 @@ impl Search<'_> {
             (self.progress)(&format!("{n} of {} fits of a cause beside {}", points.len(), fit.terms.len()));
             fitted
         };
-        let probed = points.par_iter().filter_map(probe).collect();
-        self.raced(probed, None)
+        points.par_iter().filter_map(probe).collect()
     }
 
     /// The fit without one of its effects: the known one, unless the richer fit as it stands is likelier without that effect already,
@@ -496,6 +530,11 @@ impl Search<'_> {
 /// Whether a fit has all effects of another, and more.
 pub fn is_extension(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
+}
+
+/// Whether two fits have the same effects, in whatever forms.
+fn is_alike(a: &Fit, b: &Fit) -> bool {
+    a.terms.len() == b.terms.len() && a.terms.iter().all(|t| b.terms.iter().any(|o| o.0 == t.0))
 }
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
