@@ -87,6 +87,7 @@ pub fn friction(machine: &str) -> Diagnosis {
             ranked(&[], 0.0, 160_322.0, 145.0, 0.0),
         ],
         confusable: vec![Confusable { named: Effect::CoulombMotor, other: Effect::PreslidingMotor, difference: 7.1 }],
+        undecided: None,
         location: Where {
             site: Some(motor),
             shares: vec![

@@ -4,9 +4,11 @@ mod contract;
 mod fixture;
 mod words;
 
-use eixo::diagnose::{ClosedLoop, Commands, Confusable, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Site, Verdict};
+use eixo::diagnose::{
+    ClosedLoop, Commands, Confusable, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Site, Undecided, Verdict,
+};
 use eixo::effects::{Effect, Place};
-use eixo::report::diagnose::{Findings, report, short};
+use eixo::report::diagnose::{Findings, json, report, short};
 use eixo::report::terminal::{self, Layout};
 use eixo::report::{Report, html};
 use eixo::trace::Motion;
@@ -73,6 +75,21 @@ fn two_causes_that_explain_a_gap_alike_are_what_the_next_record_is_to_tell_apart
         assert!(page.contains(sentence), "{sentence}");
     }
     assert!(!page.contains("none of the known effects"));
+}
+
+#[test]
+fn one_of_several_effects_that_acts_beside_the_causes_is_told_with_its_share_and_not_named() {
+    let open = Undecided { effects: vec![Effect::LoadMotor, Effect::ExternalSpring], share_of_gap: 0.7 };
+    let d = Diagnosis { undecided: Some(open), ..friction("x-axis") };
+    let page = html::page(&made(&d));
+    let told = "the record does not tell which: constant torque on the motor or a spring from the table to the frame";
+    assert!(page.contains(told), "{page}");
+    assert!(page.contains("Not told: constant torque on the motor or a spring"));
+    let file = json::value(&d, &[]);
+    assert_eq!(file["causes"].as_array().map(Vec::len), Some(1));
+    assert_eq!(file["undecided"]["effects"], serde_json::json!(["load_motor", "external_spring"]));
+    assert_eq!(file["undecided"]["share_of_gap"], 0.7);
+    assert!(file["sentence"].as_str().is_some_and(|s| s.contains(told)));
 }
 
 #[test]

@@ -32,6 +32,10 @@ pub fn value(d: &Diagnosis, of_the_record: &[String]) -> Value {
         "parameters": map(d.parameters.iter().map(|p| (p.parameter.name(), parameter(p)))),
         "warnings": of_the_record.iter().cloned().chain(words::warnings(d, None)).collect::<Vec<_>>(),
     });
+    if let Some(open) = &d.undecided {
+        let ids: Vec<&str> = open.effects.iter().map(|e| e.info().id).collect();
+        all["undecided"] = json!({ "effects": ids, "share_of_gap": open.share_of_gap });
+    }
     if let Some(l) = &d.closed_loop {
         all["closed_loop"] = closed_loop(l);
     }

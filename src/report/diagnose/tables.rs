@@ -1,6 +1,7 @@
 //! The tables of a diagnosis.
 
 use super::naming::{improved, title, way};
+use super::words;
 use crate::diagnose::{AxisParameter, Diagnosis, Estimate, Hypothesis, Levels, Verdict};
 use crate::report::{Cell, Table};
 
@@ -27,6 +28,10 @@ pub fn causes(d: &Diagnosis) -> Table {
             head.extend([Cell::Empty, Cell::Empty]);
             table.row(head);
         }
+    }
+    if let Some(open) = d.undecided.as_ref().filter(|_| d.verdict == Verdict::Effect) {
+        let name = Cell::text(format!("Not told: {}", words::names_of(open)));
+        table.row(vec![name, Cell::Empty, Cell::Bar(open.share_of_gap), Cell::Empty, Cell::Empty]);
     }
     table
 }

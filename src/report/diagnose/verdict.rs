@@ -2,7 +2,7 @@
 
 use super::naming::{held_out, lower, short_title, title};
 use super::percent;
-use super::words::{REMAINS, either, in_the_noise};
+use super::words::{REMAINS, either, in_the_noise, undecided};
 use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, UNCAUSED, Verdict as Answer};
 use crate::report::{Cell, Tone, Verdict};
 
@@ -48,7 +48,8 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
             if let Some(c) = d.causes.first() {
                 figures.insert(0, ("probability".to_owned(), Cell::Percent(c.probability)));
             }
-            (Tone::Finding, left_out(&d.causes), fall(d))
+            let detail = undecided(d).into_iter().chain([fall(d)]).collect::<Vec<_>>().join(" ");
+            (Tone::Finding, left_out(&d.causes), detail)
         }
         Answer::Unexplained => {
             let at = d.location.site.map_or("at no single place".to_owned(), |s| format!("at the {}", s.as_str()));

@@ -5,7 +5,7 @@ use super::percent;
 use crate::diagnose::location::{Appearance, Location, OwnFrequency, Shape, Spread};
 use crate::diagnose::{
     AxisParameter, BaseParameter, Cause, ClosedLoop, ClosureOf, Confusable, Diagnosis, LoopRanked, RoundingRole,
-    UNCAUSED, Verdict,
+    UNCAUSED, Undecided, Verdict,
 };
 use crate::effects::{Contrast, Effect};
 use crate::examine::NOMINAL_OFF;
@@ -41,11 +41,12 @@ pub fn sentence(d: &Diagnosis) -> String {
                 format!("{} ({}, at the {})", info.title, info.id, c.site.as_str())
             };
             let names = d.causes.iter().map(describe).collect::<Vec<_>>().join(", and ");
-            if d.gap.closure < 0.0 {
+            let told = if d.gap.closure < 0.0 {
                 format!("{names}, by the fitted record; the held-out record contradicts it: the error grows there.")
             } else {
                 format!("{names}: {} of {gap} on held-out data closes with it.", percent(d.gap.closure))
-            }
+            };
+            [told].into_iter().chain(undecided(d)).collect::<Vec<_>>().join(" ")
         }
         Verdict::Unexplained if is_rounding(d) => {
             "Unexplained: what is left is the rounding of the readings, which is not among the effects that may be named."
@@ -63,6 +64,21 @@ pub fn sentence(d: &Diagnosis) -> String {
             }
         }
     }
+}
+
+/// What acts beside the causes of a gap, where the record does not tell which of several effects it is.
+pub fn undecided(d: &Diagnosis) -> Option<String> {
+    let open = d.undecided.as_ref().filter(|_| d.verdict == Verdict::Effect)?;
+    Some(format!(
+        "Beside that acts one of these, and the record does not tell which: {}; {} of the gap.",
+        names_of(open),
+        percent(open.share_of_gap)
+    ))
+}
+
+/// The effects of which one acts.
+pub fn names_of(open: &Undecided) -> String {
+    open.effects.iter().map(|e| lower(short_title(e.info()))).collect::<Vec<_>>().join(" or ")
 }
 
 /// Two causes of unlike families that explain the gap of an unexplained record alike.

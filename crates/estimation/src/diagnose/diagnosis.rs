@@ -116,6 +116,8 @@ pub struct Diagnosis {
     pub ranking: Vec<Ranked>,
     /// Effects that the record cannot tell from named ones.
     pub confusable: Vec<Confusable>,
+    /// What acts beside the causes, where the record does not tell which of several effects it is.
+    pub undecided: Option<Undecided>,
     /// Where the gap lies.
     pub location: Where,
     /// What stays unexplained beside the causes.
@@ -130,6 +132,15 @@ pub struct Diagnosis {
     pub cut_short: bool,
     /// What the drive's loop says, for a record under control whose drive is known.
     pub closed_loop: Option<ClosedLoop>,
+}
+
+/// One of several effects, of which the record does not tell which.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Undecided {
+    /// The effects, the one in the improved model first.
+    pub effects: Vec<Effect>,
+    /// Share of the gap that comes back without it.
+    pub share_of_gap: f64,
 }
 
 /// A cause.

@@ -18,7 +18,7 @@ pub use assess::{Case, Outcome, Replay};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
 pub use diagnosis::{
     AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Hypothesis, Levels, Ranked,
-    Remainder, Rounding, RoundingRole, Site, Way, Where,
+    Remainder, Rounding, RoundingRole, Site, Undecided, Way, Where,
 };
 pub use location::Location;
 pub use model::{BaseParameter, Model};

@@ -27,6 +27,8 @@ const LEFT: f64 = 0.25;
 const DOUBT: f64 = 0.5;
 /// Probability from which an effect may be named: more likely than not, and by more than one of two that are alike is by rounding.
 pub const LIKELY: f64 = 0.55;
+/// Probability from which a hypothesis is told beside likelier ones.
+const POSSIBLE: f64 = 0.05;
 /// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
 /// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
@@ -80,6 +82,8 @@ pub struct Decision {
     pub independent: f64,
     /// Effects that the record cannot tell from chosen ones.
     pub confusable: Vec<Confusable>,
+    /// Effects of which one is there beside the causes, the chosen one first; empty where all that is chosen is told.
+    pub undecided: Vec<Effect>,
 }
 
 impl Confusable {
@@ -149,17 +153,14 @@ impl Search<'_> {
         let twins: Vec<Option<Confusable>> =
             (0..chosen.terms.len()).map(|i| self.constant_instead(&chosen, i, &pool, independent)).collect();
         let mut ranking = self.weighed(pool, independent);
+        let doubt = (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0);
         let mut probabilities: Vec<f64> = chosen
             .terms
             .iter()
             .zip(&decisive)
             .map(|((e, _), decisive)| {
-                let of: f64 = ranking
-                    .iter()
-                    .filter(|w| w.fit.terms.iter().any(|(o, _)| o.info().family == e.info().family))
-                    .map(|w| w.probability)
-                    .sum();
-                of * decisive * (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
+                let of: f64 = ranking.iter().filter(|w| has_one_like(&w.fit, *e)).map(|w| w.probability).sum();
+                of * decisive * doubt
             })
             .collect();
         let likely = |p: &f64| *p >= LIKELY;
@@ -176,8 +177,26 @@ impl Search<'_> {
         for (p, twin) in probabilities.iter_mut().zip(&twins) {
             *p = twin.map_or(*p, |t| p.min(of_log_odds(t.difference)));
         }
+        let least = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]));
+        // One of several effects that do the same beside the others stays open, and the others are told.
+        let open = least.filter(|&i| {
+            decisive[i] * doubt >= LIKELY
+                && chosen.terms.len() > 1
+                && (0..probabilities.len()).all(|k| k == i || likely(&probabilities[k]))
+                && one_instead(&ranking, &chosen, i) >= LIKELY
+        });
+        // It is told, too, where one of them is likelier than not.
+        let told = open.and_then(|i| {
+            let best = with_one_instead(&ranking, &chosen, i).next()?;
+            likely(&(best.probability * decisive[i] * doubt)).then(|| best.fit.clone())
+        });
+        if let Some(told) = told.filter(|f| f.terms != chosen.terms && f.settled) {
+            let pool = ranking.into_iter().map(|w| w.fit).collect();
+            return self.conclude(given, parameters, told, pool);
+        }
         if chosen.terms.len() > 1
-            && let Some(least) = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))
+            && open.is_none()
+            && let Some(least) = least
             && !likely(&probabilities[least])
             && let Some(refitted) = self.refitted(&chosen, least)
         {
@@ -196,7 +215,7 @@ impl Search<'_> {
             let plain = other.cloned().unwrap_or(plain);
             return self.conclude(given, parameters, plain, pool);
         }
-        let likely = probabilities.iter().all(likely);
+        let likely = (0..probabilities.len()).all(|i| open == Some(i) || likely(&probabilities[i]));
         let verdict = match chosen.terms.is_empty() {
             false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
             false => Verdict::Unexplained,
@@ -210,6 +229,7 @@ impl Search<'_> {
         let twins = twins.into_iter().flatten().filter(|t| t.difference < ALIKE);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent), twins);
         let shares = self.shares(&chosen);
+        let undecided = open.map(|i| instead(&ranking, &chosen, i)).unwrap_or_default();
         let cut_short = self.cut_short.load(Ordering::Relaxed);
         Decision {
             verdict,
@@ -222,6 +242,7 @@ impl Search<'_> {
             probabilities,
             independent,
             confusable,
+            undecided,
         }
     }
 
@@ -335,6 +356,41 @@ impl Search<'_> {
     }
 }
 
+/// Whether a fit has an effect of the family of this one.
+fn has_one_like(fit: &Fit, effect: Effect) -> bool {
+    fit.terms.iter().any(|(o, _)| o.info().family == effect.info().family)
+}
+
+/// The hypotheses with all effects of a fit but one, and some effect beside them in its place.
+fn with_one_instead<'r>(ranking: &'r [Weighed], chosen: &'r Fit, i: usize) -> impl Iterator<Item = &'r Weighed> {
+    ranking
+        .iter()
+        .filter(move |w| w.fit.terms.len() >= chosen.terms.len())
+        .filter(move |w| others(chosen, i).all(|e| has_one_like(&w.fit, e)))
+}
+
+/// The effects of a fit but one.
+fn others(fit: &Fit, i: usize) -> impl Iterator<Item = Effect> {
+    fit.terms.iter().enumerate().filter(move |(k, _)| *k != i).map(|(_, t)| t.0)
+}
+
+/// Probability of these hypotheses.
+fn one_instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> f64 {
+    with_one_instead(ranking, chosen, i).map(|w| w.probability).sum()
+}
+
+/// The effects that stand in the place of that one in the likely ones of these hypotheses, and itself first.
+fn instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> Vec<Effect> {
+    let mut effects = vec![chosen.terms[i].0];
+    for w in with_one_instead(ranking, chosen, i).filter(|w| w.probability >= POSSIBLE) {
+        let like = |e: Effect, of: Effect| e.info().family == of.info().family;
+        let other = |e: &Effect| others(chosen, i).all(|o| !like(*e, o)) && effects.iter().all(|k| !like(*e, *k));
+        let found: Vec<Effect> = w.fit.terms.iter().map(|t| t.0).filter(other).collect();
+        effects.extend(found);
+    }
+    effects
+}
+
 /// Whether the inertia that moves is so far from the nominal one that what is fitted beside it says nothing of this axis.
 fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
     let inertia = |m: &Model| m.parameters.i1 + m.parameters.i2;
@@ -394,6 +450,7 @@ mod tests {
             probabilities: Vec::new(),
             independent: 1.0,
             confusable: Vec::new(),
+            undecided: Vec::new(),
         }
     }
 
@@ -436,6 +493,24 @@ mod tests {
         ];
         let told = |i: usize| nested_fit(&all, i, &pool).map(|f| f.log_likelihood);
         assert_eq!((told(0), told(1), told(2)), (None, Some(5.0), Some(7.0)));
+    }
+
+    #[test]
+    fn one_of_two_that_do_the_same_beside_a_third_leaves_that_third_as_likely_as_both_together() {
+        use Effect::{CoulombMotor, Delay, Latch, PreslidingMotor, ViscousMotor};
+        let chosen = fit(&[CoulombMotor, Delay], 0.0);
+        let weighed =
+            |effects: &[Effect], probability: f64| Weighed { fit: fit(effects, 0.0), evidence: 0.0, probability };
+        let ranking = [
+            weighed(&[CoulombMotor, Latch], 0.5),
+            weighed(&[Delay, CoulombMotor], 0.2),
+            weighed(&[PreslidingMotor, ViscousMotor], 0.1),
+            weighed(&[ViscousMotor, Delay], 0.1),
+            weighed(&[CoulombMotor], 0.1),
+        ];
+        assert!((one_instead(&ranking, &chosen, 1) - 0.8).abs() < 1e-12);
+        assert!((one_instead(&ranking, &chosen, 0) - 0.3).abs() < 1e-12);
+        assert_eq!(instead(&ranking, &chosen, 1), [Delay, Latch, ViscousMotor]);
     }
 
     #[test]
