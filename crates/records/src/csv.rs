@@ -14,6 +14,7 @@ use std::ops::Range;
 use memchr::{memchr, memchr2};
 use rayon::prelude::*;
 
+use super::Signal;
 use super::error::TraceError;
 use preamble::Preamble;
 use stamp::stamp;
@@ -157,8 +158,8 @@ impl Head {
                 if fields.len() > MAX_COLUMNS {
                     return Err(none(format!("{} columns; at most {MAX_COLUMNS} are read", fields.len())));
                 }
-                let headers: Vec<Header> = fields.iter().map(|f| header(f)).collect();
-                distinct(&headers, file)?;
+                let mut headers: Vec<Header> = fields.iter().map(|f| header(f)).collect();
+                distinct(&mut headers, file)?;
                 return Ok(Self { headers, separator, blank_last, body, lines: counted });
             }
             at = next;
@@ -168,8 +169,21 @@ impl Head {
     }
 }
 
-/// Refuses a name that two columns have.
-fn distinct(headers: &[Header], file: &str) -> Result<(), TraceError> {
+/// Refuses a name that two columns have. Of a quantity that stands in several units, each in a column of its own, as in the summary of
+/// rotary and linear machines, every column keeps its unit in its name; of a signal one is meant, and which is not guessed.
+fn distinct(headers: &mut [Header], file: &str) -> Result<(), TraceError> {
+    let signal = |name: &str| name.eq_ignore_ascii_case("time") || Signal::from_name(name).is_some();
+    let several = |h: &Header| {
+        let namesakes = || headers.iter().filter(|o| o.name == h.name);
+        let alike = namesakes().filter(|o| o.unit == h.unit).count();
+        namesakes().count() > 1 && alike == 1 && namesakes().all(|o| o.unit.is_some()) && !signal(&h.name)
+    };
+    let several: Vec<bool> = headers.iter().map(several).collect();
+    for (header, _) in headers.iter_mut().zip(several).filter(|(_, several)| *several) {
+        if let Some(unit) = &header.unit {
+            header.name = format!("{} [{unit}]", header.name);
+        }
+    }
     for (k, one) in headers.iter().enumerate() {
         if let Some(other) = headers[..k].iter().position(|h| h.name == one.name && !one.name.is_empty()) {
             return Err(TraceError::TwiceNamed {
@@ -580,6 +594,17 @@ mod tests {
             assert!(parse(text).unwrap_err().to_string().contains("header row such as"), "{text:?}");
         }
         assert!(parse("T,T\n0,1\n").unwrap_err().to_string().contains("fields 1 and 2"));
+    }
+
+    #[test]
+    fn a_quantity_in_two_units_has_a_column_in_each_and_a_signal_has_one() {
+        let table = parse("machine,K [N.m/rad],K_std,K [N/m],K_change\nx,1,0.1,,0\ny,,,3,0\n").unwrap();
+        assert_eq!([table.position("K [N.m/rad]"), table.position("K [N/m]")], [Some(1), Some(3)]);
+        assert_eq!(table.position("K"), None, "which of the two is not guessed");
+        assert_eq!(table.headers[3].unit.as_deref(), Some("N/m"));
+        for twice in ["a,K [N/m],K [N/m]\n0,1,2\n", "a,K,K [N/m]\n0,1,2\n", "a,theta1 [rad],theta1 [deg]\n0,1,2\n"] {
+            assert!(parse(twice).unwrap_err().to_string().contains("fields 2 and 3"), "{twice}");
+        }
     }
 
     #[test]

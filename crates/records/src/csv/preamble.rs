@@ -112,7 +112,7 @@ impl Preamble {
                 header.unit = Some(inner.to_owned());
             }
         }
-        distinct(&headers, file)?;
+        distinct(&mut headers, file)?;
         Ok(Head { headers, separator: self.separator, blank_last: self.blank_last, body: self.body, lines: self.lines })
     }
 }
