@@ -273,11 +273,12 @@ pub fn nearest<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> St
 
 /// What can be done about a file that cannot be written.
 fn way_out(reason: &std::io::Error) -> &'static str {
-    use std::io::ErrorKind::{BrokenPipe, FileTooLarge, QuotaExceeded, StorageFull};
+    use std::io::ErrorKind::{BrokenPipe, FileTooLarge, NotFound, QuotaExceeded, StorageFull};
     match reason.kind() {
         StorageFull | QuotaExceeded => "Make room, or write to another disk",
         FileTooLarge => "Raise the limit of a file's size (`ulimit -f`), or write less",
         BrokenPipe => "What reads the output has ended before it had all of it",
+        NotFound => "Create the folder, or choose one that exists",
         _ => "Choose a folder that exists and that you may write to",
     }
 }

@@ -179,6 +179,17 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
+/// Why a folder takes no file, without the name that the file would have had on its way: the user gave another.
+fn refused(folder: &Path, error: &std::io::Error) -> std::io::Error {
+    let there = folder.display();
+    let words = match std::fs::metadata(folder) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => format!("the folder {there} does not exist"),
+        Ok(found) if !found.is_dir() => format!("{there} is no folder"),
+        _ => error.get_ref().and_then(std::error::Error::source).map_or_else(|| error.to_string(), ToString::to_string),
+    };
+    std::io::Error::new(error.kind(), words)
+}
+
 /// What begins the name of a file on its way.
 const PREFIX: &str = ".eixo-";
 /// A file left beside its target for so long belongs to nobody, whichever machine it came from, s.
@@ -205,7 +216,7 @@ impl Pending {
         let prefix = format!("{PREFIX}{}-{}-", processes(), std::process::id());
         // Made while the list is held, so that no interrupt comes between the file and its entry.
         let mut all = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
-        let file = builder.prefix(&prefix).tempfile_in(folder)?;
+        let file = builder.prefix(&prefix).tempfile_in(folder).map_err(|e| refused(folder, &e))?;
         all.push(file.path().to_owned());
         Ok(Self { file })
     }
@@ -392,7 +403,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("no/such/folder/trace.csv");
         let error = write_columns(&path, &[("a", &[1.0])]).unwrap_err().to_string();
-        assert!(error.contains("trace.csv") && error.contains("cannot write"), "{error}");
+        let parent = path.parent().unwrap().display();
+        let said = format!(
+            "{}: cannot write: the folder {parent} does not exist. Create the folder, or choose one that exists",
+            path.display()
+        );
+        assert_eq!(error, said);
+        assert_eq!(writable(&path).unwrap_err().to_string(), said);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        std::fs::write(folder.path().join("log.csv"), "x").unwrap();
+        let below = write_text(&folder.path().join("log.csv/trace.csv"), b"x").unwrap_err().to_string();
+        assert!(below.contains("log.csv is no folder") && !below.contains(PREFIX), "{below}");
     }
 }
