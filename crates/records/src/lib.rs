@@ -53,7 +53,7 @@ pub use crate::axis::Hold;
 pub use error::TraceError;
 pub use error::nearest;
 pub use load::{COUNTS, Column, Loaded, LoadedPieces, Mapping, from_table, load, load_pieces};
-pub use lost::bridge;
+pub use lost::{bridge, held};
 pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
 pub use signal::{Motion, Quantity, Signal};

@@ -92,20 +92,75 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f6
 /// Bridges the lost samples of a position whose noise has a standard deviation of `noise`, in its unit, and tells how many they were. Where
 /// they would be more than one in fifty, they are the signal and stay.
 pub fn bridge(y: &mut [f64], noise: f64) -> usize {
-    let mut count = 0;
+    bridged(y, noise).len()
+}
+
+/// Bridges the lost samples as [`bridge`] does, and gives them as they were found, one twice where two passes bridged it.
+fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
+    let mut all = Vec::new();
     for pass in PASSES {
         let (span, found) = (pass.0, lost(y, noise, pass));
         let each = if span == 0 { 1 } else { 2 };
-        if (count + each * found.len()) as f64 > MOST * y.len() as f64 {
+        if (all.len() + each * found.len()) as f64 > MOST * y.len() as f64 {
             break;
         }
-        count += each * found.len();
         for (k, expected, residual) in found {
+            all.push(k);
+            all.extend((span > 0).then_some(k + span));
             // The nearest neighbours tell a fast motion best, where they are sound.
             let (nearer, left) = cubic(y, k, (span, NEAREST));
             let expected = if left < residual { nearer } else { expected };
             (y[k], y[k + span]) = (expected[0], expected[1]);
         }
     }
-    count
+    all
+}
+
+/// Steps of the encoder from which a position goes on after a sample that was held: where it repeats because it is slow, it goes on by one.
+const GOES_ON: f64 = 1.5;
+
+/// The samples among those that [`bridge`] bridges that repeat the one before, in order: the log held them while the axis went on.
+#[must_use]
+pub fn held(y: &[f64], noise: f64) -> Vec<usize> {
+    let repeats = |k: usize| y[k] == y[k - 1];
+    // Most records have none: nothing is fitted there.
+    let step = (1..y.len()).filter(|k| !repeats(*k)).map(|k| (y[k] - y[k - 1]).abs()).fold(f64::INFINITY, f64::min);
+    if !(1..y.len().saturating_sub(1)).any(|k| repeats(k) && (y[k + 1] - y[k]).abs() >= GOES_ON * step) {
+        return Vec::new();
+    }
+    let mut held = bridged(&mut y.to_vec(), noise);
+    held.retain(|k| *k > 0 && repeats(*k));
+    held.sort_unstable();
+    held.dedup();
+    held
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A motion with a rounding of the encoder.
+    fn motion(step: f64) -> Vec<f64> {
+        (0..4096).map(|k| ((0.05 * f64::from(k)).sin() / step).round() * step).collect()
+    }
+
+    #[test]
+    fn held_samples_are_found_where_they_are_and_a_spike_is_none() {
+        let mut y = motion(1e-6);
+        assert!(held(&y, 0.0).is_empty());
+        y[700] += 1e-2;
+        for k in [500, 3001, 3005] {
+            y[k] = y[k - 1];
+        }
+        assert_eq!(held(&y, 0.0), [500, 3001, 3005]);
+    }
+
+    #[test]
+    fn an_encoder_that_repeats_because_the_axis_is_slow_holds_nothing() {
+        let coarse = motion(1e-2);
+        assert!(coarse.windows(2).filter(|w| w[0] == w[1]).count() > 100);
+        assert!(held(&coarse, 0.0).is_empty());
+        assert!(held(&[], 0.0).is_empty());
+        assert!(held(&[0.0; 600], 0.0).is_empty());
+    }
 }
