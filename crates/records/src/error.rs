@@ -278,7 +278,7 @@ fn way_out(reason: &std::io::Error) -> &'static str {
         StorageFull | QuotaExceeded => "Make room, or write to another disk",
         FileTooLarge => "Raise the limit of a file's size (`ulimit -f`), or write less",
         BrokenPipe => "What reads the output has ended before it had all of it",
-        NotFound => "Create the folder, or choose one that exists",
+        NotFound => "Create the folder, or choose a folder that exists",
         _ => "Choose a folder that exists and that you may write to",
     }
 }

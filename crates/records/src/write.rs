@@ -405,7 +405,7 @@ mod tests {
         let error = write_columns(&path, &[("a", &[1.0])]).unwrap_err().to_string();
         let parent = path.parent().unwrap().display();
         let said = format!(
-            "{}: cannot write: the folder {parent} does not exist. Create the folder, or choose one that exists",
+            "{}: cannot write: the folder {parent} does not exist. Create the folder, or choose a folder that exists",
             path.display()
         );
         assert_eq!(error, said);
