@@ -133,6 +133,11 @@ fn what_cannot_be_read_is_said_and_inputs_are_not_written_over() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("log.csv: no column for the angle"));
     let output = eixo(at, &["circle", "--measured", "log.csv", "--report", "log.csv"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("is the input log.csv"));
-    let output = eixo(at, &["circle", "--directions", "ccw"]);
+    for of_a_measured_one in [["--directions", "ccw"], ["--from", "1"], ["--to", "1"]] {
+        let output = eixo(at, &["circle", of_a_measured_one[0], of_a_measured_one[1]]);
+        assert_eq!(output.status.code(), Some(2), "{of_a_measured_one:?}");
+    }
+    let output = eixo(at, &["circle", "--measured", CCW, "--from", "1"]);
     assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no column of time"));
 }

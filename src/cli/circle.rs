@@ -6,8 +6,10 @@ use std::process::ExitCode;
 
 use super::diagnosed;
 use super::drives::{Drives, ideal, machine};
+use super::examined::finite;
 use super::outputs;
 use super::stdout::out;
+use crate::circle::measured::{Given, Part};
 use crate::circle::roundness::{Roundness, SHOWN, bidirectional};
 use crate::circle::trace::{analyse, turns};
 use crate::circle::{CircleTest, ServoAxis, run as run_test};
@@ -41,6 +43,12 @@ pub struct Args {
     /// Which way the measured turns go, in the order of the files, where they do not say it
     #[arg(long, value_name = "ccw|cw", value_delimiter = ',', value_parser = direction, requires = "measured")]
     directions: Vec<bool>,
+    /// First time used of a measured turn, s, as its file counts it
+    #[arg(long, allow_negative_numbers = true, value_name = "S", value_parser = finite, requires = "measured")]
+    from: Option<f64>,
+    /// Last time used of a measured turn, s
+    #[arg(long, allow_negative_numbers = true, value_name = "S", value_parser = finite, requires = "measured")]
+    to: Option<f64>,
     /// The circle and the drives.
     #[command(flatten)]
     test: Test,
@@ -98,7 +106,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !args.measured.is_empty() {
         let axes = [x, y];
         let known = (args.axis.is_some() || args.y.is_some()).then_some(&axes);
-        let found = super::circle_measured::findings(&args.measured, &args.directions, &args.test, known)?;
+        let given = Given {
+            radius: args.test.radius,
+            feed: args.test.feed.map(|f| f / 60.0),
+            clockwise: args.directions.clone(),
+            part: Part { from: args.from, to: args.to },
+        };
+        let found = super::circle_measured::findings(&args.measured, &given, &args.test, known)?;
         return write_out(
             &args,
             || ballbar::report(&found),

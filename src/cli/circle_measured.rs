@@ -20,12 +20,11 @@ use crate::trace::Machine;
 /// When a file is no circular test or has too few points.
 pub(super) fn findings(
     files: &[PathBuf],
-    directions: &[bool],
+    given: &Given,
     test: &Test,
     axes: Option<&[Machine; 2]>,
 ) -> anyhow::Result<Findings> {
-    let given = Given { radius: test.radius, feed: test.feed.map(|f| f / 60.0), clockwise: directions.to_vec() };
-    let measured = read(files, &given)?;
+    let measured = read(files, given)?;
     check_radius(measured.radius).context("the measured circle")?;
     let too_few = || anyhow::anyhow!("the turns have too few points to tell the deviations apart; sample faster");
     let analysis = analyse(&measured.turns, measured.radius, measured.feed).ok_or_else(too_few)?;

@@ -36,6 +36,23 @@ impl Points {
     }
 }
 
+impl Picked {
+    /// The same of these rows alone.
+    pub fn of_rows(self, rows: &[usize]) -> Self {
+        let taken = |v: &[f64]| rows.iter().map(|k| v[*k]).collect::<Vec<f64>>();
+        let points = match &self.points {
+            Points::Cartesian { x, y, time } => {
+                Points::Cartesian { x: taken(x), y: taken(y), time: time.as_deref().map(taken) }
+            }
+            Points::Radius { angle, radius } => Points::Radius { angle: taken(angle), radius: taken(radius) },
+            Points::Deviation { angle, deviation } => {
+                Points::Deviation { angle: taken(angle), deviation: taken(deviation) }
+            }
+        };
+        Self { points, direction: self.direction.as_deref().map(taken), ..self }
+    }
+}
+
 /// What was made of a table, or of one of its columns of deviations.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Picked {
@@ -128,15 +145,41 @@ fn role(name: &str, unit: Option<Quantity>) -> Option<Role> {
     (way_of(name).is_some() && length).then_some(Role::Deviation)
 }
 
-/// The columns of a table as points; `radius` is the nominal one where it is known, m.
-pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, MeasuredError> {
-    let failed = |what: String| MeasuredError::File { file: table.file.clone(), what };
+/// What each column of a table may be, and its unit where that is known.
+fn roles(table: &Table) -> Vec<(Option<Role>, Option<&'static Unit>)> {
     let known = table.headers.iter().map(|h| {
         let (stem, own) = suffix(&h.name).map_or((h.name.as_str(), None), |(stem, unit)| (stem, Some(unit)));
         (stem.to_owned(), h.unit.as_deref().and_then(unit).or(own))
     });
-    let columns: Vec<(Option<Role>, Option<&'static Unit>)> =
-        known.map(|(stem, unit)| (role(&stem, unit.map(|u| u.quantity)), unit)).collect();
+    known.map(|(stem, unit)| (role(&stem, unit.map(|u| u.quantity)), unit)).collect()
+}
+
+/// The name of the column of time and its values, s; none where no column has the name or the unit of a time.
+///
+/// # Errors
+/// When its unit is no time, or a cell of it no number.
+pub(super) fn time(table: &Table) -> Result<Option<(&str, Vec<f64>)>, MeasuredError> {
+    let columns = roles(table);
+    let Some(at) = columns.iter().position(|(r, _)| *r == Some(Role::Time)) else { return Ok(None) };
+    let header = &table.headers[at];
+    let per = match (columns[at].1, &header.unit) {
+        (Some(u), _) if u.quantity == Quantity::Time => u.factor,
+        (None, None) => 1.0,
+        (known, written) => {
+            let unit = known.map_or_else(|| written.as_deref().unwrap_or_default(), |u| u.symbol);
+            return Err(MeasuredError::File {
+                file: table.file.clone(),
+                what: format!("column {}: [{unit}] is no unit of time; use s, ms or us", header.name),
+            });
+        }
+    };
+    Ok(Some((header.name.as_str(), table.column(at)?.iter().map(|t| t * per).collect())))
+}
+
+/// The columns of a table as points; `radius` is the nominal one where it is known, m.
+pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, MeasuredError> {
+    let failed = |what: String| MeasuredError::File { file: table.file.clone(), what };
+    let columns = roles(table);
     for (header, (role, unit)) in table.headers.iter().zip(&columns) {
         if let (Some(_), Some(text), None) = (role, &header.unit, unit) {
             return Err(failed(format!(

@@ -5,6 +5,7 @@
 //! and from the order of the angles.
 
 mod columns;
+mod part;
 mod text;
 
 use std::f64::consts::{PI, TAU};
@@ -14,6 +15,7 @@ use super::Path;
 use super::trace::{Turn, turns};
 use crate::trace::{Table, TraceError};
 use columns::{Points, pick};
+pub use part::Part;
 use text::Said;
 
 /// A measured test that cannot be used.
@@ -45,6 +47,8 @@ pub struct Given {
     pub feed: Option<f64>,
     /// Whether each turn is clockwise, in the order of the files.
     pub clockwise: Vec<bool>,
+    /// The part of each file that is used.
+    pub part: Part,
 }
 
 /// A measured circular test.
@@ -249,7 +253,12 @@ fn runs_of(file: &File, given: &Given) -> Result<(Vec<Run>, Said), MeasuredError
 /// Takes a table apart into turns.
 fn split(table: &Table, said: &Said, file: &str, given: &Given) -> Result<Vec<Run>, MeasuredError> {
     let mut runs = Vec::new();
+    let part = given.part.rows(table)?;
     for picked in pick(table, given.radius.or(said.radius))? {
+        let picked = match &part {
+            Some(rows) => picked.of_rows(rows),
+            None => picked,
+        };
         let angle = picked.points.angle();
         let all = stretches(&angle, picked.direction.as_deref());
         let whole = |forward: bool| {
@@ -281,11 +290,14 @@ fn split(table: &Table, said: &Said, file: &str, given: &Given) -> Result<Vec<Ru
         }
     }
     if runs.is_empty() {
-        let rows = table.rows();
+        let rows = match part {
+            Some(part) => format!("the {} of its {} rows that --from and --to leave", part.len(), table.rows()),
+            None => format!("its {} rows", table.rows()),
+        };
         return Err(MeasuredError::File {
             file: file.to_owned(),
             what: format!(
-                "no whole turn in its {rows} rows: at least {FEWEST} points over 350 degrees without a gap of more than 15 are \
+                "no whole turn in {rows}: at least {FEWEST} points over 350 degrees without a gap of more than 15 are \
                  needed; the angles or positions must stand in the order of the measurement"
             ),
         });

@@ -69,6 +69,32 @@ fn angle_and_radius_in_every_unit_and_separator_are_one_circle() {
 }
 
 #[test]
+fn a_part_is_taken_by_the_column_of_time_and_refused_where_there_is_none() {
+    // A turn of 12 s between two ways in and out, which lie far off the circle.
+    let mut text = "t [ms],x [mm],y [mm]\n".to_owned();
+    let mut row = |t: f64, x: f64, y: f64| writeln!(text, "{},{x},{y}", 1e3 * t).unwrap();
+    (0..100).for_each(|k| row(0.02 * f64::from(k), 0.5 * f64::from(k), 0.0));
+    for (k, (a, d)) in circle(720).iter().enumerate() {
+        let (s, c) = a.to_radians().sin_cos();
+        row(2.0 + k as f64 / 60.0, (50.0 + 1e-3 * d) * c, (50.0 + 1e-3 * d) * s);
+    }
+    (0..100).for_each(|k| row(14.0 + 0.02 * f64::from(k), 50.0 - 0.5 * f64::from(k), 0.0));
+    let part = |from, to| Given { part: Part { from, to }, ..Given::default() };
+    let m = read_text("a.csv", &text, &part(Some(2.0), Some(13.99))).unwrap();
+    bump(&m, 0, 720);
+    assert!((m.feed.unwrap() - std::f64::consts::TAU * 0.05 / 12.0).abs() < 1e-4, "{:?}", m.feed);
+    let error = |text: &str, given: &Given| read_text("a.csv", text, given).unwrap_err().to_string();
+    let short = error(&text, &part(None, Some(3.0)));
+    assert!(short.contains("no whole turn in the 161 of its 920 rows that --from and --to leave"), "{short}");
+    let none = error(&text, &part(Some(20.0), None));
+    assert!(none.contains("its t runs from 0 s to 15.98 s"), "{none}");
+    let timeless = error("angle [deg],radius [mm]\n0,50\n1,50\n", &part(Some(1.0), None));
+    assert!(timeless.contains("no column of time") && timeless.contains("time [s]"), "{timeless}");
+    let wrong = error("time [mm],x [mm],y [mm]\n0,50,0\n1,50,1\n", &part(Some(1.0), None));
+    assert!(wrong.contains("column time: [mm] is no unit of time"), "{wrong}");
+}
+
+#[test]
 fn two_directions_come_from_a_column_two_columns_two_runs_or_two_files() {
     let rows = circle(720);
     let mut column = "angle [deg],deviation [um],direction\n".to_owned();
