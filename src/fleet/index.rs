@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::trend::Trend;
+use super::trend::{Moved, Trend};
 use super::{Placed, Plan, store};
 use crate::report::{Axis, Block, Cell, Chart, Colour, Figure, Report, Section, Series, Table, Tone, Verdict};
 
@@ -12,6 +12,9 @@ use crate::report::{Axis, Block, Cell, Chart, Colour, Figure, Report, Section, S
 const PLOTS: usize = 24;
 /// Most parameters with a column of their own: with more the tables are cut on paper and run out of the screen.
 const COLUMNS: usize = 4;
+
+/// What stands for a drift that the errors of the estimates would make by themselves.
+const WITHIN: &str = "within its error";
 
 /// The report of a run.
 pub(super) fn report(plan: &Plan, rows: &[Placed]) -> Report {
@@ -161,7 +164,7 @@ fn machines(plan: &Plan, rows: &[Placed], trends: &[Trend], wide: bool) -> Table
     head.extend(shown(plan).map(|(_, name)| name.to_owned()));
     head.extend(names.iter().map(|n| format!("drift of {n}")));
     let caption = if wide {
-        "What its last usable trace shows, and the drift over all of them"
+        "What its last usable trace shows, and the drift over all of them where it is more than two standard errors"
     } else {
         "What the last usable trace of each machine shows"
     };
@@ -179,7 +182,10 @@ fn machines(plan: &Plan, rows: &[Placed], trends: &[Trend], wide: bool) -> Table
         cells.extend(shown(plan).map(|(k, name)| cell(name, last.and_then(|p| p.row.facts.get(k)))));
         let own = |name: &&str| by_name.get(&(first.machine.as_str(), *name)).copied();
         cells.extend(names.iter().map(|name| {
-            own(name).and_then(|t| t.drift().map(|d| d.0).or(t.change())).map_or(Cell::Empty, Cell::Percent)
+            own(name).and_then(Trend::moved).map_or(Cell::Empty, |moved| match moved {
+                Moved::By(drift) => Cell::Percent(drift),
+                Moved::WithinItsError => Cell::text(WITHIN),
+            })
         }));
         if trends.iter().any(|t| t.machine == first.machine && t.stands_out()) {
             table.strong_row(cells);

@@ -16,6 +16,18 @@ pub(super) struct Trend<'a> {
     pub days: bool,
 }
 
+/// What a parameter did over the records.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Moved {
+    /// No more than two standard errors.
+    WithinItsError,
+    /// By this share of itself.
+    By(f64),
+}
+
+/// A change by a smaller share of the parameter is one of rounding.
+const LEAST: f64 = 1e-6;
+
 impl<'a> Trend<'a> {
     /// Every parameter of every machine that was estimated at least twice; the rows in the summary's order.
     pub fn all(rows: &'a [Placed<'a>]) -> Vec<Self> {
@@ -72,9 +84,26 @@ impl<'a> Trend<'a> {
         Some((slope * span / y.abs(), std * span / y.abs()))
     }
 
+    /// The drift, or of two records the change, and its standard error where anything tells one.
+    fn told(&self) -> Option<(f64, Option<f64>)> {
+        if let Some((drift, std)) = self.drift() {
+            return Some((drift, Some(std)));
+        }
+        let ((first, one), (_, other)) = (self.values.first()?, self.values.last()?);
+        let std = one.zip(*other).map(|(one, other)| one.hypot(other) / first.abs());
+        Some((self.change()?, std))
+    }
+
+    /// What the parameter did, as a table of many shows it: what lies within two standard errors says nothing of the machine.
+    pub fn moved(&self) -> Option<Moved> {
+        let (drift, std) = self.told()?;
+        let within = std.is_some_and(|std| drift.abs() <= 2.0 * std) || drift.abs() <= LEAST;
+        Some(if within { Moved::WithinItsError } else { Moved::By(drift) })
+    }
+
     /// Whether the drift stands out of the scatter: four standard errors.
     pub fn stands_out(&self) -> bool {
-        self.drift().is_some_and(|(drift, std)| drift.abs() > 4.0 * std && drift.abs() > 1e-6)
+        self.drift().is_some_and(|(drift, std)| drift.abs() > 4.0 * std && drift.abs() > LEAST)
     }
 }
 
@@ -82,11 +111,31 @@ impl<'a> Trend<'a> {
 mod tests {
     use super::*;
 
-    /// Three records a day apart.
-    fn drifts(values: [f64; 3], std: Option<f64>) -> bool {
+    /// Records a day apart.
+    fn of<T>(values: &[f64], std: Option<f64>, ask: impl Fn(&Trend) -> T) -> T {
         let parameter = Tracked { name: "K".into(), unit: String::new(), value: values[0], std };
+        let at = (0..values.len()).map(|k| k as f64).collect();
         let values = values.iter().map(|v| (*v, std)).collect();
-        Trend { machine: "press", parameter: &parameter, at: vec![0.0, 1.0, 2.0], values, days: true }.stands_out()
+        ask(&Trend { machine: "press", parameter: &parameter, at, values, days: true })
+    }
+
+    fn drifts(values: [f64; 3], std: Option<f64>) -> bool {
+        of(&values, std, |t| t.stands_out())
+    }
+
+    #[test]
+    fn a_change_of_no_more_than_two_standard_errors_is_told_as_none() {
+        let moved = |values: &[f64], std| of(values, std, |t| t.moved());
+        assert_eq!(moved(&[20.0, 20.3, 20.1], Some(0.2)), Some(Moved::WithinItsError));
+        assert!(
+            matches!(moved(&[20.0, 20.5, 21.0], Some(0.2)), Some(Moved::By(drift)) if (drift - 1.0 / 20.5).abs() < 1e-9)
+        );
+        // Of two records: the errors of both, 0.2*sqrt(2).
+        assert_eq!(moved(&[20.0, 20.56], Some(0.2)), Some(Moved::WithinItsError));
+        assert!(matches!(moved(&[20.0, 20.58], Some(0.2)), Some(Moved::By(drift)) if (drift - 0.029).abs() < 1e-9));
+        // Where nothing tells the error, the change stands; one of rounding does not.
+        assert!(matches!(moved(&[20.0, 20.1], None), Some(Moved::By(_))));
+        assert_eq!(moved(&[20.0, 20.0 + 1e-9], None), Some(Moved::WithinItsError));
     }
 
     #[test]
