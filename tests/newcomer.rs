@@ -310,6 +310,7 @@ fn a_number_of_the_drive_without_a_unit_is_in_counts_and_never_in_newton_metres(
     assert!(said.contains("not given: counts"), "{said}");
     let axis = std::fs::read_to_string(folder.path().join("arm/axis.toml")).unwrap();
     assert!(axis.contains("column = \"load_raw\", unit = \"counts\"") && axis.contains("counts.s2/rad"), "{axis}");
+    assert!(axis.contains("come out in counts (the column load_raw has no unit) instead of N.m."), "{axis}");
     // The machine of a log that is called by its date is the folder.
     assert!(axis.contains("name = \"arm\""), "{axis}");
     let done = run::eixo_in(

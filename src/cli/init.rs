@@ -553,11 +553,12 @@ fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
         };
         let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, &hold));
         if signal == Signal::T && g.unit.is_none_or(|u| u.quantity == Quantity::Drive) && scale == 1.0 {
-            let _ = writeln!(
-                out,
-                "# scale is 1: all inertias and stiffnesses come out in units of {} instead of {torque}.",
-                g.column
-            );
+            let unit = match g.unit {
+                Some(unit) => unit.symbol.to_owned(),
+                None if made.counts() => format!("{COUNTS} (the column {} has no unit)", g.column),
+                None => format!("the unit of the column {}", g.column),
+            };
+            let _ = writeln!(out, "# scale is 1: all inertias and stiffnesses come out in {unit} instead of {torque}.");
         }
     }
     out
