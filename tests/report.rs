@@ -354,6 +354,31 @@ fn a_figure_that_is_alone_in_its_row_is_drawn_for_the_whole_width() {
 }
 
 #[test]
+fn a_unit_in_a_sentence_of_the_page_is_written_as_in_its_tables() {
+    let mut table = Table::new("Torque in N.m", ["cause", "K [N.m/rad]"]);
+    table.row(vec![Cell::text("0.1 N.m of friction"), Cell::quantity(1.0, "N.m/rad")]);
+    let blocks = vec![
+        Block::Paragraph("The model lacks 0.004 N.m rms.".into()),
+        Block::Warning("I1 is 2 kg.m2.".into()),
+        Block::Steps(vec!["Take 0.1 N.m.".into()]),
+        Block::Table(table),
+    ];
+    let report = Report {
+        title: "units".into(),
+        subject: String::new(),
+        sections: vec![Section::new("", blocks)],
+        footer: String::new(),
+    };
+    let page = html::page(&report);
+    assert!(!page.contains("N.m") && !page.contains("kg.m2"), "one page, two spellings");
+    for typeset in ["0.004 N·m rms", "2 kg·m²", "Take 0.1 N·m.", "Torque in N·m", "0.1 N·m of friction", "[N·m/rad]"]
+    {
+        assert!(page.contains(typeset), "{typeset}");
+    }
+    assert!(terminal::render(&report, Layout::default()).contains("0.004 N.m rms"));
+}
+
+#[test]
 fn a_heading_can_be_broken_within_the_name_of_a_parameter() {
     let mut table = Table::new("t", ["drift of viscous_motor.coefficient"]);
     table.row(vec![Cell::Percent(0.1)]);

@@ -121,7 +121,8 @@ fn space(medium: Medium) -> char {
 pub fn cell(cell: &Cell, medium: Medium) -> String {
     match cell {
         Cell::Empty => String::new(),
-        Cell::Text(text) | Cell::Link(text, _) => text.clone(),
+        Cell::Text(text) => prose(text, medium).into_owned(),
+        Cell::Link(text, _) => text.clone(),
         Cell::Number(value, digits, unit) => with_unit(number(*value, *digits, medium), unit, medium),
         Cell::Count(value) => count(*value),
         Cell::Estimate(value, std, unit) => with_unit(estimate(*value, *std, medium), unit, medium),
@@ -154,6 +155,44 @@ pub fn unit(unit: &str, medium: Medium) -> String {
         letter_before = c.is_alphabetic() || (c == '^' && letter_before);
     }
     out
+}
+
+/// Symbols that units in sentences are made of.
+const SYMBOLS: [&str; 17] =
+    ["N", "mN", "kN", "kg", "g", "m", "mm", "um", "s", "ms", "rad", "deg", "A", "V", "%", "Hz", "counts"];
+
+/// Whether a word is a unit made of several: `N.m`, `kg.m2`, `A.s/rad`.
+fn is_compound(word: &str) -> bool {
+    let symbol = |part: &str| SYMBOLS.contains(&part.trim_end_matches(['2', '3']));
+    word.contains('.') && word.split(['.', '/']).all(symbol)
+}
+
+/// A sentence with its units as the medium writes them; what stands in quotes or backticks is a file's or a command's, and stays.
+#[must_use]
+pub fn prose(text: &str, medium: Medium) -> Cow<'_, str> {
+    if medium == Medium::Terminal || !text.contains('.') {
+        return Cow::Borrowed(text);
+    }
+    let of_a_word = |c: char| c.is_alphanumeric() || "._/%-".contains(c);
+    let mut out = String::with_capacity(text.len() + 8);
+    let mut quoted = None;
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let end = rest.find(|c| !of_a_word(c)).unwrap_or(rest.len()).max(first.len_utf8());
+        let (word, next) = rest.split_at(end);
+        let (stem, stops) = word.split_at(word.trim_end_matches('.').len());
+        if quoted.is_none() && is_compound(stem) {
+            out.push_str(&unit(stem, medium));
+            out.push_str(stops);
+        } else {
+            out.push_str(word);
+        }
+        if matches!(first, '"' | '`') {
+            quoted = if quoted == Some(first) { None } else { quoted.or(Some(first)) };
+        }
+        rest = next;
+    }
+    Cow::Owned(out)
 }
 
 /// Text from outside with nothing in it that steers a terminal or the direction of a page: control characters and
@@ -274,6 +313,20 @@ mod tests {
         assert_eq!(unit("N.m.s/rad", Page), "N·m·s/rad");
         assert_eq!(unit("rad/s^2", Page), "rad/s²");
         assert_eq!(unit("kg.m2", Terminal), "kg.m2");
+    }
+
+    #[test]
+    fn units_in_sentences_are_typeset_on_the_page_and_nothing_else_is() {
+        let said =
+            "The model lacks 0.004 N.m rms, 2.5 kg.m2 and (0.1 A.s2/rad). See load.m, end_stop.k, README.md, m.2.";
+        let typeset =
+            "The model lacks 0.004 N·m rms, 2.5 kg·m² and (0.1 A·s²/rad). See load.m, end_stop.k, README.md, m.2.";
+        assert_eq!(prose(said, Page), typeset);
+        assert_eq!(prose(said, Terminal), said);
+        assert_eq!(prose("in N.m.", Page), "in N·m.");
+        for kept in ["unit = \"N.m\"", "`T = 1 N.m`", "N/m", "0.5 s", ""] {
+            assert_eq!(prose(kept, Page), kept);
+        }
     }
 
     #[test]

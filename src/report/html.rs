@@ -102,11 +102,11 @@ fn section(index: usize, section: &Section) -> Markup {
 fn block(block: &Block) -> Markup {
     match block {
         Block::Verdict(v) => verdict(v),
-        Block::Paragraph(text) => html! { p { (text) } },
+        Block::Paragraph(text) => html! { p { (prose(text)) } },
         Block::Warning(text) => {
-            html! { p class="warning" role="note" { span class="sign" aria-hidden="true" { "!" } span { (text) @if text.ends_with(char::is_alphanumeric) { "." } } } }
+            html! { p class="warning" role="note" { span class="sign" aria-hidden="true" { "!" } span { (prose(text)) @if text.ends_with(char::is_alphanumeric) { "." } } } }
         }
-        Block::Steps(steps) => html! { ol class="steps" { @for s in steps { li { (s) } } } },
+        Block::Steps(steps) => html! { ol class="steps" { @for s in steps { li { (prose(s)) } } } },
         Block::KeyValues(pairs) => key_values(pairs),
         Block::Table(t) => table(t),
         Block::Figure(f) => html! { div class="full" { (figure(f, Size { width: 1040.0, height: 330.0 })) } },
@@ -116,7 +116,7 @@ fn block(block: &Block) -> Markup {
             html! { div class="grid2" { @for f in all { (figure(f, Size { width: 510.0, height: 310.0 })) } } }
         }
         Block::Details(summary, blocks) => {
-            html! { details { summary { (summary) } @for b in blocks { (self::block(b)) } } }
+            html! { details { summary { (prose(summary)) } @for b in blocks { (self::block(b)) } } }
         }
     }
 }
@@ -132,18 +132,18 @@ fn verdict(v: &Verdict) -> Markup {
         div class={ "verdict " (class) } {
             div class="sentence" {
                 span class="sign" role="img" aria-label=(name) { (sign) }
-                p { (v.sentence) }
+                p { (prose(&v.sentence)) }
             }
-            @if !v.detail.is_empty() { p class="detail" { (v.detail) } }
+            @if !v.detail.is_empty() { p class="detail" { (prose(&v.detail)) } }
             @if !v.figures.is_empty() {
-                dl class="figures" { @for (k, c) in &v.figures { div { dt { (k) } dd { (format::cell(c, Medium::Page)) } } } }
+                dl class="figures" { @for (k, c) in &v.figures { div { dt { (prose(k)) } dd { (format::cell(c, Medium::Page)) } } } }
             }
         }
     }
 }
 
 fn key_values(pairs: &[(String, Cell)]) -> Markup {
-    html! { dl class="pairs" { @for (k, c) in pairs { div { dt { (k) } dd { (format::cell(c, Medium::Page)) } } } } }
+    html! { dl class="pairs" { @for (k, c) in pairs { div { dt { (prose(k)) } dd { (format::cell(c, Medium::Page)) } } } } }
 }
 
 fn table(t: &Table) -> Markup {
@@ -162,9 +162,9 @@ fn table(t: &Table) -> Markup {
     };
     let class = |c: usize| numeric.get(c).copied().unwrap_or(false).then_some("num");
     html! {
-        div class={ "scroll" (room) } role="region" tabindex="0" aria-label=(t.caption) {
+        div class={ "scroll" (room) } role="region" tabindex="0" aria-label=(prose(&t.caption)) {
             table {
-                @if !t.caption.is_empty() { caption { (t.caption) } }
+                @if !t.caption.is_empty() { caption { (prose(&t.caption)) } }
                 thead { tr { @for (c, name) in t.columns.iter().enumerate() { th scope="col" class=[class(c)] { (broken(&heading(name))) } } } }
                 tbody {
                     @for r in &t.rows {
@@ -178,6 +178,11 @@ fn table(t: &Table) -> Markup {
             }
         }
     }
+}
+
+/// A sentence of the page.
+fn prose(text: &str) -> std::borrow::Cow<'_, str> {
+    format::prose(text, Medium::Page)
 }
 
 /// A heading with the unit in its brackets typeset.
@@ -249,7 +254,7 @@ fn figure(f: &Figure, wide: Size) -> Markup {
                     div class="narrow" { (chain::svg(c, narrow)) }
                 }
             }
-            @if !f.caption.is_empty() { figcaption { (f.caption) } }
+            @if !f.caption.is_empty() { figcaption { (prose(&f.caption)) } }
         }
     }
 }
@@ -286,7 +291,7 @@ fn legend<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Markup {
                                 Sign::Patch => { path class="band" d="M1 1H27V11H1Z" {} }
                             }
                         }
-                        (e.name)
+                        (prose(e.name))
                     }
                 }
             }

@@ -35,7 +35,7 @@ fn an_effect_is_named_with_its_place_its_size_and_what_it_means() {
         "theta1 on held-out data",
         "theta1 read in steps of 1.000e-3 rad;",
         "do not tell Coulomb friction of motor and screw from ",
-        "the model lacks 0.00400 N.m rms in torque, flat against the sign of omega1 (93 % of its variance)",
+        "the model lacks 0.00400 N·m rms in torque, flat against the sign of omega1 (93 % of its variance)",
     ] {
         assert!(page.contains(needle), "{needle}");
     }
