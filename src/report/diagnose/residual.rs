@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::naming;
-use crate::diagnose::location::{FrequencyPart, PartOf, Side, StateCurve};
+use crate::diagnose::location::{Bin, FrequencyPart, PartOf, Side, StateCurve, StateVariable};
 use crate::diagnose::{ClosureOf, Location, Overlay, Site, TORQUE, Where};
 use crate::effects::Place;
 use crate::report::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
@@ -133,10 +133,17 @@ fn over_frequency(parts: &[FrequencyPart], name: Side, unit: &str) -> Option<Fig
 fn against_state(c: &StateCurve, unit: &str, motion: Motion) -> Figure {
     let (against, rotary) = naming::variable(c.against);
     let against_unit = motion.unit(rotary);
-    let x: Arc<[f64]> = c.bins.iter().map(|b| b.x).collect();
-    let mean: Arc<[f64]> = c.bins.iter().map(|b| b.mean).collect();
-    let low: Vec<f64> = c.bins.iter().map(|b| b.mean - b.std).collect();
-    let high: Vec<f64> = c.bins.iter().map(|b| b.mean + b.std).collect();
+    let bins = if matches!(c.against, StateVariable::Turn1 | StateVariable::Turn2) {
+        apart(&c.bins)
+    } else {
+        c.bins.iter().map(Some).collect()
+    };
+    // A line and a band are broken where a value is missing.
+    let of = |f: &dyn Fn(&Bin) -> f64| -> Vec<f64> { bins.iter().map(|b| b.map_or(f64::NAN, f)).collect() };
+    let x: Arc<[f64]> = of(&|b| b.x).into();
+    let mean: Arc<[f64]> = of(&|b| b.mean).into();
+    let low = of(&|b| b.mean - b.std);
+    let high = of(&|b| b.mean + b.std);
     let chart = Chart::new(
         format!("Against {against}"),
         Axis::linear(against, against_unit),
@@ -146,6 +153,36 @@ fn against_state(c: &StateCurve, unit: &str, motion: Motion) -> Figure {
     .with(Series::line("mean", x.clone(), mean.clone()).in_colour(Colour::Vermillion))
     .with(Series::points("", x, mean).in_colour(Colour::Vermillion));
     Figure::new(chart, format!("Explains {:.0} % of the residual's variance.", 100.0 * c.explained.clamp(0.0, 1.0)))
+}
+
+/// Distance of two bins, in that of the bins next to them, from which no sample lies between the two: bins hold as many samples each, and
+/// the reversal of a sine brings neighbours no further apart than three times.
+const EMPTY: f64 = 4.0;
+
+/// The bins of an angle within its turn, `None` between two that lie apart: an axis that does not go all the way round leaves a part of
+/// the turn out. A bin alone between two such gaps took its samples from either side, and has no place of its own.
+fn apart(bins: &[Bin]) -> Vec<Option<&Bin>> {
+    let step = |i: usize| bins[i + 1].x - bins[i].x;
+    let steps = bins.len().saturating_sub(1);
+    // The larger step of the two on the far sides of steps `i` to `j`.
+    let beside = |i: usize, j: usize| {
+        let before = i.checked_sub(1).map_or(0.0, step);
+        before.max(if j + 1 < steps { step(j + 1) } else { 0.0 })
+    };
+    let wide = |i: usize, j: usize| (i..=j).all(|k| step(k) > EMPTY * beside(i, j)) && beside(i, j) > 0.0;
+    let mut out = Vec::with_capacity(bins.len() + 2);
+    let mut i = 0;
+    while i < bins.len() {
+        out.push(Some(&bins[i]));
+        if i + 1 < steps && wide(i, i + 1) {
+            out.push(None);
+            i += 1;
+        } else if i < steps && wide(i, i) {
+            out.push(None);
+        }
+        i += 1;
+    }
+    out
 }
 
 /// The parts of the residual by lines of the excitation and of the turn.
@@ -173,4 +210,39 @@ fn parts(all: &[FrequencyPart], name: Side, unit: &str) -> Table {
         ]);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bins(at: &[f64]) -> Vec<Bin> {
+        at.iter().map(|x| Bin { x: *x, mean: 0.0, std: 1.0, count: 50 }).collect()
+    }
+
+    fn drawn(at: &[f64]) -> Vec<Option<f64>> {
+        apart(&bins(at)).iter().map(|b| b.map(|b| b.x)).collect()
+    }
+
+    #[test]
+    fn a_part_of_the_turn_that_the_axis_does_not_reach_breaks_the_line() {
+        let both = [0.1, 0.2, 0.3, 0.4, 6.0, 6.1, 6.2];
+        assert_eq!(drawn(&both), [&[0.1, 0.2, 0.3, 0.4].map(Some)[..], &[None], &[6.0, 6.1, 6.2].map(Some)].concat());
+        // One bin with samples of either side.
+        let across = [0.1, 0.2, 0.3, 3.2, 6.0, 6.1, 6.2];
+        assert_eq!(drawn(&across), [&[0.1, 0.2, 0.3].map(Some)[..], &[None], &[6.0, 6.1, 6.2].map(Some)].concat());
+    }
+
+    #[test]
+    fn a_turn_that_is_gone_through_is_one_line_however_the_axis_dwells() {
+        // To and fro over a turn: the bins are the quantiles of a sine.
+        let sine: Vec<f64> =
+            (0..24).map(|k| 3.1 - 3.0 * (std::f64::consts::PI * (f64::from(k) + 0.5) / 24.0).cos()).collect();
+        let even: Vec<f64> = (0..24).map(|k| 0.26 * f64::from(k)).collect();
+        for at in [sine, even] {
+            assert!(drawn(&at).iter().all(Option::is_some), "{at:?}");
+        }
+        assert!(drawn(&[]).is_empty());
+        assert_eq!(drawn(&[1.0]), [Some(1.0)]);
+    }
 }
