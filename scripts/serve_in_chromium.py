@@ -103,6 +103,9 @@ class Tab:
         await self.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 600)
         wide = await self.value("document.documentElement.scrollWidth")
         assert wide <= width, f"{name}: {wide} pixels wide in a window of {width}"
+        if width < 600:
+            said = await self.value("(e => [e.scrollWidth, e.clientWidth])(document.getElementById('said'))")
+            assert said[0] <= said[1], f"{name}: what was printed is {said[0]} pixels wide in a box of {said[1]}"
         shot = await self.call("Page.captureScreenshot", captureBeyondViewport=True)
         (folder / f"{name}-{width}{'-dark' if dark else ''}.png").write_bytes(base64.b64decode(shot["data"]))
 

@@ -202,6 +202,7 @@
   // Characters of a line of what the diagnosis prints; it has no size yet while it is hidden.
   function width() {
     const brush = document.createElement("canvas").getContext("2d");
+    $("said").style.removeProperty("--longest");
     const style = getComputedStyle($("said"));
     brush.font = `${style.fontSize} ${style.fontFamily}`;
     const room = $("findings").clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight);
@@ -263,6 +264,8 @@
     $("stop").disabled = false;
     $("run").disabled = running;
     $("said").textContent = told.state === "failed" ? "" : told.said;
+    // By it a narrow window sets the size of the letters.
+    $("said").style.setProperty("--longest", Math.max(60, ...$("said").textContent.split("\n").map((line) => line.length)));
     show("said", !running && Boolean($("said").textContent));
     problem("work-problem", told.state === "failed" ? told.said.trim() : told.aside ? `The circle could not be drawn: ${told.aside.trim()}` : "");
     show("trust", told.state === "refused");
