@@ -248,6 +248,34 @@ fn the_record_that_they_were_made_of_is_believed() {
 }
 
 #[test]
+fn samples_that_the_log_held_are_counted_and_dated_by_the_inspection() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("axis.toml"), AXIS).unwrap();
+    let mut log = Log::new(1);
+    // Where the motor is fastest in each third of the record.
+    let third = log.0[3].len() / 3;
+    let fastest =
+        |range: std::ops::Range<usize>| range.max_by(|a, b| log.0[3][*a].abs().total_cmp(&log.0[3][*b].abs())).unwrap();
+    let held = [fastest(10..third), fastest(third..2 * third), fastest(2 * third..3 * third - 10)];
+    held.iter().for_each(|k| log.hold(2, *k - 1..*k + 1));
+    log.write(&at("log.csv"), POSITIONS);
+    let done = run::eixo_in(folder.path(), &["inspect", "log.csv", "--axis", "axis.toml", "--json", "seen.json"]);
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(said.contains("3 samples of theta1 repeat the one before while the axis goes on."), "{said}");
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(at("seen.json")).unwrap()).unwrap();
+    let all = json["examination"]["findings"].as_array().unwrap();
+    let notes: Vec<_> = all.iter().filter(|f| f["id"] == "held_samples").collect();
+    assert_eq!(notes.len(), 1, "theta2 has none: {all:?}");
+    assert_eq!((&notes[0]["severity"], &notes[0]["signal"]), (&"note".into(), &"theta1".into()));
+    assert_eq!(notes[0]["samples"], 3);
+    for (told, k) in notes[0]["seconds"].as_array().unwrap().iter().zip(held) {
+        assert!((told[0].as_f64().unwrap() - log.0[0][k]).abs() < 1e-9, "{told} {k}");
+    }
+}
+
+#[test]
 fn white_noise_identifies_nothing_in_memory_or_streamed() {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);

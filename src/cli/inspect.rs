@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use super::FINDINGS;
 use super::examined::Part;
+use super::held;
 use super::outputs;
 use super::stdout::{WIDTH, layout, out};
 use crate::examine::{Input, examine};
@@ -49,7 +50,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let file = args.trace.display().to_string();
     let loaded = load(&args.trace, &machine.signals)?;
     let input = Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, args.axis.is_some());
-    let examination = examine(&input);
+    let mut examination = examine(&input);
+    examination.findings.extend(held::notes(&loaded.trace));
     let seen = Inspected {
         examination: &examination,
         trace: &loaded.trace,

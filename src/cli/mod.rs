@@ -43,6 +43,7 @@ mod effects;
 mod examined;
 mod excite;
 mod export;
+mod held;
 mod identify;
 mod info;
 mod info3;
