@@ -2,6 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
+use super::super::diagnosis::Undecided;
 use super::super::model::Model;
 use super::super::verdict::Verdict;
 use super::determined::{is_simpler, is_undetermined, steadiness};
@@ -82,8 +83,8 @@ pub struct Decision {
     pub independent: f64,
     /// Effects that the record cannot tell from chosen ones.
     pub confusable: Vec<Confusable>,
-    /// Effects of which one is there beside the causes, the chosen one first; empty where all that is chosen is told.
-    pub undecided: Vec<Effect>,
+    /// What of the chosen hypothesis is not told, where it is one of several effects.
+    pub undecided: Option<Undecided>,
 }
 
 impl Confusable {
@@ -229,7 +230,7 @@ impl Search<'_> {
         let twins = twins.into_iter().flatten().filter(|t| t.difference < ALIKE);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent), twins);
         let shares = self.shares(&chosen);
-        let undecided = open.map(|i| instead(&ranking, &chosen, i)).unwrap_or_default();
+        let undecided = open.map(|i| Undecided { effects: instead(&ranking, &chosen, i), share_of_gap: shares[i] });
         let cut_short = self.cut_short.load(Ordering::Relaxed);
         Decision {
             verdict,
@@ -313,11 +314,7 @@ impl Search<'_> {
             .filter(|w| w.evidence.is_finite() && !w.fit.at_bound && !is_any_simpler(&w.fit))
             .collect();
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        let key = |f: &Fit| {
-            let mut ids: Vec<Effect> = f.terms.iter().map(|t| t.0).collect();
-            ids.sort_unstable();
-            (ids, f.coordinates.is_empty())
-        };
+        let key = |f: &Fit| (f.effects(), f.coordinates.is_empty());
         let mut seen = Vec::new();
         all.retain(|w| {
             let k = key(&w.fit);
@@ -450,7 +447,7 @@ mod tests {
             probabilities: Vec::new(),
             independent: 1.0,
             confusable: Vec::new(),
-            undecided: Vec::new(),
+            undecided: None,
         }
     }
 

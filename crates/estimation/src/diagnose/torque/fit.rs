@@ -78,6 +78,14 @@ impl Fit {
             _ => Hypothesis::Effects(self.terms.iter().map(|(e, _)| *e).collect()),
         }
     }
+
+    /// Its effects in the order of the list, in whatever forms and however they were found.
+    #[must_use]
+    pub fn effects(&self) -> Vec<Effect> {
+        let mut effects: Vec<Effect> = self.terms.iter().map(|t| t.0).collect();
+        effects.sort_unstable();
+        effects
+    }
 }
 
 /// A record in its band, to which hypotheses are fitted.

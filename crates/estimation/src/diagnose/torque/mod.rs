@@ -34,7 +34,7 @@ use rayon::prelude::*;
 
 use super::assess::{Case, HELD_OUT, Outcome, Replay};
 use super::diagnosis::{
-    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Remainder, Site, Undecided, Where,
+    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Remainder, Site, Where,
 };
 use super::location::{Location, Residual, along, without_offset};
 use super::model::{BaseParameter, Free, Model};
@@ -329,7 +329,7 @@ fn build(
         causes,
         ranking,
         confusable: decision.confusable.clone(),
-        undecided: undecided(decision),
+        undecided: decision.undecided.clone(),
         remainder: remains(searched, &decision.chosen),
         gap: GapReport {
             closure: holdout.closure,
@@ -374,13 +374,6 @@ fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
     causes.retain(|c| c.probability >= LIKELY);
     causes.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap));
     causes
-}
-
-/// What of the chosen hypothesis stays open, where it is one of several effects.
-fn undecided(decision: &Decision) -> Option<Undecided> {
-    let first = decision.undecided.first()?;
-    let at = decision.chosen.terms.iter().position(|t| t.0 == *first)?;
-    Some(Undecided { effects: decision.undecided.clone(), share_of_gap: decision.shares[at] })
 }
 
 /// Share of a value by which the method itself may be off, whatever the noise: where a record without noise is read, the simulation's steps

@@ -33,8 +33,9 @@ const MOST: usize = 5;
 const BUDGET: u64 = 150_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
-/// Hypotheses of each size that are gone on from beside the chosen way, and the steps from which no further one is.
-const BESIDE: usize = 4;
+/// Hypotheses of each size that are gone on from beside the chosen way: as many as effects that are promising.
+const BESIDE: usize = PROMISING;
+/// Simulated steps from which no further one is: a dozen seconds on two cores.
 const BUDGET_BESIDE: u64 = 40_000_000;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
@@ -324,7 +325,7 @@ impl Search<'_> {
         of_size.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
         let mut likeliest: Vec<Fit> = Vec::new();
         for fit in of_size {
-            if likeliest.len() < BESIDE && likeliest.iter().all(|l| !is_alike(l, fit)) {
+            if likeliest.len() < BESIDE && likeliest.iter().all(|l| l.effects() != fit.effects()) {
                 likeliest.push(fit.clone());
             }
         }
@@ -530,11 +531,6 @@ impl Search<'_> {
 /// Whether a fit has all effects of another, and more.
 pub fn is_extension(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
-}
-
-/// Whether two fits have the same effects, in whatever forms.
-fn is_alike(a: &Fit, b: &Fit) -> bool {
-    a.terms.len() == b.terms.len() && a.terms.iter().all(|t| b.terms.iter().any(|o| o.0 == t.0))
 }
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
