@@ -27,11 +27,19 @@ impl Points {
     }
 
     pub fn part(&self, from: usize, to: usize) -> Self {
-        let cut = |v: &[f64]| v[from..to].to_vec();
+        self.each(|v| v[from..to].to_vec())
+    }
+
+    /// The same points with something done to each of their columns.
+    fn each(&self, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         match self {
-            Self::Cartesian { x, y, time } => Self::Cartesian { x: cut(x), y: cut(y), time: time.as_deref().map(cut) },
-            Self::Radius { angle, radius } => Self::Radius { angle: cut(angle), radius: cut(radius) },
-            Self::Deviation { angle, deviation } => Self::Deviation { angle: cut(angle), deviation: cut(deviation) },
+            Self::Cartesian { x, y, time } => {
+                Self::Cartesian { x: change(x), y: change(y), time: time.as_deref().map(&change) }
+            }
+            Self::Radius { angle, radius } => Self::Radius { angle: change(angle), radius: change(radius) },
+            Self::Deviation { angle, deviation } => {
+                Self::Deviation { angle: change(angle), deviation: change(deviation) }
+            }
         }
     }
 }
@@ -40,16 +48,7 @@ impl Picked {
     /// The same of these rows alone.
     pub fn of_rows(self, rows: &[usize]) -> Self {
         let taken = |v: &[f64]| rows.iter().map(|k| v[*k]).collect::<Vec<f64>>();
-        let points = match &self.points {
-            Points::Cartesian { x, y, time } => {
-                Points::Cartesian { x: taken(x), y: taken(y), time: time.as_deref().map(taken) }
-            }
-            Points::Radius { angle, radius } => Points::Radius { angle: taken(angle), radius: taken(radius) },
-            Points::Deviation { angle, deviation } => {
-                Points::Deviation { angle: taken(angle), deviation: taken(deviation) }
-            }
-        };
-        Self { points, direction: self.direction.as_deref().map(taken), ..self }
+        Self { points: self.points.each(taken), direction: self.direction.as_deref().map(taken), ..self }
     }
 }
 
