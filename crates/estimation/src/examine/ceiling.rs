@@ -11,8 +11,9 @@
 
 use super::Input;
 use super::finding::runs;
-use super::rigid::{MOST_LEFT, SAMPLES, SHORTEST, smoothed};
+use super::rigid::{MOST_LEFT, SAMPLES};
 use super::robust::quantile;
+use super::smoothing::{SHORTEST, smoothed};
 use crate::identify::lsq::triangularise;
 
 /// Widths of the smoothing that are tried.

@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex;
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
-use super::nominal::explains_the_table;
+use super::nominal::{explains_the_table, rather_as_logged};
 use super::pairs::{NEAR, factor_within};
 use super::rigid::{Slow, rigid_up_to};
 use super::spectra::Spectra;
@@ -37,7 +37,8 @@ fn of_one_body(input: &Input<'_>) -> Option<f64> {
 
 /// What the slow motion says of the two encoders alone, where the record is too short for more.
 pub(super) fn slowly(input: &Input<'_>) -> Option<Finding> {
-    of_one_body(input).and_then(|ratio| miscounted(input, ratio, ratio < 0.0))
+    let ratio = of_one_body(input)?;
+    miscounted(input, ratio, ratio < 0.0).filter(|_| !rather_as_logged(input, 1.0 / ratio, 1.0))
 }
 
 /// What is wrong where the table moves so many times as far as the motor: it counts the other way round, or in another unit.
@@ -56,8 +57,15 @@ fn miscounted(input: &Input<'_>, ratio: f64, turned: bool) -> Option<Finding> {
 }
 
 /// How many times as far as the motor the table moves, beside what its coupling makes of it, by the lines that show both; and what is
-/// wrong with that: it counts the other way round, or in another unit.
+/// wrong with that: it counts the other way round, or in another unit. What else acts on the table may move it any way; where the motor's
+/// side has it as it is logged, nothing is wrong.
 pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
+    let (ratio, finding) = moves_along(input, s, lines);
+    let alike = (LIKE.recip()..LIKE).contains(&ratio.abs()) && finding.is_none();
+    if !alike && rather_as_logged(input, 1.0 / ratio, 1.0) { (1.0, None) } else { (ratio, finding) }
+}
+
+fn moves_along(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
     if let Some(ratio) = of_one_body(input) {
         return (ratio, miscounted(input, ratio, ratio < 0.0));
     }

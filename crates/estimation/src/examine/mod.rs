@@ -25,6 +25,7 @@ mod pairs;
 mod rigid;
 mod robust;
 mod slips;
+mod smoothing;
 mod spectra;
 mod stamps;
 mod usable;

@@ -15,8 +15,10 @@ use std::ops::Range;
 
 use super::finding::{Finding, Severity, told};
 use super::least::bounded;
+use super::nominal::rather_as_logged;
 use super::pairs::factor;
 use super::robust::quantile;
+use super::smoothing::{SHORTEST, smoothed, widths};
 use super::spectra::Spectra;
 use super::{Input, Motion, NOMINAL_OFF, Nominal, Structure};
 use crate::identify::lsq::triangularise;
@@ -36,8 +38,6 @@ pub(super) const WORSE: f64 = 2.0;
 const ENOUGH: f64 = 8.0;
 /// Share of the torque's power that may be left beside an inertia that is read from a record.
 pub(super) const MOST_LEFT: f64 = 0.25;
-/// Samples below which there is nothing to transform.
-pub(super) const SHORTEST: usize = 64;
 /// Most samples of one segment.
 const LONGEST: usize = 65_536;
 
@@ -70,6 +70,10 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
     }
     let worse = WORSE * (1.0 + (ENOUGH / balance.freedom).powi(2));
     if own <= worse * any.min(turned) {
+        return Some(Weight::Nominal);
+    }
+    // What moves the table beside the coupling counts in the momentum of both, not on the motor's side.
+    if turned <= any && rather_as_logged(input, 1.0, -1.0) {
         return Some(Weight::Nominal);
     }
     if turned <= any {
@@ -119,27 +123,6 @@ pub(super) fn follows(input: &Input<'_>) -> bool {
         let (friction, mass) = (found.friction / found.friction_error, found.mass / found.error);
         found.left < MOST_LEFT && (friction > 0.0 && mass > -SURELY || friction > -SURELY && mass > SURELY)
     })
-}
-
-/// Widths of the smoothing that are tried of a record of `n` samples.
-fn widths(n: usize) -> impl Iterator<Item = usize> {
-    [0, 1, 2, 4, 8, 16, 32, 64].into_iter().filter(move |w| SHORTEST + 8 * w <= n)
-}
-
-/// A mean over `2*width + 1` samples, twice; the ends are left out.
-pub(super) fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
-    let once = |v: &[f64]| -> Vec<f64> {
-        let length = 2 * width + 1;
-        let middle = v[v.len() / 2];
-        let sums: Vec<f64> = std::iter::once(0.0)
-            .chain(v.iter().scan(0.0, |sum, v| {
-                *sum += v - middle;
-                Some(*sum)
-            }))
-            .collect();
-        sums.windows(length + 1).map(|w| middle + (w[length] - w[0]) / length as f64).collect()
-    };
-    once(&once(values))
 }
 
 /// Range of an angle about its middle from which a weight's torque is not a straight line, rad; and beyond which the column is no angle of a

@@ -532,6 +532,37 @@ fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
     assert!(looked_at(&dead).contains(&"foreign"), "{:?}", looked_at(&dead));
 }
 
+#[test]
+fn what_moves_the_table_beside_its_coupling_is_no_unit_and_no_sign() {
+    // A light table on a soft coupling, on which a weight above its hinge pulls nearly as hard as the coupling holds it: slowly it goes
+    // seven times as far as the motor, which friction brakes.
+    let p = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5.5e-4, k: 0.0176, rho: 1.0 };
+    let nominal = Some(Nominal { structure: Structure::TwoInertia, parameters: p });
+    let looked_at = |x: &Columns| refused(&Input { nominal, ..x.positions() });
+    let (dt, far) = (2e-3, 7.0);
+    let parts: Vec<(f64, f64, f64)> =
+        (1..30).map(f64::from).map(|i| (0.02 / i.powf(1.5), 2.0 * i, 1.3 * i * i)).collect();
+    let of = |t: f64, n: i32| -> f64 { parts.iter().map(|(a, w, p)| a * w.powi(n) * (w * t + p).sin()).sum() };
+    let rate = |t: f64| -> f64 { parts.iter().map(|(a, w, p)| a * w * (w * t + p).cos()).sum() };
+    let mut e = noise(41, 1e-5);
+    let mut columns = Columns { dt, v: Default::default() };
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * dt;
+        let twisted = (1.0 - far) * (p.k * of(t, 0) + p.b * rate(t));
+        columns.v[0].push(-p.i1 * of(t, 2) + twisted + 0.002 * rate(t).signum());
+        columns.v[1].push(of(t, 0) + e());
+        columns.v[3].push(far * of(t, 0) + e());
+    }
+    assert_eq!(looked_at(&columns), [""; 0]);
+    // The same where the table goes with the motor and is logged in degrees.
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * dt;
+        columns.v[0][k as usize] -= (1.0 - far) * (p.k * of(t, 0) + p.b * rate(t));
+        columns.v[3][k as usize] = of(t, 0).to_degrees() + e();
+    }
+    assert_eq!(looked_at(&columns), ["units"]);
+}
+
 /// Two slow moves to and fro along `s(10 - 15 s + 6 s^2)s^2`, of which averaged spectra show few lines or none, and the torque that the
 /// equation of motion gives for them beside Coulomb and viscous friction; noise on both encoders.
 fn slow_moves() -> Columns {
