@@ -266,8 +266,9 @@ impl Search<'_> {
         }
         let share = self.independent(std::slice::from_ref(chosen));
         let most = self.longest_beside(chosen);
-        let rivals: Vec<Fit> =
-            pool.fits().iter().filter(|f| !is_extension(f, chosen) && f.terms.len() <= most).cloned().collect();
+        // A longer account is believed, as several at once are, where it explains the torque.
+        let is_rival = |f: &&Fit| !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f));
+        let rivals: Vec<Fit> = pool.fits().iter().filter(is_rival).cloned().collect();
         let best = self.best(&rivals, share)?;
         (self.evidence(best, share) > self.evidence(chosen, share) + ALIKE).then(|| best.clone())
     }
