@@ -68,6 +68,18 @@ pub enum First {
     Sizes,
     /// The axis' parameters: the effect was found beside an axis as given.
     Effects,
+    /// The stiffness, in all steps: the inertias come to it.
+    Inertias,
+}
+
+impl First {
+    fn holds(self, c: &Coordinate) -> bool {
+        match self {
+            Self::Sizes => c.is_shape(),
+            Self::Effects => c.is_base(),
+            Self::Inertias => c.free == Free::Base(BaseParameter::K),
+        }
+    }
 }
 
 impl<'a> Descent<'a> {
@@ -141,7 +153,7 @@ impl<'a> Descent<'a> {
         let mut damping = 0.0;
         for i in 0..effort {
             self.iterations += 1;
-            let gained = self.step(&mut damping, i < FIRST_STEPS)?;
+            let gained = self.step(&mut damping, i < FIRST_STEPS || self.first == First::Inertias)?;
             let found = band.discrepancy(&self.at.rows);
             let likelier = band.log_likelihood(&self.at.rows, found) > self.log_likelihood();
             let s = if likelier { found } else { self.at.s };
@@ -174,10 +186,7 @@ impl<'a> Descent<'a> {
             -band.log_likelihood(l, s) - problem.log_prior(coordinates, x) / share
         };
         let before = cost(&at.rows, at.s, &x);
-        let mut held: Vec<bool> = coordinates
-            .iter()
-            .map(|c| begins && if self.first == First::Sizes { c.is_shape() } else { c.is_base() })
-            .collect();
+        let mut held: Vec<bool> = coordinates.iter().map(|c| begins && self.first.holds(c)).collect();
         let (mut next, mut leaves) = (None, false);
         for _ in 0..TRIALS {
             let (delta, errors) = normal.solve(coordinates, &x, *damping, &held)?;
@@ -288,6 +297,7 @@ impl<'a> Descent<'a> {
     pub fn done(self) -> Fit {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let std = self.std.iter().zip(&self.coordinates).zip(&x).map(|((s, c), x)| s * c.slope(*x)).collect();
+        let at_bound = self.leaves || self.stands_for_the_coupling(&x);
         Fit {
             terms: self.terms.to_vec(),
             log_likelihood: self.log_likelihood(),
@@ -301,8 +311,14 @@ impl<'a> Descent<'a> {
             rows: self.at.rows,
             iterations: self.iterations,
             settled: false,
-            at_bound: self.leaves,
+            at_bound,
         }
+    }
+
+    /// Whether a third inertia on a spring is there beside a coupling as stiff as it may be: it is the table, the two inertias are one.
+    fn stands_for_the_coupling(&self, x: &[f64]) -> bool {
+        let is_stiff = |(c, x): (&Coordinate, &f64)| c.free == Free::Base(BaseParameter::K) && *x > c.bounds[1] - 1e-9;
+        self.terms.iter().any(|t| t.0.is_mode()) && self.coordinates.iter().zip(x).any(is_stiff)
     }
 }
 

@@ -19,6 +19,7 @@ mod hidden;
 mod likelihood;
 mod material;
 mod octaves;
+mod parameters;
 mod pool;
 mod race;
 mod scales;
@@ -78,6 +79,8 @@ const TOLD: usize = 12;
 struct Prepared {
     record: Record,
     band: Band,
+    /// The axis' own parameters as they follow the record the best: through them the band sees its noise.
+    reference: Model,
     rate: Rate,
     /// Upper end of the band, Hz.
     limit: f64,
@@ -200,12 +203,12 @@ fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option
     };
     let [own, slow] = [exact, fast].map(at);
     let alike = slow.len() == own.len() && slow.instants() == own.instants();
-    let referred = |record, rate| referred(record, nominal, limit, rate, peak);
-    let (own, left) = referred(own, exact);
+    let referred = |record, rate, known: Option<&Model>| referred(record, nominal, known, limit, rate, peak);
+    let (own, left) = referred(own, exact, None);
     if alike || left < EXACT {
         return (own, None);
     }
-    let (slow, left) = referred(slow, fast);
+    let (slow, left) = referred(slow, fast, Some(&own.reference));
     if left.is_finite() { (slow, Some(own)) } else { (own, None) }
 }
 
@@ -220,22 +223,34 @@ fn likely(decision: &Decision) -> Vec<Effect> {
 
 /// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,
 /// in noises.
-fn referred(record: Record, nominal: &Model, limit: f64, rate: Rate, peak: f64) -> (Prepared, f64) {
+fn referred(
+    record: Record,
+    nominal: &Model,
+    known: Option<&Model>,
+    limit: f64,
+    rate: Rate,
+    peak: f64,
+) -> (Prepared, f64) {
     let mask = band::mask(&record);
     let plain = Band::new(&record, nominal, limit, &mask);
     let problem = Problem::new(&record, &plain, *nominal);
-    let fit = problem.fit(nominal, &[], [f64::MAX; 2], REFERRED);
+    let fit = match known {
+        Some(known) => problem.parameters(known, [f64::MAX; 2], REFERRED),
+        None => problem.parameters_of_any_stiffness([f64::MAX; 2], REFERRED),
+    };
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
-    let band = Band::new(&record, &fit.map_or(*nominal, |f| f.model), limit, &mask);
+    let reference = fit.map_or(*nominal, |f| f.model);
+    let band = Band::new(&record, &reference, limit, &mask);
     let torque_rms = deviation(&record.torque);
-    (Prepared { record, band, rate, limit, torque_rms, peak }, left)
+    (Prepared { record, band, reference, rate, limit, torque_rms, peak }, left)
 }
 
 impl Prepared {
     /// A search in it for some effects.
     fn search<'a>(&'a self, case: &Case<'_>, suspects: Vec<Effect>, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
         let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak);
-        Search { problem, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
+        let reference = self.reference;
+        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
     }
 
     /// Share of the torque that a fit leaves.

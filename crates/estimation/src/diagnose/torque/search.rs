@@ -50,6 +50,8 @@ pub const ALIKE: f64 = 3.0;
 pub struct Search<'a> {
     /// The record and how it is compared.
     pub problem: Problem<'a>,
+    /// Parameters that are known to follow the record.
+    pub reference: Model,
     /// Effects that may be named.
     pub suspects: Vec<Effect>,
     /// Discrepancy of the axis with its parameters alone: the gap.
@@ -138,7 +140,8 @@ impl Search<'_> {
         (self.progress)("the model as given");
         let nominal = self.problem.nominal;
         let given = self.problem.given(&nominal).unwrap_or_else(|| self.problem.nothing());
-        let parameters = self.problem.fit(&nominal, &[], given.discrepancy, STEPS).unwrap_or_else(|| given.clone());
+        let parameters = self.problem.parameters(&self.reference, given.discrepancy, STEPS);
+        let parameters = parameters.unwrap_or_else(|| given.clone());
         self.problem.scales = Scales::new(&self.problem, &parameters);
         let mut pool = Pool::default();
         pool.extend([given.clone(), parameters.clone()]);

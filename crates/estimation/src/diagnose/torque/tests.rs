@@ -114,6 +114,37 @@ fn with(values: &[(Effect, usize, f64)]) -> Settings {
 }
 
 #[test]
+fn an_encoder_on_the_motor_alone_tells_a_coupling_that_is_not_the_nominal_one() {
+    // A soft belt that a slow controller moves on and on.
+    let belt = Parameters { i1: 1.26e-3, i2: 9.3e-4, b: 5.8e-4, k: 1.52, rho: 1.0 };
+    for (seed, nominal) in
+        [Parameters { i1: 1.13e-3, b: 6.8e-4, k: 1.91, ..belt }, Parameters { i1: 1.4e-3, i2: 1.1e-3, k: 1.0, ..belt }]
+            .into_iter()
+            .enumerate()
+    {
+        let axis = Axis::new(belt, Structure::TwoInertia, Settings::default(), Scheme::Exact, DT);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
+        let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+        let (mut torque, mut theta) = (Vec::new(), Vec::new());
+        for k in 0..3000 {
+            let t = f64::from(k) * DT;
+            let wanted = 2.0 * t - 1.8 * (0.9 * t).sin() + 0.2 * (7.0 * t).sin();
+            theta.push(state.theta1() + noise(&mut rng, 1e-6));
+            torque.push((belt.i1 + belt.i2) * (100.0 * (wanted - state.theta1()) - 14.0 * state.omega1()));
+            state = axis.advance(&state, Ramp { start: torque[k as usize], end: torque[k as usize] }, t);
+        }
+        let o = diagnosed_as(&of_one_encoder(0.0, torque, theta), Structure::TwoInertia, nominal);
+        let p = &o.models[1].parameters;
+        assert_eq!(o.decision.verdict, Verdict::Parameters, "{seed}: {:?}", named(&o));
+        assert!(
+            (p.k / belt.k).ln().abs() < 0.03 && (p.i2 / belt.i2).ln().abs() < 0.03,
+            "{seed}: {p:?} {}",
+            o.diagnosis.remainder.noise_multiple
+        );
+    }
+}
+
+#[test]
 fn a_friction_and_a_load_are_not_told_apart_where_the_axis_never_goes_back() {
     let onwards = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
     // What a constant torque leaves, slow and small beside it, a friction with a shape follows some of.

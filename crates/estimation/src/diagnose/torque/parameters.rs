@@ -1,0 +1,78 @@
+//! The axis' own parameters, fitted without any effect: what effects are measured by.
+
+use rayon::prelude::*;
+
+use super::super::model::Model;
+use super::descent::{Descent, First};
+use super::discrepancy::Discrepancy;
+use super::fit::{Fit, Problem};
+use super::likelihood::Sight;
+use super::search::PROBE;
+
+/// Ratio of the stiffnesses that are tried one after the other: the resonance of one is within a cycle of the next one's over some ten of
+/// them.
+const RATIO: f64 = 1.06;
+/// Stiffnesses that are tried to either side of the nominal one: up to a factor of two and a half.
+const TO_EITHER_SIDE: usize = 16;
+/// Steps in which the inertias come from one stiffness to the next.
+const FOLLOWING: usize = 3;
+/// Stiffnesses that are gone on from.
+const BEST: usize = 3;
+/// Share of what the nearest hollow leaves that another one may leave for the record to tell it from the nearest.
+const CLEARLY: f64 = 0.1;
+
+impl Problem<'_> {
+    /// The fit from the nominal parameters, or from `others` that are known to follow the record where they do to the noise.
+    pub fn parameters(&self, others: &Model, from: Discrepancy, effort: usize) -> Option<Fit> {
+        let nominal = self.fit(&self.nominal, &[], from, effort);
+        if others.parameters == self.nominal.parameters || nominal.as_ref().is_some_and(|f| self.is_at_floor(f)) {
+            return nominal;
+        }
+        self.fit(others, &[], from, effort).filter(|f| self.is_at_floor(f)).or(nominal)
+    }
+
+    /// The same from the nominal parameters, or from another stiffness where the axis follows the record far better from there. With an
+    /// encoder on one side alone a record tells `I1 + I2` and, at first order, `I2^2/K`, and along that valley each resonance that the
+    /// model may have beside the measured one ends in a hollow of its own. Stiffnesses are held until the inertias have come to them. What
+    /// leaves more than noise has effects in it: beside them the nearest hollow is as good as the deepest.
+    pub fn parameters_of_any_stiffness(&self, from: Discrepancy, effort: usize) -> Option<Fit> {
+        let fit = self.fit(&self.nominal, &[], from, effort);
+        let one_side = matches!(self.band.sight, Sight::Motor | Sight::Table);
+        if !one_side || fit.as_ref().is_some_and(|f| self.is_at_floor(f)) {
+            return fit;
+        }
+        let coarse = self.coarse();
+        let mut held: Vec<Fit> =
+            [RATIO, 1.0 / RATIO].par_iter().flat_map_iter(|ratio| coarse.held_stiffnesses(*ratio, from)).collect();
+        held.sort_by(|a, b| (b.log_likelihood + b.log_prior).total_cmp(&(a.log_likelihood + a.log_prior)));
+        held.truncate(BEST);
+        let freed: Vec<Fit> = held.par_iter().filter_map(|f| self.fit(&f.model, &[], f.discrepancy, effort)).collect();
+        let least = fit.as_ref().map_or(f64::INFINITY, |f| CLEARLY * self.band.noise_multiple(&f.rows));
+        freed.into_iter().find(|f| self.band.noise_multiple(&f.rows) < least).or(fit)
+    }
+
+    fn is_at_floor(&self, fit: &Fit) -> bool {
+        self.band.at_floor(&fit.rows)
+    }
+
+    /// Fits with the stiffness held, from the nominal one in steps of a ratio.
+    fn held_stiffnesses(&self, ratio: f64, from: Discrepancy) -> Vec<Fit> {
+        let mut model = self.nominal;
+        let mut held: Vec<Fit> = Vec::new();
+        for i in 0..=TO_EITHER_SIDE {
+            let (from, effort) = held.last().map_or((from, PROBE), |f| (f.discrepancy, FOLLOWING));
+            let fitted = Descent::new(self, &model, &[], from).and_then(|descent| {
+                let mut descent = descent.holding(First::Inertias);
+                descent.run(effort)?;
+                Some(descent.done())
+            });
+            let Some(fit) = fitted else { break };
+            model = Model { parameters: fit.model.parameters, ..model };
+            model.parameters.k *= ratio;
+            if i > 0 || ratio > 1.0 {
+                held.push(fit);
+            }
+        }
+        held
+    }
+}
