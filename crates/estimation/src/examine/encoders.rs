@@ -65,6 +65,7 @@ pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, 
     if !alike && rather_as_logged(input, 1.0 / ratio, 1.0) { (1.0, None) } else { (ratio, finding) }
 }
 
+/// The same by the two encoders alone.
 fn moves_along(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
     if let Some(ratio) = of_one_body(input) {
         return (ratio, miscounted(input, ratio, ratio < 0.0));

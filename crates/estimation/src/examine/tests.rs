@@ -563,6 +563,33 @@ fn what_moves_the_table_beside_its_coupling_is_no_unit_and_no_sign() {
     assert_eq!(looked_at(&columns), ["units"]);
 }
 
+#[test]
+fn a_torque_on_the_table_that_the_drive_brakes_is_no_sign_turned_round() {
+    let p = Parameters::PAPER;
+    let (dt, inertia) = (1e-3, p.i1 + p.i2);
+    let parts: Vec<(f64, f64, f64)> = (1..30).map(f64::from).map(|i| (0.5 / i.powi(2), 2.0 * i, 1.3 * i * i)).collect();
+    let way = |t: f64| -> f64 { parts.iter().map(|(a, w, p)| a * (w * t + p).sin()).sum() };
+    let rate = |t: f64| -> f64 { -parts.iter().map(|(a, w, p)| a * w * w * (w * t + p).sin()).sum::<f64>() };
+    let logged = |foreign: f64| {
+        let mut e = noise(43, 1e-7);
+        let mut columns = Columns { dt, v: Default::default() };
+        for k in 0..8192_u32 {
+            let t = f64::from(k) * dt;
+            // The foreign torque moves so many times the axis' inertia; the drive holds the rest of it back.
+            columns.v[0].push((1.0 - foreign) * inertia * rate(t));
+            columns.v[1].push(way(t) + e());
+            columns.v[3].push(way(t) - (p.i2 - foreign * inertia) * rate(t) / p.k + e());
+        }
+        columns
+    };
+    let looked_at = |x: &Columns| refused(&Input { nominal: Some(NOMINAL), ..x.positions() });
+    assert_eq!(looked_at(&logged(0.0)), [""; 0]);
+    assert_eq!(looked_at(&logged(2.5)), [""; 0]);
+    let mut turned = logged(0.0);
+    turned.v[0].iter_mut().for_each(|t| *t = -*t);
+    assert_eq!(looked_at(&turned), ["sign"]);
+}
+
 /// Two slow moves to and fro along `s(10 - 15 s + 6 s^2)s^2`, of which averaged spectra show few lines or none, and the torque that the
 /// equation of motion gives for them beside Coulomb and viscous friction; noise on both encoders.
 fn slow_moves() -> Columns {
