@@ -20,6 +20,7 @@ mod encoders;
 mod finding;
 mod least;
 mod momentum;
+mod motor_side;
 mod nominal;
 mod pairs;
 mod rigid;

@@ -3,10 +3,8 @@
 use rustfft::num_complex::Complex;
 
 use super::momentum::{MAIN, T, TABLE};
-use super::smoothing::{smoothed, widths};
 use super::spectra::Spectra;
 use super::{Input, Nominal, Structure};
-use crate::numerics::level::deviation;
 
 /// Share of the torque's power up to which the nominal axis may miss it for it to be this axis' own torque and motion: in its unit and at
 /// its time. A factor of six, a foreign torque and half a turn of phase miss more; friction and parameters some tens of per cent off do not.
@@ -15,32 +13,6 @@ const MISSED: f64 = 0.5;
 /// Times that with the table's encoder the axis may miss more than without it for that encoder to be the table's: on a table that is heavy
 /// enough to tell, a foreign one misses many times more.
 const WORSE: f64 = 4.0;
-
-/// Share of what the axis misses with a column mended that it may miss with the column as logged for nothing to be wrong with it.
-const BETTER: f64 = 0.8;
-
-/// Whether the motor's side of the nominal axis, which holds whatever else acts on the table, has the torque and the table's motion as
-/// they are logged rather than times `torque` and `table`.
-pub(super) fn rather_as_logged(input: &Input<'_>, table: f64, torque: f64) -> bool {
-    let of = |table: f64, torque: f64| missed_by_the_motor(input, table, torque);
-    of(1.0, 1.0).zip(of(table, torque)).is_some_and(|(logged, mended)| logged < BETTER * mended)
-}
-
-/// Share of the torque about its mean that `I1*a1 + B*d' + K*d` misses, `d` the twist, by the smoothing that leaves the least.
-fn missed_by_the_motor(input: &Input<'_>, table: f64, torque: f64) -> Option<f64> {
-    let Nominal { structure: Structure::TwoInertia, parameters: p } = input.nominal? else { return None };
-    let (t, x1, x2, dt) = (input.torque?, input.theta1?, input.theta2?, input.dt);
-    let twist: Vec<f64> = x1.iter().zip(x2).map(|(a, b)| a - table * b).collect();
-    let by = |width: usize| {
-        let [t, x, d] = [t, x1, &twist].map(|v| smoothed(v, width));
-        let missed = (1..t.len() - 1).map(|k| {
-            let acceleration = (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt);
-            torque * t[k] - p.i1 * acceleration - p.b * (d[k + 1] - d[k - 1]) / (2.0 * dt) - p.k * d[k]
-        });
-        deviation(&missed.collect::<Vec<f64>>()) / (torque.abs() * deviation(&t))
-    };
-    widths(x1.len()).map(by).filter(|share| share.is_finite()).min_by(f64::total_cmp)
-}
 
 /// Whether the nominal axis needs about this torque for this motion at the lines: of the motor, and of the table where it is measured.
 pub(super) fn explains(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> bool {

@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use super::finding::{Finding, Severity, told};
 use super::least::bounded;
-use super::nominal::rather_as_logged;
+use super::motor_side::rather_as_logged;
 use super::pairs::factor;
 use super::robust::quantile;
 use super::smoothing::{SHORTEST, smoothed, widths};
@@ -72,12 +72,10 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
     if own <= worse * any.min(turned) {
         return Some(Weight::Nominal);
     }
-    // What moves the table beside the coupling counts in the momentum of both, not on the motor's side.
-    if turned <= any && rather_as_logged(input, 1.0, -1.0) {
-        return Some(Weight::Nominal);
-    }
     if turned <= any {
-        return Some(Weight::Wrong(against(turned, own)));
+        // What moves the table beside the coupling counts in the momentum of both, not on the motor's side.
+        let sound = rather_as_logged(input, 1.0, -1.0);
+        return Some(if sound { Weight::Nominal } else { Weight::Wrong(against(turned, own)) });
     }
     let ratio = mass / inertia;
     // Noise of the encoder, differentiated twice, hides an inertia: what it does not explain it does not tell.

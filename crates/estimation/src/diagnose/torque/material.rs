@@ -22,7 +22,7 @@ const TELLING: f64 = 5e-3;
 
 impl Search<'_> {
     pub fn at_floor(&self, fit: &Fit) -> bool {
-        self.band().at_floor(&fit.rows)
+        self.problem.is_at_floor(fit)
     }
 
     /// Whether what a fit leaves is too little of the gap for any further cause in it.

@@ -9,14 +9,14 @@ use super::fit::{Fit, Problem};
 use super::likelihood::Sight;
 use super::search::PROBE;
 
-/// Ratio of the stiffnesses that are tried one after the other: the resonance of one is within a cycle of the next one's over some ten of
-/// them.
+/// Ratio of the stiffnesses that are tried one after the other: 3 % in the resonance's frequency, a cycle in some thirty. Fits from within
+/// that came to the resonance of a record of forty cycles, one from 8 % off in stiffness did not.
 const RATIO: f64 = 1.06;
 /// Stiffnesses that are tried to either side of the nominal one: up to a factor of two and a half.
 const TO_EITHER_SIDE: usize = 16;
-/// Steps in which the inertias come from one stiffness to the next.
+/// Steps in which the inertias come from one stiffness to the next: the table's changes by 3 % between the two, one step of a fit nearly.
 const FOLLOWING: usize = 3;
-/// Stiffnesses that are gone on from.
+/// Stiffnesses that are gone on from: the likeliest and its neighbours, between which it lies.
 const BEST: usize = 3;
 /// Share of what the nearest hollow leaves that another one may leave for the record to tell it from the nearest.
 const CLEARLY: f64 = 0.1;
@@ -51,7 +51,8 @@ impl Problem<'_> {
         freed.into_iter().find(|f| self.band.noise_multiple(&f.rows) < least).or(fit)
     }
 
-    fn is_at_floor(&self, fit: &Fit) -> bool {
+    /// Whether a fit leaves no more than the noise.
+    pub fn is_at_floor(&self, fit: &Fit) -> bool {
         self.band.at_floor(&fit.rows)
     }
 
