@@ -181,10 +181,12 @@ impl Search<'_> {
         let least = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]));
         // One of several effects that do the same beside the others stays open, and the others are told.
         let open = least.filter(|&i| {
-            decisive[i] * doubt >= LIKELY
+            !likely(&probabilities[i])
+                && decisive[i] * doubt >= LIKELY
                 && chosen.terms.len() > 1
                 && (0..probabilities.len()).all(|k| k == i || likely(&probabilities[k]))
                 && one_instead(&ranking, &chosen, i) >= LIKELY
+                && instead(&ranking, &chosen, i, twins[i]).len() > 1
         });
         // It is told, too, where one of them is likelier than not.
         let told = open.and_then(|i| {
@@ -227,10 +229,11 @@ impl Search<'_> {
         };
         let chosen = finished;
         ranking.truncate(40);
+        let shares = self.shares(&chosen);
+        let effects = |i: usize| instead(&ranking, &chosen, i, twins[i]);
+        let undecided = open.map(|i| Undecided { effects: effects(i), share_of_gap: shares[i] });
         let twins = twins.into_iter().flatten().filter(|t| t.difference < ALIKE);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent), twins);
-        let shares = self.shares(&chosen);
-        let undecided = open.map(|i| Undecided { effects: instead(&ranking, &chosen, i), share_of_gap: shares[i] });
         let cut_short = self.cut_short.load(Ordering::Relaxed);
         Decision {
             verdict,
@@ -376,8 +379,8 @@ fn one_instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> f64 {
     with_one_instead(ranking, chosen, i).map(|w| w.probability).sum()
 }
 
-/// The effects that stand in the place of that one in the likely ones of these hypotheses, and itself first.
-fn instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> Vec<Effect> {
+/// The effects that stand in the place of that one in the likely ones of these hypotheses or are its twin, and itself first.
+fn instead(ranking: &[Weighed], chosen: &Fit, i: usize, twin: Option<Confusable>) -> Vec<Effect> {
     let mut effects = vec![chosen.terms[i].0];
     for w in with_one_instead(ranking, chosen, i).filter(|w| w.probability >= POSSIBLE) {
         let like = |e: Effect, of: Effect| e.info().family == of.info().family;
@@ -385,6 +388,7 @@ fn instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> Vec<Effect> {
         let found: Vec<Effect> = w.fit.terms.iter().map(|t| t.0).filter(other).collect();
         effects.extend(found);
     }
+    effects.extend(twin.map(|t| t.other).filter(|e| !effects.contains(e)));
     effects
 }
 
@@ -507,7 +511,9 @@ mod tests {
         ];
         assert!((one_instead(&ranking, &chosen, 1) - 0.8).abs() < 1e-12);
         assert!((one_instead(&ranking, &chosen, 0) - 0.3).abs() < 1e-12);
-        assert_eq!(instead(&ranking, &chosen, 1), [Delay, Latch, ViscousMotor]);
+        assert_eq!(instead(&ranking, &chosen, 1, None), [Delay, Latch, ViscousMotor]);
+        let twin = Confusable { named: Delay, other: Effect::LoadMotor, difference: 0.0 };
+        assert_eq!(instead(&ranking, &chosen, 1, Some(twin)), [Delay, Latch, ViscousMotor, Effect::LoadMotor]);
     }
 
     #[test]
