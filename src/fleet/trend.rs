@@ -1,6 +1,7 @@
 //! How a parameter drifts over a machine's records: the line through its estimates, by least squares.
 
 use super::{Placed, Tracked};
+use crate::identify::identifiability::DETERMINED;
 
 /// A parameter of one machine over its records.
 pub(super) struct Trend<'a> {
@@ -29,7 +30,7 @@ pub(super) enum Moved {
 const LEAST: f64 = 1e-6;
 
 impl<'a> Trend<'a> {
-    /// Every parameter of every machine that was estimated at least twice; the rows in the summary's order.
+    /// Every parameter of every machine that was determined at least twice; the rows in the summary's order.
     pub fn all(rows: &'a [Placed<'a>]) -> Vec<Self> {
         let mut trends: Vec<Self> = Vec::new();
         for of_machine in rows.chunk_by(|a, b| a.machine == b.machine) {
@@ -54,9 +55,21 @@ impl<'a> Trend<'a> {
                     of[index].values.push((parameter.value, parameter.std));
                 }
             }
-            trends.extend(of.into_iter().filter(|t| t.at.len() > 1));
+            trends.extend(of.into_iter().map(Self::determined).filter(|t| t.at.len() > 1));
         }
         trends
+    }
+
+    /// Without the estimates that their records did not determine: those whose two standard errors are more of them, and of the largest
+    /// that was determined, than `identify` calls determined, and those without an error beside others that have one.
+    fn determined(self) -> Self {
+        let within = |std: f64, of: f64| 2.0 * std <= DETERMINED * of;
+        let has_errors = self.values.iter().any(|(_, std)| std.is_some());
+        let sure = self.values.iter().filter(|(value, std)| std.is_some_and(|std| within(std, value.abs())));
+        let largest = sure.map(|(value, _)| value.abs()).fold(0.0, f64::max);
+        let kept = |(value, std): &(f64, Option<f64>)| std.map_or(!has_errors, |s| within(s, value.abs().max(largest)));
+        let (at, values) = self.at.into_iter().zip(self.values).filter(|(_, v)| kept(v)).unzip();
+        Self { at, values, ..self }
     }
 
     /// Change from the first record to the last, relative to the first.
@@ -117,6 +130,23 @@ mod tests {
         let at = (0..values.len()).map(|k| k as f64).collect();
         let values = values.iter().map(|v| (*v, std)).collect();
         ask(&Trend { machine: "press", parameter: &parameter, at, values, days: true })
+    }
+
+    #[test]
+    fn an_estimate_that_its_record_does_not_determine_is_no_part_of_a_trend() {
+        let parameter = Tracked { name: "K".into(), unit: String::new(), value: 20.0, std: None };
+        let kept = |values: &[(f64, Option<f64>)]| {
+            let at = (0..values.len()).map(|k| k as f64).collect();
+            let trend = Trend { machine: "press", parameter: &parameter, at, values: values.to_vec(), days: true };
+            trend.determined().at
+        };
+        let sure = (20.0, Some(0.2));
+        // Two errors of three tenths, and one more; a value at the end of its range has no error.
+        assert_eq!(kept(&[sure, (20.0, Some(3.0)), (20.0, Some(3.01)), sure]), [0.0, 1.0, 3.0]);
+        assert_eq!(kept(&[sure, (1e9, Some(1e9)), (2.5e-98, None), sure]), [0.0, 3.0]);
+        // A bias that begins at zero is known as well as later.
+        assert_eq!(kept(&[(0.01, Some(0.2)), sure]), [0.0, 1.0]);
+        assert_eq!(kept(&[(20.0, None), (21.0, None)]), [0.0, 1.0]);
     }
 
     fn drifts(values: [f64; 3], std: Option<f64>) -> bool {
