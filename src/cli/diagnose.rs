@@ -24,7 +24,7 @@ use crate::report::diagnose::{Findings, json as contract, report, short, warning
 use crate::report::driven::Driven;
 use crate::report::format::{Medium, number, percent, printable};
 use crate::report::{Block, html, terminal};
-use crate::trace::{Machine, Signal, Trace, nearest, write_text};
+use crate::trace::{Machine, Signal, Trace, nearest, restore, write_text};
 
 /// Arguments of `eixo diagnose`.
 #[derive(Debug, clap::Args)]
@@ -346,6 +346,8 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
         path.display(),
         torque.len()
     );
+    // Of a fast motion a sample that was held is more than the noise: it must not be taken for it.
+    channels.iter_mut().step_by(2).flatten().for_each(|position| restore(position));
     let views = [0, 1, 2, 3].map(|i: usize| channels[i].as_deref());
     let noise = estimate_noise(&torque, &views, None);
     // A noise-free trace (a simulation) still has the rounding of its file: no channel is taken as exact.

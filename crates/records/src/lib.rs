@@ -6,6 +6,7 @@
 //! (or N), angles in rad (or m), speeds in rad/s (or m/s). What the torque does between two samples is part of the
 //! record: see [`Trace::hold`].
 
+mod autoregressive;
 #[cfg(any(feature = "hdf5", feature = "parquet"))]
 mod caught;
 mod clock;
@@ -50,10 +51,11 @@ use std::ops::Range;
 use eixo_model::{axis, drive, effects};
 
 pub use crate::axis::Hold;
+pub use autoregressive::floor;
 pub use error::TraceError;
 pub use error::nearest;
 pub use load::{COUNTS, Column, Loaded, LoadedPieces, Mapping, from_table, load, load_pieces};
-pub use lost::{bridge, held};
+pub use lost::{bridge, held, restore};
 pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
 pub use signal::{Motion, Quantity, Signal};

@@ -1,8 +1,13 @@
 //! Samples that a log lost: spikes of a disturbed line, and samples that repeat the one before.
 //!
-//! A position runs smoothly from sample to sample, at a blow with a kink that stays; lost is one, or two near each other, that their
+//! A reading with noise in it repeats by chance hardly ever: one that does, where the others expect another value
+//! ([`super::autoregressive`]), was held.
+//!
+//! Else a position runs smoothly from sample to sample, at a blow with a kink that stays; lost is one, or two near each other, that their
 //! neighbours, which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry
 //! 36(8), 1964).
+
+use crate::autoregressive::expected;
 
 /// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
 /// hides another near it until it is bridged, and two that hide each other are found together.
@@ -89,6 +94,21 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f6
     out
 }
 
+/// Samples that repeat the one before and are expected to be something else, and what: as many as may be lost of a record at most.
+fn repeated(y: &[f64], noise: f64) -> Vec<(usize, f64)> {
+    let repeats: Vec<usize> = (1..y.len()).filter(|k| y[*k] == y[k - 1]).collect();
+    if repeats.len() as f64 > MOST * y.len() as f64 {
+        return Vec::new();
+    }
+    let told = expected(y, &repeats).into_iter();
+    told.filter(|e| (y[e.at] - e.value).abs() > FAR * e.error.max(noise)).map(|e| (e.at, e.value)).collect()
+}
+
+/// Gives the samples that repeat the one before the values that the others expect there, whatever the noise of the position is.
+pub fn restore(y: &mut [f64]) {
+    repeated(y, 0.0).into_iter().for_each(|(k, expected)| y[k] = expected);
+}
+
 /// Bridges the lost samples of a position whose noise has a standard deviation of `noise`, in its unit, and tells how many they were. Where
 /// they would be more than one in fifty, they are the signal and stay.
 pub fn bridge(y: &mut [f64], noise: f64) -> usize {
@@ -98,6 +118,10 @@ pub fn bridge(y: &mut [f64], noise: f64) -> usize {
 /// Bridges the lost samples as [`bridge`] does, and gives them as they were found, one twice where two passes bridged it.
 fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
     let mut all = Vec::new();
+    for (k, expected) in repeated(y, noise) {
+        all.push(k);
+        y[k] = expected;
+    }
     for pass in PASSES {
         let (span, found) = (pass.0, lost(y, noise, pass));
         let each = if span == 0 { 1 } else { 2 };

@@ -1,0 +1,223 @@
+//! Samples of a signal that its own past and future tell: interpolation by an autoregressive model (Janssen, Veldhuis, Vries, Adaptive
+//! interpolation of discrete-time signals that can be modeled as autoregressive processes, IEEE Trans. ASSP 34(2), 1986).
+//!
+//! A polynomial through the neighbours follows a motion that is slow beside the sampling; this one follows any motion whose spectrum
+//! leaves a part of the band to the noise, however near its frequencies are to Nyquist's.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+/// Samples before one that it is told by.
+const ORDER: usize = 32;
+/// Samples that a model is of: a motion changes its kind, and a record may have a million.
+const STRETCH: usize = 4096;
+/// Values for each coefficient from which a model is one.
+const VALUES: usize = 8;
+/// Share of the signal, rms, below which what a model leaves is rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// A sample with the value that the others expect there, and the standard error of that.
+pub struct Expected {
+    /// Its index.
+    pub at: usize,
+    /// The value that the others expect.
+    pub value: f64,
+    /// Standard error of that value.
+    pub error: f64,
+}
+
+/// What a signal is expected to be at samples, in rising order, whose own values say nothing. Where too few others are sound nothing is.
+pub fn expected(y: &[f64], lost: &[usize]) -> Vec<Expected> {
+    let mut all = Vec::new();
+    let mut from = 0;
+    while from < y.len() {
+        // The last stretch takes what is left of the record.
+        let end = if from + 2 * STRETCH > y.len() { y.len() } else { from + STRETCH };
+        let own: Vec<usize> = lost.iter().copied().filter(|k| (from..end).contains(k)).collect();
+        if !own.is_empty() {
+            // A model of its neighbours' samples, too: at the edge a sample has few to one side.
+            let whole = from.saturating_sub(ORDER)..(end + ORDER).min(y.len());
+            all.extend(of_stretch(y, lost, &own, whole));
+        }
+        from = end;
+    }
+    all
+}
+
+/// Samples that tell a noise: more hardly tell it better.
+const TELLING: usize = 4 * STRETCH;
+/// Frequencies at which a spectrum is looked at.
+const FREQUENCIES: usize = 512;
+
+/// Standard deviation, a sample, of the noise under a signal: the level above which 95 % of its spectrum lie, as its model has it. A motion
+/// that leaves no twentieth of the band to the noise hides it. `None` of too short a signal.
+#[must_use]
+pub fn floor(y: &[f64]) -> Option<f64> {
+    let y = &y[..y.len().min(TELLING)];
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    let model = Model::of(&y.iter().map(|v| v - mean).collect::<Vec<f64>>(), &[])?;
+    let mut levels: Vec<f64> = (0..FREQUENCIES)
+        .map(|m| {
+            let turn = std::f64::consts::PI * (m as f64 + 0.5) / FREQUENCIES as f64;
+            let part = |of: fn(f64) -> f64| -> f64 {
+                model.coefficients.iter().enumerate().map(|(i, c)| c * of(turn * i as f64)).sum()
+            };
+            model.left / part(f64::cos).hypot(part(f64::sin))
+        })
+        .collect();
+    Some(*levels.select_nth_unstable_by(FREQUENCIES / 20, f64::total_cmp).1)
+}
+
+fn of_stretch(y: &[f64], lost: &[usize], own: &[usize], whole: Range<usize>) -> Vec<Expected> {
+    let sound = whole.clone().filter(|k| lost.binary_search(k).is_err());
+    let (sum, count) = sound.fold((0.0, 0.0), |(sum, count), k| (sum + y[k], count + 1.0));
+    let mean = sum / count;
+    let series: Vec<f64> = y[whole.clone()].iter().map(|v| v - mean).collect();
+    let inside = |k: &usize| k.checked_sub(whole.start).filter(|k| *k < series.len());
+    let lost: Vec<usize> = lost.iter().filter_map(inside).collect();
+    let own: Vec<usize> = own.iter().filter_map(inside).collect();
+    let Some(model) = Model::of(&series, &lost) else { return Vec::new() };
+    // Each with those that it is told beside.
+    let group = |k: usize| -> Vec<usize> { lost.iter().copied().filter(|l| l.abs_diff(k) <= ORDER).collect() };
+    own.iter()
+        .filter_map(|&k| {
+            let (value, error) = model.expects(&series, k, &group(k))?;
+            Some(Expected { at: whole.start + k, value: value + mean, error })
+        })
+        .collect()
+}
+
+/// A signal's value less what the ones before it tell: `coefficients` of the value and of those before it, one first.
+struct Model {
+    coefficients: Vec<f64>,
+    /// Standard deviation of what is left.
+    left: f64,
+}
+
+impl Model {
+    /// The model that leaves the least of a series, lost samples left out (the covariance method).
+    fn of(y: &[f64], lost: &[usize]) -> Option<Self> {
+        let mut sound = vec![true; y.len()];
+        for &k in lost {
+            let end = (k + ORDER + 1).min(y.len());
+            sound[k..end].fill(false);
+        }
+        let rows: Vec<usize> = (ORDER..y.len()).filter(|k| sound[*k]).collect();
+        if rows.len() < VALUES * ORDER {
+            return None;
+        }
+        let power = rows.iter().map(|k| y[*k] * y[*k]).sum::<f64>();
+        // The last rows keep the coefficients small where fewer tell all there is.
+        let rounding = ROUNDING * power.sqrt();
+        let triangle = DMatrix::from_fn(rows.len() + ORDER, ORDER + 1, |r, i| match rows.get(r) {
+            // The samples before, the nearest first, and the sample that they tell.
+            Some(k) => {
+                if i < ORDER {
+                    y[k - 1 - i]
+                } else {
+                    y[*k]
+                }
+            }
+            None => {
+                if r - rows.len() == i {
+                    rounding
+                } else {
+                    0.0
+                }
+            }
+        })
+        .qr()
+        .r();
+        let told = triangle.column(ORDER).rows(0, ORDER).into_owned();
+        let w = triangle.view((0, 0), (ORDER, ORDER)).solve_upper_triangular(&told)?;
+        let coefficients: Vec<f64> = std::iter::once(1.0).chain(w.iter().map(|w| -w)).collect();
+        let residual = |k: usize| -> f64 { coefficients.iter().enumerate().map(|(i, c)| c * y[k - i]).sum() };
+        let squares: f64 = rows.iter().map(|k| residual(*k).powi(2)).sum();
+        let left = (squares.max(rounding * rounding) / (rows.len() - ORDER) as f64).sqrt();
+        Some(Self { coefficients, left })
+    }
+
+    /// What the others expect at one of a group of lost samples, and its standard error: the values that leave the least, forwards
+    /// in time and backwards.
+    fn expects(&self, y: &[f64], k: usize, group: &[usize]) -> Option<(f64, f64)> {
+        let n = group.len();
+        let mut a = DMatrix::<f64>::zeros(n, n);
+        let mut b = DVector::<f64>::zeros(n);
+        let mut add = |sample: &dyn Fn(usize) -> usize| {
+            let mut own = vec![0.0; n];
+            let mut known = 0.0;
+            for (i, c) in self.coefficients.iter().enumerate() {
+                let at = sample(i);
+                match group.binary_search(&at) {
+                    Ok(g) => own[g] = *c,
+                    Err(_) => known += c * y[at],
+                }
+            }
+            for p in 0..n {
+                b[p] -= own[p] * known;
+                for q in 0..n {
+                    a[(p, q)] += own[p] * own[q];
+                }
+            }
+        };
+        for j in k.max(ORDER)..(k + ORDER + 1).min(y.len()) {
+            add(&|i| j - i);
+        }
+        for j in k.saturating_sub(ORDER)..=k.min(y.len() - 1 - ORDER) {
+            add(&|i| j + i);
+        }
+        let inverse = a.cholesky()?.inverse();
+        let at = group.binary_search(&k).ok()?;
+        // The two ways say the same of one noise.
+        Some(((&inverse * b)[at], self.left * (2.0 * inverse[(at, at)]).sqrt()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Two lines, the higher at 0.6 of Nyquist's frequency, in white noise.
+    fn signal(noise: f64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let of = |k: usize| (0.11 * k as f64).sin() + 0.3 * (1.885 * k as f64).sin();
+        (0..6000)
+            .map(|k| of(k) + noise * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng))
+            .collect()
+    }
+
+    #[test]
+    fn lost_samples_are_told_to_the_noise_and_the_error_says_so() {
+        let noise = 1e-3;
+        let sound = signal(noise);
+        // At the edges, in a row, two near one another, and where two stretches meet.
+        let lost = [1, 3, 700, 701, 2000, 2009, 4095, 4096, 5990];
+        let mut y = sound.clone();
+        lost.iter().for_each(|k| y[*k] = f64::MAX.sqrt());
+        let told = expected(&y, &lost);
+        assert_eq!(told.iter().map(|e| e.at).collect::<Vec<_>>(), lost);
+        let off: Vec<f64> = told.iter().map(|e| (e.value - sound[e.at]) / e.error).collect();
+        assert!(off.iter().all(|z| z.abs() < 3.5), "{off:?}");
+        let inside = |e: &&Expected| (ORDER..sound.len() - ORDER).contains(&e.at);
+        let errors: Vec<f64> = told.iter().filter(inside).map(|e| e.error / noise).collect();
+        assert!(errors.iter().all(|e| *e < 5.0), "{errors:?}");
+    }
+
+    #[test]
+    fn the_noise_under_a_motion_near_nyquists_frequency_is_told() {
+        let told = floor(&signal(1e-3)).expect("long enough");
+        assert!((told / 1e-3 - 1.0).abs() < 0.2, "{told}");
+        assert!(floor(&signal(1e-3)[..200]).is_none());
+    }
+
+    #[test]
+    fn of_a_short_or_spoilt_stretch_nothing_is_told() {
+        assert!(expected(&signal(1e-3)[..200], &[100]).is_empty());
+        let every_tenth: Vec<usize> = (0..600).map(|k| 10 * k).collect();
+        assert!(expected(&signal(1e-3), &every_tenth).is_empty());
+    }
+}
