@@ -7,12 +7,13 @@
 //! alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
 //! start, and serves as one more candidate. What stays of the signal can only raise a level.
 //!
-//! Assumed: the noise is white at the sampling rate. Where the levels never settle it is not, and the answer says so. What grows with
+//! Assumed: the noise is white at the sampling rate. Where the levels never settle, the lowest part of the spectrum is it. What grows with
 //! the speed ([`super::jitter`]) counts with its mean over the record.
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::jitter::growth;
+use crate::trace::floor;
 
 /// Highest order of difference.
 const ORDERS: usize = 12;
@@ -41,8 +42,11 @@ pub enum NoiseMethod {
     },
     /// The resolution of the channel, which is coarser than its noise.
     Resolution,
-    /// No level settled: the noise is not white, or the signal fills the whole band. The lowest level, or the scatter
-    /// from period to period.
+    /// No level of the differences settled: the motion reaches up to the noise's own frequencies. The lowest part of the spectrum
+    /// of an autoregressive model.
+    Spectrum,
+    /// Nothing tells it: the noise is not white, or the signal fills the whole band. The lowest level of the differences, or the
+    /// scatter from period to period.
     Unsettled,
 }
 
@@ -131,14 +135,18 @@ fn level_of(y: &[f64], period: Option<usize>) -> (f64, NoiseMethod) {
         settled(&difference)
             .map(|(level, order)| (with_speed(&difference, &y[..y.len() - p], order).unwrap_or(level), order))
     });
+    let unsettled = |level: f64| {
+        let told = floor(y).filter(|told| *told < level);
+        told.map_or((level, NoiseMethod::Unsettled), |told| (told, NoiseMethod::Spectrum))
+    };
     match (plain, periodic) {
         (Ok((a, order)), Some(Ok((b, lower)))) if b * AGREE < a || (b < a * AGREE && lower < order) => {
             (b, NoiseMethod::Periods { order: lower })
         }
         (Ok((level, order)), _) => (level, NoiseMethod::Differences { order }),
         (Err(_), Some(Ok((level, order)))) => (level, NoiseMethod::Periods { order }),
-        (Err(a), Some(Err(b))) => (a.min(b), NoiseMethod::Unsettled),
-        (Err(level), None) => (level, NoiseMethod::Unsettled),
+        (Err(a), Some(Err(b))) => unsettled(a.min(b)),
+        (Err(level), None) => unsettled(level),
     }
 }
 
