@@ -243,38 +243,57 @@ impl<'a> Descent<'a> {
 
     /// Normal equations at x, with columns of their own.
     fn normal(&mut self, x: &[f64], share: f64) -> Option<Normal> {
+        Some(self.normal_with_growth(x, share)?.0)
+    }
+
+    /// The same, and how the density of readings grows with each coordinate at each bin; nothing with those of effects.
+    fn normal_with_growth(&mut self, x: &[f64], share: f64) -> Option<(Normal, Vec<Vec<f64>>)> {
         let (problem, band, coordinates, at) = (self.problem, self.problem.band, &self.coordinates, &self.at);
         self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
         scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
         let base = of_the_axis(coordinates, x);
         let grows = band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
         let mut normal = Normal::new(problem, coordinates, x, &self.columns, at, share);
-        for ((_, _, i), g) in base.iter().zip(&grows) {
-            normal.g[*i] += g;
+        let mut growth = vec![Vec::new(); x.len()];
+        for ((_, _, i), g) in base.iter().zip(grows) {
+            normal.g[*i] += g.iter().sum::<f64>();
+            growth[*i] = g;
         }
-        Some(normal)
+        Some((normal, growth))
     }
 
     /// Standard error of each free value, in its unit, everything free at once: what a step took them to be held some shapes. With a share of
-    /// `independent` values they are as large as the score's scatter over the record asks.
+    /// `independent` values they are as large as the score's scatter over the record and over the band asks.
     pub fn standard_errors(&mut self, independent: f64) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
-        let normal = self.normal(&x, share)?;
+        let (normal, growth) = self.normal_with_growth(&x, share)?;
         let (_, errors) = normal.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
-        let scatter = self.scatter(&normal).unwrap_or_else(|| vec![0.0; x.len()]);
-        let of = |i: usize| errors[i].max(scatter[i] * independent.sqrt()) * self.coordinates[i].slope(x[i]);
+        let scatter = self.scatter(&normal, &growth);
+        let largest = |i: usize| scatter.iter().flatten().map(|of| of[i]).fold(0.0, f64::max);
+        let of = |i: usize| errors[i].max(largest(i) * independent.sqrt()) * self.coordinates[i].slope(x[i]);
         Some((0..x.len()).map(of).collect())
     }
 
-    /// The same by how the score scatters between stretches of the record.
-    fn scatter(&self, normal: &Normal) -> Option<Vec<f64>> {
-        let in_time = |rows: &[Vec<C>; 2]| {
-            let (band, at) = (self.problem.band, &self.at);
-            band.whitened_in_time(&band.whiten(rows, &at.rows.weights, at.s))
+    /// The same by how the score scatters between stretches of the record, and between stretches of the band.
+    fn scatter(&self, normal: &Normal, growth: &[Vec<f64>]) -> [Option<Vec<f64>>; 2] {
+        let (band, at) = (self.problem.band, &self.at);
+        let white = |rows: &[Vec<C>; 2]| band.whiten(rows, &at.rows.weights, at.s);
+        let columns: Vec<Vec<f64>> = self.columns.iter().map(white).collect();
+        let residual = white(&at.rows.rows);
+        let series: Vec<scatter::Series> = columns.iter().map(|c| band.whitened_in_time(c)).collect();
+        let per_bin = 2 * band.equations();
+        let dot = |(a, b): (&[f64], &[f64])| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let by_bin = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            a.chunks_exact(per_bin).zip(b.chunks_exact(per_bin)).map(dot).collect()
         };
-        let columns: Vec<scatter::Series> = self.columns.iter().map(in_time).collect();
-        scatter::standard_errors(&columns, &in_time(&self.at.rows.rows), &normal.a)
+        let information: Vec<Vec<f64>> = columns.iter().map(|c| by_bin(c, c)).collect();
+        let mut scores: Vec<Vec<f64>> = columns.iter().map(|c| by_bin(c, &residual)).collect();
+        for (score, growth) in scores.iter_mut().zip(growth) {
+            score.iter_mut().zip(growth).for_each(|(s, g)| *s -= g);
+        }
+        [scatter::in_time(&series, &band.whitened_in_time(&residual)), scatter::in_frequency(&scores, &information)]
+            .map(|scores| scatter::standard_errors(scores, &normal.a))
     }
 
     /// Follows the record at another bandwidth where that is likelier.

@@ -214,10 +214,10 @@ impl Band {
         s: Discrepancy,
         base: &[(BaseParameter, f64, usize)],
         columns: &mut [[Vec<C>; 2]],
-    ) -> Vec<f64> {
+    ) -> Vec<Vec<f64>> {
         let both = self.sight == Sight::Both;
         let one = C::new(1.0, 0.0);
-        let mut grows = vec![0.0; base.len()];
+        let mut grows = vec![vec![0.0; self.omega.len()]; base.len()];
         let units: Vec<Parameters> = base
             .iter()
             .map(|(p, ..)| {
@@ -267,13 +267,13 @@ impl Band {
                     // The table's discrepancy grows with its inertia (`carried`).
                     let grown = slope / model.parameters.i2 * s[1];
                     column[1][m] -= y[1] * grown;
-                    grows[i] -= 2.0 * weight * grown * c * c;
+                    grows[i][m] -= 2.0 * weight * grown * c * c;
                 }
                 column[0][m] -= (d[0][0] * e[0] + d[0][1] * e[1]) * *slope;
                 if both {
                     column[1][m] -= (d[1][0] * e[0] + d[1][1] * e[1]) * *slope;
                 }
-                grows[i] += 2.0 * weight * slope * (of(&d, &vs, 0, 0) + of(&d, &vs, 1, 1)).re;
+                grows[i][m] += 2.0 * weight * slope * (of(&d, &vs, 0, 0) + of(&d, &vs, 1, 1)).re;
             }
         }
         grows
