@@ -31,6 +31,7 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
             between: None,
             channels,
             noise: std,
+            corner: noise.corner.map(|c| c / dt),
             common_noise: noise.common,
             idle: Vec::new(),
         },

@@ -28,6 +28,7 @@ fn logged(trace: &Trace) -> Logged {
         between: None,
         channels: [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(channel),
         noise: [0.0; 4],
+        corner: [0.0; 2],
         common_noise: 0.0,
         idle: Vec::new(),
     }

@@ -236,6 +236,7 @@ mod tests {
                 between: None,
                 channels: [Some(silent(3000)), None, Some(silent(3000)), None],
                 noise: [1e-9; 4],
+                corner: [0.0; 2],
                 common_noise: 0.0,
                 idle: Vec::new(),
             };

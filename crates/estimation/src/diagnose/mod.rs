@@ -2,6 +2,7 @@
 
 mod assess;
 mod closed_loop;
+mod colour;
 mod diagnosis;
 mod jitter;
 pub mod location;

@@ -7,11 +7,12 @@
 //! alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
 //! start, and serves as one more candidate. What stays of the signal can only raise a level.
 //!
-//! Assumed: the noise is white at the sampling rate. Where the levels never settle, the lowest part of the spectrum is it. What grows with
+//! Assumed: the noise is white at the sampling rate, or grows below a corner ([`super::colour`]). Where the levels never settle, the lowest part of the spectrum is it. What grows with
 //! the speed ([`super::jitter`]) counts with its mean over the record.
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
+use super::colour::corner;
 use super::jitter::growth;
 use crate::trace::floor;
 
@@ -23,6 +24,9 @@ const LOWEST: usize = 3;
 const BLOCK: usize = 128;
 /// Two levels agree when they differ by no more than this factor: three standard errors of a level from 40 blocks.
 const AGREE: f64 = 1.1;
+
+/// Mean of `1/f` over the frequencies that third differences see, `sin^6(pi f)`, in samples a cycle.
+const SEEN: f64 = 2.58;
 
 /// Where the noise level of a channel comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -55,6 +59,9 @@ pub enum NoiseMethod {
 pub struct NoiseEstimate {
     /// Standard deviation of each channel's noise, its resolution included; zero where the channel is absent.
     pub std: [f64; 4],
+    /// Frequency below which the noise of theta1 and of theta2 grows as 1/f, cycles a sample; zero where it is white. The standard
+    /// deviation is then that of the white part.
+    pub corner: [f64; 2],
     /// Covariance of the noises of theta1 and theta2, which are read at one time: what a jitter of the samples makes in both, rad^2.
     pub common: f64,
     /// Standard deviation of the time by which samples of a position are taken early or late, in samples, where that rules its noise.
@@ -78,6 +85,7 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
     let period = period.filter(|p| *p > 0 && *p < torque.len()).or_else(|| find_period(torque));
     let mut estimate = NoiseEstimate {
         std: [0.0; 4],
+        corner: [0.0; 2],
         common: 0.0,
         jitter: None,
         method: [NoiseMethod::Absent; 4],
@@ -101,6 +109,11 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
                 estimate.jitter = [estimate.jitter, jitter(y, order)].into_iter().flatten().reduce(f64::max);
             }
         }
+    }
+    for side in 0..2 {
+        let Some(corner) = channels[2 * side].and_then(corner) else { continue };
+        estimate.corner[side] = corner;
+        estimate.std[2 * side] /= (1.0 + SEEN * corner).sqrt();
     }
     if let (
         [Some(a), _, Some(b), _],

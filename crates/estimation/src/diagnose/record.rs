@@ -29,6 +29,8 @@ pub struct Record {
     pub channels: [Option<Vec<f64>>; 4],
     /// Standard deviation of the noise of each channel, in its unit; means nothing where the channel is `None`.
     pub noise: [f64; 4],
+    /// Frequency below which the noise of theta1 and of theta2 grows as 1/f, Hz; zero where it is white.
+    pub corner: [f64; 2],
     /// Covariance of the noises of both positions, rad^2.
     pub common_noise: f64,
     /// Stretches that tell nothing (the drive is off, the axis stands): they are followed, and not weighed.
@@ -53,6 +55,7 @@ impl Record {
             between: (self.between.as_ref()).map(|(m, t)| (*m, t[m * range.start..m * range.end].to_vec())),
             channels: std::array::from_fn(|c| self.channels[c].as_ref().map(|v| v[range.clone()].to_vec())),
             noise: self.noise,
+            corner: self.corner,
             common_noise: self.common_noise,
             idle: (self.idle.iter())
                 .map(|r| r.start.max(range.start)..r.end.min(range.end))
@@ -60,6 +63,12 @@ impl Record {
                 .map(|r| r.start - range.start..r.end - range.start)
                 .collect(),
         }
+    }
+
+    /// Variance of the noise of a side's position as if all frequencies had as much of it as one in Hz, rad^2.
+    #[must_use]
+    pub fn position_noise(&self, side: usize, frequency: f64) -> f64 {
+        self.noise[2 * side].powi(2) * (1.0 + self.corner[side] / frequency)
     }
 
     /// Instants a sample at which the torque is known.
@@ -142,6 +151,7 @@ mod tests {
             between: None,
             channels: [const { None }; 4],
             noise: [0.0; 4],
+            corner: [0.0; 2],
             common_noise: 0.0,
             idle: Vec::new(),
         }

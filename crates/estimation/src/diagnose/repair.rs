@@ -41,6 +41,7 @@ mod tests {
             between: None,
             channels: [Some(y), None, None, None],
             noise: [NOISE, 0.0, 0.0, 0.0],
+            corner: [0.0; 2],
             common_noise: 0.0,
             idle: Vec::new(),
         }

@@ -65,7 +65,12 @@ fn acceleration(record: &Record, side: usize, mask: &[f64]) -> Option<(Vec<f64>,
         .map(|m| {
             let w = std::f64::consts::TAU * m as f64 / n as f64;
             let c = 2.0 * (1.0 - w.cos()) / (dt * dt);
-            if kind == 2 { record.noise[2 * side].powi(2) * c * c } else { record.noise[2 * side + 1].powi(2) * c }
+            let frequency = m.max(1) as f64 / (n as f64 * dt);
+            if kind == 2 {
+                record.position_noise(side, frequency) * c * c
+            } else {
+                record.noise[2 * side + 1].powi(2) * c
+            }
         })
         .collect();
     let half = (n / 400).max(2);
@@ -237,6 +242,7 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         between,
         channels,
         noise,
+        corner: record.corner,
         common_noise,
         idle,
     };
@@ -278,6 +284,7 @@ mod tests {
             between: None,
             channels: [Some((0..n).map(position).collect()), None, None, None],
             noise: [1e-6; 4],
+            corner: [0.0; 2],
             common_noise: 0.0,
             idle: Vec::new(),
         };

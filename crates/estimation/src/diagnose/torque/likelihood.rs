@@ -132,7 +132,7 @@ impl Band {
         let common = if sight == Sight::Both { record.common_noise } else { 0.0 };
         let noise_of = |i: usize, w: f64| -> f64 {
             match record.channels[2 * i] {
-                Some(_) => record.noise[2 * i].powi(2) - common,
+                Some(_) => record.position_noise(i, w / std::f64::consts::TAU) - common,
                 None => (record.noise[2 * i + 1] / w.max(0.5 * step)).powi(2),
             }
         };

@@ -6,8 +6,8 @@ use super::super::model::Model;
 use super::super::noise::estimate_noise;
 use super::super::record::Record;
 use super::super::verdict::Verdict;
+use super::diagnose;
 use super::tracking::{Resolution, track};
-use super::{UNCAUSED, diagnose};
 use crate::axis::{Axis, Hold, Motion, Parameters, Scheme, Structure};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use rand::{RngExt, SeedableRng};
@@ -34,6 +34,7 @@ fn of_one_encoder(start: f64, torque: Vec<f64>, theta: Vec<f64>) -> Record {
         between: None,
         channels: [Some(theta), None, None, None],
         noise: [1e-6; 4],
+        corner: [0.0; 2],
         common_noise: 0.0,
         idle: Vec::new(),
     }
@@ -273,6 +274,7 @@ fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, la
         between: None,
         channels,
         noise: [1e-5; 4],
+        corner: [0.0; 2],
         common_noise: 0.0,
         idle: Vec::new(),
     }
@@ -306,6 +308,7 @@ fn samples_taken_late_hide_neither_the_coupling_nor_the_friction_on_its_sides() 
     // A thousand times what the encoders have of their own.
     assert!(read.std[0] > 1e-2, "{read:?}");
     (record.noise, record.common_noise) = (read.std, read.common);
+    record.corner = read.corner.map(|c| c / record.dt);
     let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 1500.0, ..stiff });
     let mut effects: Vec<Effect> = o.decision.chosen.terms.iter().map(|t| t.0).collect();
     effects.sort_unstable();
@@ -333,10 +336,12 @@ fn noise_of_1_over_f_on_an_axis_that_hardly_moves_is_no_gap() {
     let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
     let read = estimate_noise(&record.torque, &channels, None);
     (record.noise, record.common_noise) = (read.std, read.common);
+    record.corner = read.corner.map(|c| c / record.dt);
     let o = diagnosed_as(&record, Structure::TwoInertia, paper);
     assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{:?}", o.decision.verdict);
-    // More of the torque is left than a measured current is off by.
-    assert!(o.diagnosis.remainder.share > UNCAUSED, "{:?}", o.diagnosis.remainder);
+    // What is left is the noise, of its colour.
+    let left = o.diagnosis.remainder.noise_multiple;
+    assert!((0.8..1.3).contains(&left), "{left}");
 }
 
 #[test]
@@ -436,6 +441,7 @@ fn a_log_read_early_is_followed_with_the_torque_to_come() {
         between: None,
         channels: [Some(theta), None, None, None],
         noise: [1e-9; 4],
+        corner: [0.0; 2],
         common_noise: 0.0,
         idle: Vec::new(),
     };
