@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex;
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
-use super::motor_side::rather_as_logged;
+use super::motor_side::{feels_the_table, rather_as_logged};
 use super::nominal::explains_the_table;
 use super::pairs::{NEAR, factor_within};
 use super::rigid::{Slow, rigid_up_to};
@@ -137,7 +137,7 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     let motion: f64 = driven().map(|f| s.power(MAIN, f)).sum();
     let unlike = (own as f64) < 0.1 * lines.len() as f64 && common < chance.max(0.3) * motion;
     // A table that friction holds, or that swings on a soft belt, twists the coupling as the torque says.
-    if unlike && !goes_along(input) && !explains_the_table(input, s, lines) {
+    if unlike && !goes_along(input) && !explains_the_table(input, s, lines) && !feels_the_table(input) {
         findings.push(Finding::new(
             "foreign",
             Severity::Refuse,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::motor_side::feels_the_table;
 use super::*;
 use crate::axis::{Hold, Scheme, SimulateOptions, simulate};
 use crate::effects::{EFFECTS, Effect, Settings};
@@ -588,6 +589,38 @@ fn a_torque_on_the_table_that_the_drive_brakes_is_no_sign_turned_round() {
     let mut turned = logged(0.0);
     turned.v[0].iter_mut().for_each(|t| *t = -*t);
     assert_eq!(looked_at(&turned), ["sign"]);
+}
+
+#[test]
+fn a_motor_feels_its_own_table_whatever_swings_that_and_no_other_axis() {
+    // A soft coupling: the table hardly shows in what the torque moves.
+    let p = Parameters { k: 4.0 * Parameters::PAPER.i1, ..Parameters::PAPER };
+    let dt = 1e-3;
+    let swings = |seed: u64| -> Vec<[f64; 3]> {
+        let mut random = noise(seed, 1.0);
+        let parts: Vec<[f64; 2]> = (0..40).map(|_| [random(), random()]).collect();
+        let at = |t: f64| {
+            parts.iter().fold([0.0; 3], |[x, v, a], [frequency, phase]| {
+                let w = 20.0 + 5.0 * frequency;
+                let (sin, cos) = (w * t + 9.0 * phase).sin_cos();
+                [x + 0.01 * sin, v + 0.01 * w * cos, a - 0.01 * w * w * sin]
+            })
+        };
+        (0..16_384).map(|k| at(f64::from(k) * dt)).collect()
+    };
+    let (motor, table, another) = (swings(51), swings(52), swings(53));
+    let mut e = noise(44, 1e-9);
+    let mut columns = Columns { dt, v: Default::default() };
+    for ([x1, v1, a1], [x2, v2, _]) in motor.iter().zip(&table) {
+        columns.v[0].push(p.i1 * a1 + p.b * (v1 - v2) + p.k * (x1 - x2));
+        columns.v[1].push(x1 + e());
+        columns.v[3].push(x2 + e());
+    }
+    let nominal = Nominal { parameters: p, ..NOMINAL };
+    let feels = |x: &Columns| feels_the_table(&Input { nominal: Some(nominal), ..x.positions() });
+    assert!(feels(&columns));
+    columns.v[3] = another.iter().map(|[x, ..]| x + e()).collect();
+    assert!(!feels(&columns));
 }
 
 /// Two slow moves to and fro along `s(10 - 15 s + 6 s^2)s^2`, of which averaged spectra show few lines or none, and the torque that the
