@@ -18,8 +18,8 @@ const LEAST: usize = 6;
 const BESIDE: usize = 2;
 /// Squared error a half octave up to which a spectrum is a noise's.
 const AGREES: f64 = 2.5;
-/// Gain in half the squared error from which a colour is one: a probability of one in four hundred for a white noise.
-const GAINED: f64 = 3.0;
+/// Gain in half the squared error from which a colour is one: what it makes of the noise in the band, far below, is a lot.
+const GAINED: f64 = 6.0;
 /// Least relative error of a level: what the windows share.
 const ERROR: f64 = 0.02;
 /// Standard deviation of the logarithm of a median of periodograms, times the root of their number: Laplace's, of an exponential.

@@ -143,7 +143,7 @@ mod tests {
     fn stretches_of_the_band_tell_as_much_as_one_another() {
         // All that is told is told in the first eight bins.
         let told: Vec<f64> = (0..64).map(|m| if m < 8 { 1.0 } else { 0.0 }).collect();
-        assert_eq!(in_frequency(&[told.clone()], &[told]), [[1.0; STRETCHES]]);
+        assert_eq!(in_frequency(std::slice::from_ref(&told), std::slice::from_ref(&told)), [[1.0; STRETCHES]]);
         assert!(in_frequency(&[], &[]).is_empty());
     }
 
