@@ -26,6 +26,8 @@ pub const FARTHEST: f64 = 2.3;
 const RICHER: f64 = 2.2;
 /// Least degrees of freedom that are counted: with fewer any account follows the record.
 const FEWEST: f64 = 0.1;
+/// Turn of a motion in a sample, rad, up to which a model can be held to it.
+pub const HELD: f64 = 0.5;
 /// Cost of an effect in log evidence: one of some fifty.
 pub const PRICE: f64 = 4.0;
 
@@ -173,7 +175,7 @@ impl Problem<'_> {
     pub fn bandwidth(&self, s: Discrepancy) -> Bandwidth {
         let r = self.record;
         let p = &self.nominal.parameters;
-        let high = self.band.omega.last().copied().unwrap_or(1.0).min(0.5 / r.dt);
+        let high = self.band.omega.last().copied().unwrap_or(1.0).min(HELD / r.dt);
         let low = (4.0 / (r.len() as f64 * r.dt)).min(high);
         let inertia =
             if p.i2 > 0.0 && self.nominal.structure == Structure::TwoInertia { [p.i1, p.i2] } else { [p.i1 + p.i2; 2] };

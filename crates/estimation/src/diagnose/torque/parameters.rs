@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::super::model::Model;
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, Problem};
+use super::fit::{Fit, HELD, Problem};
 use super::likelihood::Sight;
 use super::search::PROBE;
 
@@ -28,17 +28,31 @@ impl Problem<'_> {
         if others.parameters == self.nominal.parameters || nominal.as_ref().is_some_and(|f| self.is_at_floor(f)) {
             return nominal;
         }
-        self.fit(others, &[], from, effort).filter(|f| self.is_at_floor(f)).or(nominal)
+        let far = self.is_beyond_holding();
+        let is_it = |f: &Fit| self.is_at_floor(f) || far && self.leaves_clearly_less(f, nominal.as_ref());
+        self.fit(others, &[], from, effort).filter(is_it).or(nominal)
+    }
+
+    /// Whether the axis of the nominal model swings faster than a model with both sides measured can be held to.
+    fn is_beyond_holding(&self) -> bool {
+        self.band.sight == Sight::Both && self.nominal.parameters.modal().wn * self.record.dt > HELD
+    }
+
+    /// Whether a fit leaves so much less than another that the record tells it from that.
+    fn leaves_clearly_less(&self, fit: &Fit, other: Option<&Fit>) -> bool {
+        let left = |f: &Fit| self.band.noise_multiple(&f.rows);
+        other.is_none_or(|other| left(fit) < CLEARLY * left(other))
     }
 
     /// The same from the nominal parameters, or from another stiffness where the axis follows the record far better from there. With an
     /// encoder on one side alone a record tells `I1 + I2` and, at first order, `I2^2/K`, and along that valley each resonance that the
-    /// model may have beside the measured one ends in a hollow of its own. Stiffnesses are held until the inertias have come to them. What
+    /// model may have beside the measured one ends in a hollow of its own; so it does with both, where the axis swings too fast between
+    /// two samples to be held to them. Stiffnesses are held until the inertias have come to them. What
     /// leaves more than noise has effects in it: beside them the nearest hollow is as good as the deepest.
     pub fn parameters_of_any_stiffness(&self, from: Discrepancy, effort: usize) -> Option<Fit> {
         let fit = self.fit(&self.nominal, &[], from, effort);
         let one_side = matches!(self.band.sight, Sight::Motor | Sight::Table);
-        if !one_side || fit.as_ref().is_some_and(|f| self.is_at_floor(f)) {
+        if !(one_side || self.is_beyond_holding()) || fit.as_ref().is_some_and(|f| self.is_at_floor(f)) {
             return fit;
         }
         let coarse = self.coarse();
@@ -47,8 +61,7 @@ impl Problem<'_> {
         held.sort_by(|a, b| (b.log_likelihood + b.log_prior).total_cmp(&(a.log_likelihood + a.log_prior)));
         held.truncate(BEST);
         let freed: Vec<Fit> = held.par_iter().filter_map(|f| self.fit(&f.model, &[], f.discrepancy, effort)).collect();
-        let least = fit.as_ref().map_or(f64::INFINITY, |f| CLEARLY * self.band.noise_multiple(&f.rows));
-        freed.into_iter().find(|f| self.band.noise_multiple(&f.rows) < least).or(fit)
+        freed.into_iter().find(|f| self.leaves_clearly_less(f, fit.as_ref())).or(fit)
     }
 
     /// Whether a fit leaves no more than the noise.

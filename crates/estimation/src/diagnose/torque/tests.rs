@@ -237,16 +237,24 @@ fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
 
 /// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.
 fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, late: usize) -> Record {
-    let (n, dt) = (3000, 2e-3);
+    let acts = |t: f64| {
+        let tones = [(2.1, 0.3), (5.3, 1.7), (9.7, 4.1), (17.3, 2.9), (31.1, 5.3)];
+        amplitude * tones.iter().map(|(w, p)| (w * t + p).sin()).sum::<f64>()
+    };
+    moved(parameters, effects, &acts, late)
+}
+
+/// Samples of an axis, and their interval, s.
+const SAMPLED: (i32, f64) = (3000, 2e-3);
+
+/// The same under a torque over time, which is held from sample to sample.
+fn moved(parameters: Parameters, effects: Settings, acts: &dyn Fn(f64) -> f64, late: usize) -> Record {
+    let (n, dt) = SAMPLED;
     // Fine enough for all that the effects do.
     let fine = 16;
     let h = dt / f64::from(fine);
     let axis = Axis::new(parameters, Structure::TwoInertia, effects, Scheme::Exact, h);
     let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
-    let acts = |t: f64| {
-        let tones = [(2.1, 0.3), (5.3, 1.7), (9.7, 4.1), (17.3, 2.9), (31.1, 5.3)];
-        amplitude * tones.iter().map(|(w, p)| (w * t + p).sin()).sum::<f64>()
-    };
     let late = late * fine as usize / 2;
     let mut past = vec![0.0; late + 1];
     let (mut torque, mut motor, mut table) = (Vec::new(), Vec::new(), Vec::new());
@@ -278,6 +286,23 @@ fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, la
         common_noise: 0.0,
         idle: Vec::new(),
     }
+}
+
+#[test]
+fn of_an_axis_that_swings_too_fast_to_be_held_to_the_stiffness_is_found_from_afar() {
+    let (n, dt) = SAMPLED;
+    // A fifth of a turn a sample, hardly damped; from half of its stiffness the nearest hollow is an eighth off.
+    let wn = 1.25 / dt;
+    let p = Parameters::PAPER;
+    let k = wn * wn * p.i1 * p.i2 / (p.i1 + p.i2);
+    let fast = Parameters { k, b: 0.006 * k / wn, ..p };
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    let torque: Vec<f64> = (0..n).map(|_| noise(&mut rng, 20.0 * p.i1 / dt)).collect();
+    let record = moved(fast, Settings::default(), &|t| torque[((t / dt).round() as usize).min(torque.len() - 1)], 0);
+    let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 0.5 * k, ..fast });
+    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", told(&o));
+    let found = o.improved.parameters.k;
+    assert!((found / k - 1.0).abs() < 1e-3, "{found} {k}");
 }
 
 #[test]
