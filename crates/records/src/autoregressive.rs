@@ -16,6 +16,10 @@ const STRETCH: usize = 4096;
 const VALUES: usize = 8;
 /// Share of the signal, rms, below which what a model leaves is rounding.
 const ROUNDING: f64 = 1e-13;
+/// Samples that tell a noise: more hardly tell it better.
+const TELLING: usize = 4 * STRETCH;
+/// Frequencies at which a spectrum is looked at.
+const FREQUENCIES: usize = 512;
 
 /// A sample with the value that the others expect there, and the standard error of that.
 pub struct Expected {
@@ -44,11 +48,6 @@ pub fn expected(y: &[f64], lost: &[usize]) -> Vec<Expected> {
     }
     all
 }
-
-/// Samples that tell a noise: more hardly tell it better.
-const TELLING: usize = 4 * STRETCH;
-/// Frequencies at which a spectrum is looked at.
-const FREQUENCIES: usize = 512;
 
 /// Standard deviation, a sample, of the noise under a signal: the level above which 95 % of its spectrum lie, as its model has it. A motion
 /// that leaves no twentieth of the band to the noise hides it. `None` of too short a signal.
@@ -111,27 +110,16 @@ impl Model {
         // The last rows keep the coefficients small where fewer tell all there is.
         let rounding = ROUNDING * power.sqrt();
         let triangle = DMatrix::from_fn(rows.len() + ORDER, ORDER + 1, |r, i| match rows.get(r) {
-            // The samples before, the nearest first, and the sample that they tell.
-            Some(k) => {
-                if i < ORDER {
-                    y[k - 1 - i]
-                } else {
-                    y[*k]
-                }
-            }
-            None => {
-                if r - rows.len() == i {
-                    rounding
-                } else {
-                    0.0
-                }
-            }
+            // The samples before, the farthest first, and the sample that they tell.
+            Some(k) => y[k - ORDER + i],
+            None if r - rows.len() == i => rounding,
+            None => 0.0,
         })
         .qr()
         .r();
         let told = triangle.column(ORDER).rows(0, ORDER).into_owned();
         let w = triangle.view((0, 0), (ORDER, ORDER)).solve_upper_triangular(&told)?;
-        let coefficients: Vec<f64> = std::iter::once(1.0).chain(w.iter().map(|w| -w)).collect();
+        let coefficients: Vec<f64> = std::iter::once(1.0).chain(w.iter().rev().map(|w| -w)).collect();
         let residual = |k: usize| -> f64 { coefficients.iter().enumerate().map(|(i, c)| c * y[k - i]).sum() };
         let squares: f64 = rows.iter().map(|k| residual(*k).powi(2)).sum();
         let left = (squares.max(rounding * rounding) / (rows.len() - ORDER) as f64).sqrt();

@@ -7,8 +7,8 @@
 //! alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
 //! start, and serves as one more candidate. What stays of the signal can only raise a level.
 //!
-//! Assumed: the noise is white at the sampling rate, or grows below a corner ([`super::colour`]). Where the levels never settle, the lowest part of the spectrum is it. What grows with
-//! the speed ([`super::jitter`]) counts with its mean over the record.
+//! Assumed: the noise is white at the sampling rate, or grows below a corner ([`super::colour`]). Where the levels never settle, the
+//! lowest part of the spectrum is it. What grows with the speed ([`super::jitter`]) counts with its mean over the record.
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
