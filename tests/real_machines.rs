@@ -33,6 +33,7 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
             noise: std,
             corner: noise.corner.map(|c| c / dt),
             common_noise: noise.common,
+            settling: 0.0,
             idle: Vec::new(),
         },
         noise,

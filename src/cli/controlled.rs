@@ -30,6 +30,7 @@ fn logged(trace: &Trace) -> Logged {
         noise: [0.0; 4],
         corner: [0.0; 2],
         common_noise: 0.0,
+        settling: 0.0,
         idle: Vec::new(),
     }
 }

@@ -365,6 +365,7 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
         noise: std,
         corner: noise.corner.map(|c| c / trace.dt),
         common_noise: noise.common,
+        settling: 0.0,
         idle,
     };
     let [reference, command] = [Signal::Reference, Signal::Command].map(|s| trace.get(s).map(<[f64]>::to_vec));

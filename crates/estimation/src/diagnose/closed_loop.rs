@@ -238,6 +238,7 @@ mod tests {
                 noise: [1e-9; 4],
                 corner: [0.0; 2],
                 common_noise: 0.0,
+                settling: 0.0,
                 idle: Vec::new(),
             };
             let nothing = silent(3000);

@@ -33,6 +33,8 @@ pub struct Record {
     pub corner: [f64; 2],
     /// Covariance of the noises of both positions, rad^2.
     pub common_noise: f64,
+    /// Time at either end within which a filter began, s.
+    pub settling: f64,
     /// Stretches that tell nothing (the drive is off, the axis stands): they are followed, and not weighed.
     pub idle: Vec<std::ops::Range<usize>>,
 }
@@ -57,6 +59,7 @@ impl Record {
             noise: self.noise,
             corner: self.corner,
             common_noise: self.common_noise,
+            settling: self.settling,
             idle: (self.idle.iter())
                 .map(|r| r.start.max(range.start)..r.end.min(range.end))
                 .filter(|r| !r.is_empty())
@@ -153,6 +156,7 @@ mod tests {
             noise: [0.0; 4],
             corner: [0.0; 2],
             common_noise: 0.0,
+            settling: 0.0,
             idle: Vec::new(),
         }
     }

@@ -43,6 +43,7 @@ mod tests {
             noise: [NOISE, 0.0, 0.0, 0.0],
             corner: [0.0; 2],
             common_noise: 0.0,
+            settling: 0.0,
             idle: Vec::new(),
         }
     }

@@ -1,6 +1,9 @@
 //! The band of the motion, and the samples that count.
 
 use super::super::record::Record;
+use super::likelihood::Sight;
+use crate::axis::Structure;
+use nalgebra::{Matrix3, Vector3};
 use rustfft::{FftPlanner, num_complex::Complex};
 
 /// Share of the acceleration's power that the band of the motion holds, and how far beyond it goes.
@@ -22,17 +25,25 @@ pub enum Reach {
     Whole,
 }
 
+/// Share of the record over which the window rises at either end. The noise that the window spreads stands in the lowest bins alike, in the
+/// more of them the shorter it rises; the longer, the less of the record counts.
+const EDGE: f64 = 0.07;
+/// The same where a hidden inertia's beginning is taken out of those bins: it would follow what is alike in them.
+const EDGE_OF_HIDDEN: f64 = 0.1;
 /// Samples over which the window falls to an idle stretch.
 const SOFT: usize = 24;
 
 /// Window with soft ends, and none of it over idle stretches.
-pub fn mask(record: &Record) -> Vec<f64> {
+pub fn mask(record: &Record, structure: Structure) -> Vec<f64> {
     let n = record.len();
     let rise = |d: f64, edge: f64| {
         if d >= edge { 1.0 } else { 0.5 * (1.0 - (std::f64::consts::PI * (d + 0.5) / edge).cos()) }
     };
-    let edge = (n as f64 * 0.05).max(8.0);
-    let mut mask: Vec<f64> = (0..n).map(|k| rise((k.min(n - 1 - k)) as f64, edge)).collect();
+    let hidden = Sight::of(record, structure).is_of_one_side();
+    let edge = (if hidden { EDGE_OF_HIDDEN } else { EDGE } * n as f64).max(8.0);
+    let settling = (record.settling / record.dt).min(0.125 * n as f64);
+    let outside = |k: usize| k.min(n - 1 - k) as f64 - settling;
+    let mut mask: Vec<f64> = (0..n).map(|k| if outside(k) < 0.0 { 0.0 } else { rise(outside(k), edge) }).collect();
     for idle in &record.idle {
         for (k, w) in mask.iter_mut().enumerate().take(idle.end + SOFT).skip(idle.start.saturating_sub(SOFT)) {
             let beside = idle.start.saturating_sub(k + 1).max(k.saturating_sub(idle.end));
@@ -130,6 +141,8 @@ pub fn smooth(n: usize) -> usize {
         .unwrap_or(n)
 }
 
+/// Periods of the band's upper end within which a filtered record shows that it went on otherwise beyond its ends.
+const SETTLING: f64 = 0.5;
 /// Samples a period of the band's upper end that are kept.
 const KEPT: f64 = 8.0;
 /// Instants a sample at which the torque is kept: what runs straight between fewer of them has images in it that an axis of unlike
@@ -156,6 +169,48 @@ fn thinning(most: usize, straight: bool) -> (usize, usize) {
     INSTANTS.map(|m| (most / m * m, m)).into_iter().max().unwrap_or((1, 1))
 }
 
+/// How a series goes on beyond an end of the record. The torque is mirrored there, and so must be the acceleration: a motion that began
+/// otherwise would lack a torque within a filter's length of the end.
+#[derive(Debug, Clone, Copy)]
+enum Beyond {
+    /// A torque: as it came.
+    Even,
+    /// A position: as it came about its tangent.
+    AboutTangent,
+    /// A speed: turned about its value.
+    Odd,
+}
+
+impl Beyond {
+    /// Of a channel of a record.
+    const fn of(channel: usize) -> Self {
+        if channel.is_multiple_of(2) { Self::AboutTangent } else { Self::Odd }
+    }
+
+    /// The value so many samples beyond an end, of the one as many before it; the end with its value and its slope outward, a sample.
+    fn mirrored(self, inside: f64, [value, slope]: [f64; 2], samples: f64) -> f64 {
+        match self {
+            Self::Even => inside,
+            Self::AboutTangent => inside + 2.0 * slope * samples,
+            Self::Odd => 2.0 * value - inside,
+        }
+    }
+}
+
+/// Value and slope outward, a sample, of a series at its first or last sample: of the parabola through so many at that end.
+fn end(y: &[f64], samples: usize, last: bool) -> [f64; 2] {
+    let of = |k: usize| if last { y[y.len() - 1 - k] } else { y[k] };
+    let powers = |k: usize| Vector3::new(1.0, k as f64, (k * k) as f64);
+    let mut normal = Matrix3::zeros();
+    let mut right = Vector3::zeros();
+    for k in 0..samples {
+        normal += powers(k) * powers(k).transpose();
+        right += powers(k) * (of(k) - of(0));
+    }
+    let fit = normal.lu().solve(&right).unwrap_or_default();
+    [of(0) + fit[0], -fit[1]]
+}
+
 /// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
 /// the band it is the one that acted.
 pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
@@ -173,32 +228,35 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     let total = smooth_up(n + 2 * pad);
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(total), planner.plan_fft_inverse(total));
-    let filter = |y: &[f64], odd: bool, every: usize, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
-        let at = |i: isize| -> f64 {
-            let last = n as isize - 1;
-            if i < 0 {
-                let r = y[(-i).min(last) as usize];
-                if odd { 2.0 * y[0] - r } else { r }
-            } else if i > last {
-                let r = y[(2 * last - i).max(0) as usize];
-                if odd { 2.0 * y[n - 1] - r } else { r }
-            } else {
-                y[i as usize]
+    // Within half of that a tangent of the motion is told: over longer stretches its parabola is none.
+    let near = ((0.5 * SETTLING / (limit * dt)) as usize).clamp(4, n / 4);
+    // What passes `late` samples late does so with the line that is taken out of it, too.
+    let filter =
+        |y: &[f64], beyond: Beyond, every: usize, late: f64, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
+            let ends = [end(y, near, false), end(y, near, true)];
+            let at = |i: isize| -> f64 {
+                let last = n as isize - 1;
+                if i < 0 {
+                    beyond.mirrored(y[(-i).min(last) as usize], ends[0], -i as f64)
+                } else if i > last {
+                    beyond.mirrored(y[(2 * last - i).max(0) as usize], ends[1], (i - last) as f64)
+                } else {
+                    y[i as usize]
+                }
+            };
+            // A straight line through the ends keeps the circle closed.
+            let (first, end) = (at(-(pad as isize)), at((total - pad) as isize - 1));
+            let line = |at: f64| first + (end - first) * at / (total as f64 - 1.0);
+            let mut z: Vec<Complex<f64>> =
+                (0..total).map(|k| Complex::new(at(k as isize - pad as isize) - line(k as f64), 0.0)).collect();
+            forward.process(&mut z);
+            for (m, v) in z.iter_mut().enumerate() {
+                let f = if 2 * m <= total { m as f64 } else { m as f64 - total as f64 } / (total as f64 * dt);
+                *v *= response(f) / total as f64;
             }
+            inverse.process(&mut z);
+            (0..n).step_by(every).map(|k| z[k + pad].re + line((k + pad) as f64 - late)).collect()
         };
-        // A straight line through the ends keeps the circle closed.
-        let (first, end) = (at(-(pad as isize)), at((total - pad) as isize - 1));
-        let line = |k: usize| first + (end - first) * k as f64 / (total as f64 - 1.0);
-        let mut z: Vec<Complex<f64>> =
-            (0..total).map(|k| Complex::new(at(k as isize - pad as isize) - line(k), 0.0)).collect();
-        forward.process(&mut z);
-        for (m, v) in z.iter_mut().enumerate() {
-            let f = if 2 * m <= total { m as f64 } else { m as f64 - total as f64 } / (total as f64 * dt);
-            *v *= response(f) / total as f64;
-        }
-        inverse.process(&mut z);
-        (0..n).step_by(every).map(|k| z[k + pad].re + line(k + pad)).collect()
-    };
     let low = |f: f64| {
         let x = (f.abs() / limit - 1.3) / 0.9;
         if x <= 0.0 {
@@ -223,12 +281,12 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         };
         held * (low(f) / sinc(f * dt * step as f64).powi(2))
     };
-    let fine = filter(&record.torque, false, step, &shape);
+    let fine = filter(&record.torque, Beyond::Even, step, if zoh { 0.5 } else { 0.0 }, &shape);
     let torque: Vec<f64> = fine.iter().copied().step_by(instants).collect();
     let mut between = fine;
     between.resize(torque.len() * instants, between.last().copied().unwrap_or_default());
     let channels = [0, 1, 2, 3].map(|c: usize| {
-        record.channels[c].as_ref().map(|y| filter(y, c.is_multiple_of(2), every, &|f| Complex::new(low(f), 0.0)))
+        record.channels[c].as_ref().map(|y| filter(y, Beyond::of(c), every, 0.0, &|f| Complex::new(low(f), 0.0)))
     });
     let noise = record.noise.map(|s| s / (every as f64).sqrt());
     let common_noise = record.common_noise / every as f64;
@@ -244,6 +302,7 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         noise,
         corner: record.corner,
         common_noise,
+        settling: SETTLING / limit,
         idle,
     };
     let m = smooth(out.len());
@@ -286,6 +345,7 @@ mod tests {
             noise: [1e-6; 4],
             corner: [0.0; 2],
             common_noise: 0.0,
+            settling: 0.0,
             idle: Vec::new(),
         };
         // 10 rad/s are 1.6 Hz.

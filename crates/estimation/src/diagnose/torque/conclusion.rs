@@ -344,7 +344,9 @@ impl Search<'_> {
             .map(|(e, _)| {
                 let mut model = fit.model;
                 model.effects.of_mut(*e).copy_from_slice(self.problem.nominal.effects.of(*e));
-                let Some(rows) = self.problem.rows(&model, fit.bandwidth) else { return 1.0 };
+                let Some(rows) = self.problem.rows(&model, fit.bandwidth, Some(fit.rows.weighed_at)) else {
+                    return 1.0;
+                };
                 let without = self.band().discrepancy(&rows);
                 (0..self.band().equations())
                     .map(|i| (without[i] - own[i]).max(0.0) / self.band().noise_power(i).max(f64::MIN_POSITIVE))

@@ -160,6 +160,7 @@ impl<'a> Descent<'a> {
             let least = self.at.s.map(|v| SHRINKS * v);
             let settled = (0..band.equations()).all(|i| (s[i].max(1e-300) / self.at.s[i]).ln().abs() < SETTLED);
             self.at.s = [s[0].max(least[0]), s[1].max(least[1])];
+            band.weigh(&mut self.at.rows, self.at.s);
             let followed = follows && self.follow();
             if settled && !followed && gained.is_none_or(|g| g < WORTH) {
                 break;
@@ -213,7 +214,7 @@ impl<'a> Descent<'a> {
                 }
                 continue;
             }
-            if let Some(rows) = problem.rows(&model, at.bandwidth) {
+            if let Some(rows) = problem.rows(&model, at.bandwidth, Some(at.rows.weighed_at)) {
                 let s = band.rescaled(at.s, &at.model, &model);
                 let after = cost(&rows, s, &y);
                 if after < before {
@@ -303,7 +304,7 @@ impl<'a> Descent<'a> {
         let own = problem.band.log_likelihood(&at.rows, at.s);
         for bandwidth in [[0, 1].map(|i| (LOOSER * at.bandwidth[i]).max(least[i])), problem.bandwidth(at.s)] {
             if differ(bandwidth, at.bandwidth)
-                && let Some(rows) = problem.rows(&at.model, bandwidth)
+                && let Some(rows) = problem.rows(&at.model, bandwidth, Some(at.rows.weighed_at))
                 && problem.band.log_likelihood(&rows, at.s) > own + WORTH
             {
                 (at.rows, at.bandwidth) = (rows, bandwidth);

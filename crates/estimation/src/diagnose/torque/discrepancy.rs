@@ -19,9 +19,7 @@ impl Band {
     pub fn discrepancy(&self, l: &TorqueResidual) -> Discrepancy {
         let rows = &l.rows;
         let eqs = self.equations();
-        let total: f64 = self.weight.iter().sum();
-        let power = |i: usize| rows[i].iter().zip(&self.weight).map(|(r, w)| w * r.norm_sqr()).sum::<f64>() / total;
-        let most = (0..eqs).map(|i| power(i) / l.alike[i]).fold(f64::MIN_POSITIVE, f64::max);
+        let most = (0..eqs).map(|i| self.power(&rows[i]) / l.alike[i]).fold(f64::MIN_POSITIVE, f64::max);
         let alike = |v: f64| l.alike.map(|a| a * v);
         let mut s = alike(most);
         let mut value = self.log_likelihood(l, s);

@@ -185,9 +185,10 @@ impl Problem<'_> {
         })
     }
 
-    pub fn rows(&self, model: &Model, bandwidth: Bandwidth) -> Option<TorqueResidual> {
+    /// What a model lacks, beside what hidden inertias began with as it is at a discrepancy.
+    pub fn rows(&self, model: &Model, bandwidth: Bandwidth, weighed_at: Option<Discrepancy>) -> Option<TorqueResidual> {
         let tracked = self.track(model, bandwidth)?;
-        Some(PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, &tracked, planner)))
+        Some(PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, &tracked, weighed_at, planner)))
     }
 
     /// Step of a coordinate for its column.
@@ -242,7 +243,7 @@ impl Problem<'_> {
                 }
                 let mut y = x.clone();
                 y[i] += h;
-                let moved = self.rows(&model.at(coordinates, &y), bandwidth)?;
+                let moved = self.rows(&model.at(coordinates, &y), bandwidth, Some(residual.weighed_at))?;
                 Some([0, 1].map(|e| moved.rows[e].iter().zip(&residual.rows[e]).map(|(a, b)| (a - b) / h).collect()))
             })
             .collect()
@@ -264,7 +265,7 @@ impl Problem<'_> {
     pub fn nothing(&self) -> Fit {
         let mut tracked = Tracked::nothing(self.record.len());
         tracked.torque[0].copy_from_slice(&self.record.torque);
-        let rows = PLANNER.with_borrow_mut(|planner| self.band.torque_residual(&self.nominal, &tracked, planner));
+        let rows = PLANNER.with_borrow_mut(|planner| self.band.torque_residual(&self.nominal, &tracked, None, planner));
         let s = self.band.discrepancy(&rows);
         self.unfitted(Along { model: self.nominal, rows, s, bandwidth: self.bandwidth(s) })
     }
@@ -351,8 +352,9 @@ impl Problem<'_> {
 
     /// A model along the record, and the discrepancy that it leaves.
     pub fn along(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
-        let rows = self.rows(model, bandwidth)?;
+        let mut rows = self.rows(model, bandwidth, None)?;
         let s = self.band.discrepancy(&rows);
+        self.band.weigh(&mut rows, s);
         Some(Along { model: *model, rows, s, bandwidth })
     }
 

@@ -16,7 +16,7 @@ use super::super::model::Model;
 use super::super::record::{CHANNELS, Record};
 use super::Prepared;
 use super::fit::Fit;
-use super::hidden::remove_any_vibration;
+use super::hidden::any_vibrations;
 use super::likelihood::Sight;
 use super::tracking::{Resolution, Run, start_states, track};
 use crate::numerics::level::deviation;
@@ -166,8 +166,10 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
                 return (vec![Errors::from_element(f64::INFINITY); parts], vec![[f64::NAN; 4]; n]);
             };
             let planner = &mut FftPlanner::new();
-            let mut rows = band.torque_residual(&fit.model, &tracked, planner).rows;
-            remove_any_vibration(band, &fits[2].model, &mut rows, planner);
+            let mut rows = band.torque_residual(&fit.model, &tracked, Some(fit.discrepancy), planner).rows;
+            for vibration in any_vibrations(band, &fits[2].model, planner) {
+                vibration.take_out(band, &band.weights(&fits[2].model), fits[2].discrepancy, &mut rows);
+            }
             let series = [0, 1].map(|i| band.in_time(&rows[i]));
             let power = |i: usize, r: &std::ops::Range<usize>| -> f64 {
                 series[i].get(r.clone()).map_or(0.0, |s| s.iter().map(|v| v * v).sum())

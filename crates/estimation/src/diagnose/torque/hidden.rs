@@ -7,8 +7,9 @@
 use rustfft::FftPlanner;
 
 use super::super::model::Model;
+use super::discrepancy::Discrepancy;
 use super::fit::largest;
-use super::likelihood::{Band, C};
+use super::likelihood::{Band, C, Weight, mode_inertia};
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Place};
 
@@ -34,7 +35,7 @@ impl Hidden {
     }
 
     /// Third inertias of a model of which these sides are measured: on a rigid axis any is the first.
-    fn modes(model: &Model, sides: &[usize]) -> impl Iterator<Item = Self> {
+    pub fn modes(model: &Model, sides: &[usize]) -> impl Iterator<Item = Self> {
         let rigid = model.structure == Structure::Rigid;
         EFFECTS.iter().filter(|e| e.is_mode() && model.effects.is_on(**e)).filter_map(move |e| {
             let side = usize::from(!rigid && e.info().place == Place::Table);
@@ -46,6 +47,11 @@ impl Hidden {
     /// All of a model of which these sides are measured.
     pub fn of(model: &Model, sides: &[usize]) -> Vec<Self> {
         Self::across(model, sides).into_iter().chain(Self::modes(model, sides)).collect()
+    }
+
+    /// The inertia that it adds to its place at an angular frequency, kg.m2.
+    pub fn effective_inertia(&self, w: f64, dt: f64) -> C {
+        mode_inertia([self.inertia, self.stiffness, self.damping], w, dt)
     }
 
     /// Decay and angular frequency of its free vibration; `None` where it does not swing.
@@ -84,64 +90,77 @@ impl Hidden {
     }
 }
 
-/// Takes out of the rows of a model what its inertias without an encoder began with. A third inertia is no part of the axis, but an effect:
-/// it swings at most as it does later along the motion, lest the smallest explain anything that dies away.
-pub fn remove_vibration(
-    band: &Band,
-    model: &Model,
-    motion: &[[f64; 4]],
-    rows: &mut [Vec<C>; 2],
-    planner: &mut FftPlanner<f64>,
-) {
-    if let Some(hidden) = Hidden::across(model, band.sides()) {
-        project_out(band, &hidden, f64::INFINITY, rows, planner);
-    }
-    for hidden in Hidden::modes(model, band.sides()) {
+/// A free vibration from the record's first sample on.
+#[derive(Debug, Clone)]
+pub struct Vibration {
+    /// Its rows as a decaying cosine and as a decaying sine of one N.m.
+    parts: [[Vec<C>; 2]; 2],
+    /// Its largest torque there, N.m.
+    most: f64,
+}
+
+/// What the inertias without an encoder of a model may have begun with. A third inertia is no part of the axis, but an effect: it swings at
+/// most as it does later along the motion, lest the smallest explain anything that dies away.
+pub fn vibrations(band: &Band, model: &Model, motion: &[[f64; 4]], planner: &mut FftPlanner<f64>) -> Vec<Vibration> {
+    let across = Hidden::across(model, band.sides()).map(|hidden| (hidden, f64::INFINITY));
+    let mode = |hidden: Hidden| {
         let along: Vec<f64> = motion.iter().map(|m| m[2 * hidden.side]).collect();
         let most = largest(&hidden.pull(&along, band.dt));
-        project_out(band, &hidden, most, rows, planner);
-    }
+        (hidden, most)
+    };
+    let modes = Hidden::modes(model, band.sides()).map(mode);
+    across.into_iter().chain(modes).filter_map(|(hidden, most)| Vibration::of(&hidden, most, band, planner)).collect()
 }
 
 /// The same without bound: on a record that no fit has seen a model may have been swinging in any way.
-pub fn remove_any_vibration(band: &Band, model: &Model, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
-    for hidden in Hidden::of(model, band.sides()) {
-        project_out(band, &hidden, f64::INFINITY, rows, planner);
-    }
+pub fn any_vibrations(band: &Band, model: &Model, planner: &mut FftPlanner<f64>) -> Vec<Vibration> {
+    let hidden = Hidden::of(model, band.sides());
+    hidden.iter().filter_map(|hidden| Vibration::of(hidden, f64::INFINITY, band, planner)).collect()
 }
 
-/// Takes out a free vibration from the record's first sample, its torque there at most so large, N.m.
-fn project_out(band: &Band, hidden: &Hidden, most: f64, rows: &mut [Vec<C>; 2], planner: &mut FftPlanner<f64>) {
-    // Faster than the record shows it is no part of the band.
-    let Some(of) = hidden.vibration().filter(|of| of.im * band.dt < std::f64::consts::PI) else { return };
-    let step = (of * band.dt).exp();
-    let mut at = C::new(1.0, 0.0);
-    let mut z: Vec<C> = Vec::with_capacity(band.n);
-    for w in &band.taper {
-        z.push(at * w);
-        at *= step;
+impl Vibration {
+    /// That of an inertia, its torque at most so large, N.m; `None` of one that does not swing.
+    fn of(hidden: &Hidden, most: f64, band: &Band, planner: &mut FftPlanner<f64>) -> Option<Self> {
+        // Faster than the record shows it is no part of the band.
+        let of = hidden.vibration().filter(|of| of.im * band.dt < std::f64::consts::PI)?;
+        let step = (of * band.dt).exp();
+        let mut at = C::new(1.0, 0.0);
+        let mut z: Vec<C> = Vec::with_capacity(band.n);
+        for w in &band.taper {
+            z.push(at * w);
+            at *= step;
+        }
+        planner.plan_fft_forward(band.n).process(&mut z);
+        let scale = 1.0 / (band.n as f64).sqrt();
+        let parts = [(1.0, C::new(0.5, 0.0)), (-1.0, C::new(0.0, -0.5))].map(|(sign, turn)| {
+            let spectrum = |m: usize| (z[m] + z[(band.n - m) % band.n].conj() * sign) * turn * scale;
+            band.at_side(hidden.side, &(0..band.omega.len()).map(spectrum).collect::<Vec<C>>())
+        });
+        Some(Self { parts, most })
     }
-    planner.plan_fft_forward(band.n).process(&mut z);
-    let scale = 1.0 / (band.n as f64).sqrt();
-    let [cosine, sine] = [(1.0, C::new(0.5, 0.0)), (-1.0, C::new(0.0, -0.5))].map(|(sign, turn)| {
-        let spectrum = |m: usize| (z[m] + z[(band.n - m) % band.n].conj() * sign) * turn * scale;
-        band.at_side(hidden.side, &(0..band.omega.len()).map(spectrum).collect::<Vec<C>>())
-    });
-    let product = |a: &[Vec<C>; 2], b: &[Vec<C>; 2]| band.product(a, b);
-    let (cc, ss, cs) = (product(&cosine, &cosine), product(&sine, &sine), product(&cosine, &sine));
-    let (cr, sr) = (product(&cosine, rows), product(&sine, rows));
-    let determinant = cc * ss - cs * cs;
-    // Of a vibration that is one curve within the record, one part.
-    let (a, b) = if determinant > OWN * OWN * cc * ss {
-        ((ss * cr - cs * sr) / determinant, (cc * sr - cs * cr) / determinant)
-    } else {
-        (cr / cc.max(f64::MIN_POSITIVE), 0.0)
-    };
-    let size = a.hypot(b);
-    let share = if size > most { most / size } else { 1.0 };
-    for (e, row) in rows.iter_mut().enumerate() {
-        for (r, (c, s)) in row.iter_mut().zip(cosine[e].iter().zip(&sine[e])) {
-            *r -= (c * a + s * b) * share;
+
+    /// Takes it out of rows where that is likeliest: weighed as the likelihood does, for the torque of the noise grows with the square of
+    /// the frequency, and fitted to that of the band's upper end a vibration would leave a multiple of the noise at its lower.
+    pub fn take_out(&self, band: &Band, weights: &[Weight], s: Discrepancy, rows: &mut [Vec<C>; 2]) {
+        let white = |rows: &[Vec<C>; 2]| band.whiten(rows, weights, s);
+        let [cosine, sine] = self.parts.each_ref().map(white);
+        let rest = white(rows);
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (cc, ss, cs) = (product(&cosine, &cosine), product(&sine, &sine), product(&cosine, &sine));
+        let (cr, sr) = (product(&cosine, &rest), product(&sine, &rest));
+        let determinant = cc * ss - cs * cs;
+        // Of a vibration that is one curve within the record, one part.
+        let (a, b) = if determinant > OWN * OWN * cc * ss {
+            ((ss * cr - cs * sr) / determinant, (cc * sr - cs * cr) / determinant)
+        } else {
+            (cr / cc.max(f64::MIN_POSITIVE), 0.0)
+        };
+        let size = a.hypot(b);
+        let share = if size > self.most { self.most / size } else { 1.0 };
+        for (e, row) in rows.iter_mut().enumerate() {
+            for (r, (c, s)) in row.iter_mut().zip(self.parts[0][e].iter().zip(&self.parts[1][e])) {
+                *r -= (c * a + s * b) * share;
+            }
         }
     }
 }

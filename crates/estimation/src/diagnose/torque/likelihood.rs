@@ -17,15 +17,13 @@ use rustfft::{FftPlanner, num_complex::Complex};
 use super::super::model::{BaseParameter, Model};
 use super::super::record::Record;
 use super::discrepancy::Discrepancy;
-use super::hidden::remove_vibration;
+use super::hidden::{Hidden, Vibration, vibrations};
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
 use crate::numerics::level::deviation;
 
 /// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor.
 const AT_FLOOR: f64 = 1.15;
-/// Bins over which the window spreads the noise.
-const SPREAD: f64 = 3.0;
 
 pub type C = Complex<f64>;
 
@@ -36,6 +34,24 @@ pub enum Sight {
     Both,
     Motor,
     Table,
+}
+
+impl Sight {
+    /// Of what a record has measured of an axis.
+    pub fn of(record: &Record, structure: Structure) -> Self {
+        let has = |i: usize| record.channels[2 * i].is_some() || record.channels[2 * i + 1].is_some();
+        match (structure, has(0), has(1)) {
+            (Structure::Rigid, ..) => Self::Rigid,
+            (_, true, true) => Self::Both,
+            (_, true, false) => Self::Motor,
+            _ => Self::Table,
+        }
+    }
+
+    /// Whether one of two inertias shows in the other's motion alone.
+    pub fn is_of_one_side(self) -> bool {
+        matches!(self, Self::Motor | Self::Table)
+    }
 }
 
 pub struct Band {
@@ -73,10 +89,15 @@ pub struct Weight {
 /// What a model lacks, with how its own stiffness shows the noise in it.
 #[derive(Debug, Clone)]
 pub struct TorqueResidual {
-    /// Spectra of the equations.
+    /// Spectra of the equations, without what inertias that no encoder shows began with.
     pub rows: [Vec<C>; 2],
     /// What the noise makes in them.
     pub weights: Vec<Weight>,
+    /// The discrepancy beside the noise at which that was taken out.
+    pub weighed_at: Discrepancy,
+    /// The spectra with it, where there is any.
+    whole: [Vec<C>; 2],
+    vibrations: Vec<Vibration>,
     /// Square of the inertia of each equation over the larger one's: torques of one acceleration.
     pub(super) alike: [f64; 2],
 }
@@ -106,22 +127,25 @@ fn square(w: f64, dt: f64) -> f64 {
 }
 
 /// The inertia that a third inertia on a spring, `[inertia, stiffness, damping]`, adds to its place at a frequency, kg.m2.
-fn mode_inertia([inertia, stiffness, damping]: [f64; 3], w: f64, dt: f64) -> C {
+pub fn mode_inertia([inertia, stiffness, damping]: [f64; 3], w: f64, dt: f64) -> C {
     let pull = C::new(stiffness, damping * (w * dt).sin() / dt);
     pull * inertia / (pull + inertia * square(w, dt))
+}
+
+/// Angular frequency at which the noise of each bin stands. A window `w` spreads the second derivative of a white noise: of its power
+/// `mean |d^2/dt^2 (w exp(-jwt))|^2 = w^4 + 6 w^2 mean w'^2 + mean w''^2` (by parts) comes into a bin.
+fn spread(omega: &[f64], taper: &[f64], dt: f64) -> Vec<f64> {
+    let mean = |terms: f64| terms / taper.len() as f64;
+    let first = mean(taper.windows(2).map(|w| ((w[1] - w[0]) / dt).powi(2)).sum());
+    let second = mean(taper.windows(3).map(|w| ((w[2] - 2.0 * w[1] + w[0]) / (dt * dt)).powi(2)).sum());
+    omega.iter().map(|w| (w.powi(4) + 6.0 * w * w * first + second).powf(0.25)).collect()
 }
 
 impl Band {
     pub fn new(record: &Record, reference: &Model, limit: f64, mask: &[f64]) -> Self {
         let n = record.len();
         let dt = record.dt;
-        let has = |i: usize| record.channels[2 * i].is_some() || record.channels[2 * i + 1].is_some();
-        let sight = match (reference.structure, has(0), has(1)) {
-            (Structure::Rigid, ..) => Sight::Rigid,
-            (_, true, true) => Sight::Both,
-            (_, true, false) => Sight::Motor,
-            _ => Sight::Table,
-        };
+        let sight = Sight::of(record, reference.structure);
         let mean = (mask.iter().map(|w| w * w).sum::<f64>() / n as f64).sqrt();
         let taper: Vec<f64> = mask.iter().map(|w| w / mean).collect();
         let weighed = 1.0 - record.idle.iter().map(std::ops::Range::len).sum::<usize>() as f64 / n as f64;
@@ -136,8 +160,7 @@ impl Band {
                 None => (record.noise[2 * i + 1] / w.max(0.5 * step)).powi(2),
             }
         };
-        // The window spreads what stands a few bins higher.
-        let spread: Vec<f64> = omega.iter().map(|w| w.hypot(SPREAD * step)).collect();
+        let spread = spread(&omega, &taper, dt);
         let noise = spread.iter().map(|&w| [noise_of(0, w), noise_of(1, w)]).collect();
         let one = C::new(1.0, 0.0);
         let combine = spread
@@ -160,19 +183,38 @@ impl Band {
         band
     }
 
-    /// The stiffness of parameters as the equations show it at a bin: of one equation its first entry.
-    fn visible(&self, p: &Parameters, m: usize) -> [[C; 2]; 2] {
+    /// The stiffness of parameters as the equations show it at a bin: of one equation its first entry. There the side without an encoder
+    /// follows the other as it does in a `model`: `x11 - 2 a x12 + a^2 x22`, `a = d12/d22` of that, for the model itself the Schur
+    /// complement `d11 - d12^2/d22`, and for a part of it what the complement gains by that part.
+    fn visible(&self, part: &Parameters, model: &Parameters, m: usize) -> [[C; 2]; 2] {
         let structure = if self.sight == Sight::Rigid { Structure::Rigid } else { Structure::TwoInertia };
-        let d = stiffness(p, structure, self.spread[m], self.dt);
-        let side = match self.sight {
-            Sight::Rigid | Sight::Both => return d,
-            Sight::Motor => 0,
-            Sight::Table => 1,
+        let of = |p: &Parameters| stiffness(p, structure, self.spread[m], self.dt);
+        let x = of(part);
+        let (side, hidden) = match self.sight {
+            Sight::Rigid | Sight::Both => return x,
+            Sight::Motor => (0, 1),
+            Sight::Table => (1, 0),
         };
-        let [u, v] = self.combine[m];
+        let d = of(model);
+        let follows = d[side][hidden] / d[hidden][hidden];
         let mut seen = [[C::default(); 2]; 2];
-        seen[0][0] = u * d[0][side] + v * d[1][side];
+        seen[0][0] = self.combine[m][side]
+            * (x[side][side] - x[side][hidden] * follows * 2.0 + x[hidden][hidden] * follows * follows);
         seen
+    }
+
+    /// The stiffness of a model as the equations show it at a bin, with its third inertias in it.
+    fn visible_of(&self, model: &Model, modes: &[Hidden], m: usize) -> [[C; 2]; 2] {
+        let mut v = self.visible(&model.parameters, &model.parameters, m);
+        let w = self.spread[m];
+        for mode in modes {
+            let d = mode.effective_inertia(w, self.dt) * square(w, self.dt);
+            match self.sight {
+                Sight::Both => v[mode.side][mode.side] += d,
+                Sight::Rigid | Sight::Motor | Sight::Table => v[0][0] += self.combine[m][mode.side] * d,
+            }
+        }
+        v
     }
 
     /// Noise of each encoder that the equations see.
@@ -183,9 +225,10 @@ impl Band {
 
     /// What the noise makes in the equations of a model.
     pub fn weights(&self, model: &Model) -> Vec<Weight> {
+        let modes: Vec<Hidden> = Hidden::modes(model, self.sides()).collect();
         (0..self.omega.len())
             .map(|m| {
-                let v = self.visible(&model.parameters, m);
+                let v = self.visible_of(model, &modes, m);
                 let [n1, n2] = self.seen(m);
                 let (noise, det) = if self.sight == Sight::Both {
                     // Moved together the sides do not strain the spring.
@@ -226,9 +269,10 @@ impl Band {
                 unit
             })
             .collect();
+        let modes: Vec<Hidden> = Hidden::modes(model, self.sides()).collect();
         for (m, weight) in self.weight.iter().enumerate() {
             let (a, b, c, _) = self.factor(residual.weights[m], s);
-            let v = self.visible(&model.parameters, m);
+            let v = self.visible_of(model, &modes, m);
             // C^-1 r = L^-H L^-1 r, and the readings' share of it: with N the readings' noise
             // E = V^-1 (V N V^H) C^-1 r = N V^H C^-1 r.
             let r0 = residual.rows[0][m];
@@ -261,7 +305,7 @@ impl Band {
                 [of(&inverse, &sc, 1, 0), of(&inverse, &sc, 1, 1)],
             ];
             for (i, (parameter, slope, column)) in base.iter().enumerate() {
-                let d = self.visible(&units[i], m);
+                let d = self.visible(&units[i], &model.parameters, m);
                 let column = &mut columns[*column];
                 if both && *parameter == BaseParameter::I2 {
                     // The table's discrepancy grows with its inertia (`carried`).
@@ -292,8 +336,14 @@ impl Band {
         if self.sight == Sight::Both { 2 } else { 1 }
     }
 
-    /// Spectra of the equations.
-    pub fn torque_residual(&self, model: &Model, tracked: &Tracked, planner: &mut FftPlanner<f64>) -> TorqueResidual {
+    /// Spectra of the equations. What hidden inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
+    pub fn torque_residual(
+        &self,
+        model: &Model,
+        tracked: &Tracked,
+        weighed_at: Option<Discrepancy>,
+        planner: &mut FftPlanner<f64>,
+    ) -> TorqueResidual {
         let torque = &tracked.torque;
         let mut z: Vec<C> = (0..self.n).map(|k| C::new(torque[0][k], torque[1][k]) * self.taper[k]).collect();
         planner.plan_fft_forward(self.n).process(&mut z);
@@ -315,16 +365,36 @@ impl Band {
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };
-        remove_vibration(self, model, &tracked.motion, &mut rows, planner);
-        TorqueResidual { rows, weights: self.weights(model), alike }
+        let vibrations = vibrations(self, model, &tracked.motion, planner);
+        let whole = if vibrations.is_empty() { [Vec::new(), Vec::new()] } else { rows.clone() };
+        let weights = self.weights(model);
+        let known = weighed_at.is_some();
+        let weighed_at = weighed_at.unwrap_or_else(|| [0, 1].map(|i| self.power(&rows[i])));
+        let mut residual = TorqueResidual { rows, weights, weighed_at, whole, vibrations, alike };
+        self.weigh(&mut residual, weighed_at);
+        if !known && !residual.vibrations.is_empty() {
+            let s = self.discrepancy(&residual);
+            self.weigh(&mut residual, s);
+        }
+        residual
     }
 
-    /// Real product of rows, each frequency at its weight.
-    pub fn product(&self, a: &[Vec<C>; 2], b: &[Vec<C>; 2]) -> f64 {
-        let of = |a: &[C], b: &[C]| -> f64 {
-            a.iter().zip(b).zip(&self.weight).map(|((a, b), w)| w * (a.re * b.re + a.im * b.im)).sum()
-        };
-        of(&a[0], &b[0]) + of(&a[1], &b[1])
+    /// Takes out anew what hidden inertias began with, at another discrepancy.
+    pub fn weigh(&self, residual: &mut TorqueResidual, s: Discrepancy) {
+        if residual.vibrations.is_empty() {
+            return;
+        }
+        residual.weighed_at = s;
+        residual.rows.clone_from(&residual.whole);
+        for vibration in &residual.vibrations {
+            vibration.take_out(self, &residual.weights, s, &mut residual.rows);
+        }
+    }
+
+    /// Mean power of rows, N.m squared a sample of the band.
+    pub(super) fn power(&self, rows: &[C]) -> f64 {
+        let total: f64 = self.weight.iter().sum();
+        rows.iter().zip(&self.weight).map(|(r, w)| w * r.norm_sqr()).sum::<f64>() / total
     }
 
     /// Rows of a torque on one side.
@@ -509,6 +579,13 @@ impl Band {
 impl TorqueResidual {
     /// Nothing lacking in no band.
     pub fn nothing() -> Self {
-        Self { rows: [Vec::new(), Vec::new()], weights: Vec::new(), alike: [1.0; 2] }
+        Self {
+            rows: [Vec::new(), Vec::new()],
+            weights: Vec::new(),
+            weighed_at: [0.0; 2],
+            whole: [Vec::new(), Vec::new()],
+            vibrations: Vec::new(),
+            alike: [1.0; 2],
+        }
     }
 }

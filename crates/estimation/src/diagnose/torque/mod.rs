@@ -189,7 +189,7 @@ const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 /// settled, if that is something else.
 fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option<Prepared>) {
     let whole = record.part(0..band::smooth(record.len()));
-    let limit = band::limit(&whole, &band::mask(&whole), reach);
+    let limit = band::limit(&whole, &band::mask(&whole, nominal.structure), reach);
     let [exact, fast] = match nominal.structure {
         Structure::Rigid => [false, true].map(|straight| Rate { longest: f64::INFINITY, straight }),
         Structure::TwoInertia => {
@@ -231,7 +231,7 @@ fn referred(
     rate: Rate,
     peak: f64,
 ) -> (Prepared, f64) {
-    let mask = band::mask(&record);
+    let mask = band::mask(&record, nominal.structure);
     let plain = Band::new(&record, nominal, limit, &mask);
     let problem = Problem::new(&record, &plain, *nominal);
     let fit = match known {
@@ -263,7 +263,7 @@ impl Prepared {
         let whole = record.part(0..band::smooth(record.len()));
         let slow = band::decimate(&whole, self.limit, self.rate);
         let record = slow.part(0..band::smooth(slow.len()));
-        let band = Band::new(&record, model, self.limit, &band::mask(&record));
+        let band = Band::new(&record, model, self.limit, &band::mask(&record, model.structure));
         let torque_rms = deviation(&record.torque).max(self.torque_rms);
         Self { record, band, torque_rms, ..*self }
     }

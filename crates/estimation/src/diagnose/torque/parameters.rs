@@ -22,14 +22,13 @@ const BEST: usize = 3;
 const CLEARLY: f64 = 0.1;
 
 impl Problem<'_> {
-    /// The fit from the nominal parameters, or from `others` that are known to follow the record where they do to the noise.
+    /// The fit from the nominal parameters, or from `others` where the axis follows the record far better from there.
     pub fn parameters(&self, others: &Model, from: Discrepancy, effort: usize) -> Option<Fit> {
         let nominal = self.fit(&self.nominal, &[], from, effort);
         if others.parameters == self.nominal.parameters || nominal.as_ref().is_some_and(|f| self.is_at_floor(f)) {
             return nominal;
         }
-        let far = self.is_beyond_holding();
-        let is_it = |f: &Fit| self.is_at_floor(f) || far && self.leaves_clearly_less(f, nominal.as_ref());
+        let is_it = |f: &Fit| self.is_at_floor(f) || self.leaves_clearly_less(f, nominal.as_ref());
         self.fit(others, &[], from, effort).filter(is_it).or(nominal)
     }
 
@@ -51,8 +50,9 @@ impl Problem<'_> {
     /// leaves more than noise has effects in it: beside them the nearest hollow is as good as the deepest.
     pub fn parameters_of_any_stiffness(&self, from: Discrepancy, effort: usize) -> Option<Fit> {
         let fit = self.fit(&self.nominal, &[], from, effort);
-        let one_side = matches!(self.band.sight, Sight::Motor | Sight::Table);
-        if !(one_side || self.is_beyond_holding()) || fit.as_ref().is_some_and(|f| self.is_at_floor(f)) {
+        if !(self.band.sight.is_of_one_side() || self.is_beyond_holding())
+            || fit.as_ref().is_some_and(|f| self.is_at_floor(f))
+        {
             return fit;
         }
         let coarse = self.coarse();
@@ -70,7 +70,7 @@ impl Problem<'_> {
     }
 
     /// Fits with the stiffness held, from the nominal one in steps of a ratio.
-    fn held_stiffnesses(&self, ratio: f64, from: Discrepancy) -> Vec<Fit> {
+    pub fn held_stiffnesses(&self, ratio: f64, from: Discrepancy) -> Vec<Fit> {
         let mut model = self.nominal;
         let mut held: Vec<Fit> = Vec::new();
         for i in 0..=TO_EITHER_SIDE {

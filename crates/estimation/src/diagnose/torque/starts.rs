@@ -328,7 +328,9 @@ fn one(
     {
         return None;
     }
-    let rows_of = |s: &Settings| p.rows(&Model { effects: *s, ..fit.model }, fit.bandwidth).map(|l| l.rows);
+    let rows_of = |s: &Settings| {
+        p.rows(&Model { effects: *s, ..fit.model }, fit.bandwidth, Some(fit.rows.weighed_at)).map(|l| l.rows)
+    };
     let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
         [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
     };
