@@ -27,7 +27,7 @@ pub enum Reach {
 
 /// Share of the record over which the window rises at either end. The noise that the window spreads stands in the lowest bins alike, in the
 /// more of them the shorter it rises; the longer, the less of the record counts.
-const EDGE: f64 = 0.07;
+const EDGE: f64 = 0.05;
 /// The same where a hidden inertia's beginning is taken out of those bins: it would follow what is alike in them.
 const EDGE_OF_HIDDEN: f64 = 0.1;
 /// Samples over which the window falls to an idle stretch.

@@ -247,16 +247,16 @@ impl<'a> Descent<'a> {
         Some(self.normal_with_growth(x, share)?.0)
     }
 
-    /// The same, and how the density of readings grows with each coordinate at each bin; nothing with those of effects.
+    /// The same, and how the density of readings grows with each coordinate at each bin; nothing with those that no stiffness has in it.
     fn normal_with_growth(&mut self, x: &[f64], share: f64) -> Option<(Normal, Vec<Vec<f64>>)> {
         let (problem, band, coordinates, at) = (self.problem, self.problem.band, &self.coordinates, &self.at);
         self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
         scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
-        let base = of_the_axis(coordinates, x);
-        let grows = band.score(&at.model, &at.rows, at.s, &base, &mut self.columns);
+        let stiffens = of_the_stiffness(coordinates, x);
+        let grows = band.score(&at.model, &at.rows, at.s, &stiffens, &mut self.columns);
         let mut normal = Normal::new(problem, coordinates, x, &self.columns, at, share);
         let mut growth = vec![Vec::new(); x.len()];
-        for ((_, _, i), g) in base.iter().zip(grows) {
+        for ((_, _, i), g) in stiffens.iter().zip(grows) {
             normal.g[*i] += g.iter().sum::<f64>();
             growth[*i] = g;
         }
@@ -347,12 +347,15 @@ pub fn differ(a: Bandwidth, b: Bandwidth) -> bool {
     (0..2).any(|i| (a[i] / b[i]).ln().abs() > ANOTHER)
 }
 
-/// The axis' own parameters among the coordinates at x: which, its slope, its index.
-fn of_the_axis(coordinates: &[Coordinate], x: &[f64]) -> Vec<(BaseParameter, f64, usize)> {
-    let of = |(i, c): (usize, &Coordinate)| match c.free {
-        Free::Base(p) => Some((p, c.slope(x[i]), i)),
-        Free::Effect(..) | Free::Loop(_) => None,
+/// What the stiffness that the equations show has in it, among the coordinates at x: parameters of the axis and of third inertias; which,
+/// its slope, its index.
+fn of_the_stiffness(coordinates: &[Coordinate], x: &[f64]) -> Vec<(Free, f64, usize)> {
+    let is_in_it = |f: Free| match f {
+        Free::Base(_) => true,
+        Free::Effect(e, _) => e.is_mode(),
+        Free::Loop(_) => false,
     };
+    let of = |(i, c): (usize, &Coordinate)| is_in_it(c.free).then(|| (c.free, c.slope(x[i]), i));
     coordinates.iter().enumerate().filter_map(of).collect()
 }
 

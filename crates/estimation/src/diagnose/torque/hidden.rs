@@ -9,9 +9,9 @@ use rustfft::FftPlanner;
 use super::super::model::Model;
 use super::discrepancy::Discrepancy;
 use super::fit::largest;
-use super::likelihood::{Band, C, Weight, mode_inertia};
+use super::likelihood::{Band, C, Weight, mode_inertia, square};
 use crate::axis::Structure;
-use crate::effects::{EFFECTS, Place};
+use crate::effects::{EFFECTS, Effect, Place};
 
 /// Share of the second sine that must be left beside the first for it to be another one.
 const OWN: f64 = 1e-3;
@@ -34,14 +34,20 @@ impl Hidden {
         (model.structure == Structure::TwoInertia).then_some(Self { side, inertia, stiffness: p.k, damping: p.b })
     }
 
-    /// Third inertias of a model of which these sides are measured: on a rigid axis any is the first.
+    /// Third inertias of a model of which these sides are measured.
     pub fn modes(model: &Model, sides: &[usize]) -> impl Iterator<Item = Self> {
+        EFFECTS.iter().filter_map(move |e| Self::of_effect(*e, model, sides))
+    }
+
+    /// The third inertia that an effect is, where it is on and at a side that is measured: on a rigid axis any is the first.
+    pub fn of_effect(effect: Effect, model: &Model, sides: &[usize]) -> Option<Self> {
+        if !effect.is_mode() || !model.effects.is_on(effect) {
+            return None;
+        }
         let rigid = model.structure == Structure::Rigid;
-        EFFECTS.iter().filter(|e| e.is_mode() && model.effects.is_on(**e)).filter_map(move |e| {
-            let side = usize::from(!rigid && e.info().place == Place::Table);
-            let of = model.effects.of(*e);
-            (rigid || sides.contains(&side)).then_some(Self { side, inertia: of[0], stiffness: of[1], damping: of[2] })
-        })
+        let side = usize::from(!rigid && effect.info().place == Place::Table);
+        let of = model.effects.of(effect);
+        (rigid || sides.contains(&side)).then_some(Self { side, inertia: of[0], stiffness: of[1], damping: of[2] })
     }
 
     /// All of a model of which these sides are measured.
@@ -52,6 +58,16 @@ impl Hidden {
     /// The inertia that it adds to its place at an angular frequency, kg.m2.
     pub fn effective_inertia(&self, w: f64, dt: f64) -> C {
         mode_inertia([self.inertia, self.stiffness, self.damping], w, dt)
+    }
+
+    /// What that gains with its inertia, its stiffness (kg.m2 per N.m/rad) and its damping (kg.m2 per N.m.s/rad).
+    pub fn inertia_gains(&self, w: f64, dt: f64) -> [C; 3] {
+        let rate = C::new(0.0, (w * dt).sin() / dt);
+        let pull = rate * self.damping + self.stiffness;
+        let inertial = square(w, dt) * self.inertia;
+        let whole = (pull + inertial) * (pull + inertial);
+        let of_pull = C::new(inertial * self.inertia, 0.0) / whole;
+        [pull * pull / whole, of_pull, of_pull * rate]
     }
 
     /// Decay and angular frequency of its free vibration; `None` where it does not swing.
@@ -185,6 +201,24 @@ mod tests {
                 let exact = transfer.re * sine + transfer.im * cosine;
                 assert!((pull - exact).abs() < 1e-3 * transfer.norm(), "{w} {k} {pull} {exact}");
             }
+        }
+    }
+
+    #[test]
+    fn what_it_adds_grows_with_its_parameters_as_differences_say() {
+        let (w, dt) = (120.0, 1e-3);
+        let at = |h: &Hidden| h.effective_inertia(w, dt);
+        let moved = |f: fn(&mut Hidden) -> &mut f64| {
+            let mut other = HIDDEN;
+            let h = 1e-6 * *f(&mut other);
+            *f(&mut other) += h;
+            (at(&other) - at(&HIDDEN)) / h
+        };
+        let found = HIDDEN.inertia_gains(w, dt);
+        for (found, of) in
+            found.into_iter().zip([moved(|h| &mut h.inertia), moved(|h| &mut h.stiffness), moved(|h| &mut h.damping)])
+        {
+            assert!((found - of).norm() < 1e-4 * of.norm(), "{found} {of}");
         }
     }
 

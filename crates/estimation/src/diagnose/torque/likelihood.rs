@@ -14,7 +14,7 @@
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
-use super::super::model::{BaseParameter, Model};
+use super::super::model::{BaseParameter, Free, Model};
 use super::super::record::Record;
 use super::discrepancy::Discrepancy;
 use super::hidden::{Hidden, Vibration, vibrations};
@@ -122,7 +122,7 @@ pub fn stiffness(p: &Parameters, structure: Structure, w: f64, dt: f64) -> [[C; 
 }
 
 /// The square of the differential operator in central differences, 1/s^2.
-fn square(w: f64, dt: f64) -> f64 {
+pub fn square(w: f64, dt: f64) -> f64 {
     2.0 * ((w * dt).cos() - 1.0) / (dt * dt)
 }
 
@@ -206,15 +206,36 @@ impl Band {
     /// The stiffness of a model as the equations show it at a bin, with its third inertias in it.
     fn visible_of(&self, model: &Model, modes: &[Hidden], m: usize) -> [[C; 2]; 2] {
         let mut v = self.visible(&model.parameters, &model.parameters, m);
-        let w = self.spread[m];
         for mode in modes {
-            let d = mode.effective_inertia(w, self.dt) * square(w, self.dt);
-            match self.sight {
-                Sight::Both => v[mode.side][mode.side] += d,
-                Sight::Rigid | Sight::Motor | Sight::Table => v[0][0] += self.combine[m][mode.side] * d,
-            }
+            let (i, by) = self.entry(mode.side, m);
+            v[i][i] += mode.effective_inertia(self.spread[m], self.dt) * by;
         }
         v
+    }
+
+    /// Where an inertia at a side stands in the stiffness that the equations show at a bin, and the stiffness there of one kg.m2.
+    fn entry(&self, side: usize, m: usize) -> (usize, C) {
+        let s2 = square(self.spread[m], self.dt);
+        if self.sight == Sight::Both { (side, C::new(s2, 0.0)) } else { (0, self.combine[m][side] * s2) }
+    }
+
+    /// What that stiffness gains with a parameter of the axis or of a third inertia; `None` where it has none of it.
+    fn stiffened(&self, parameter: Free, model: &Model, m: usize) -> Option<[[C; 2]; 2]> {
+        match parameter {
+            Free::Base(p) => {
+                let mut unit = Parameters { i1: 0.0, i2: 0.0, b: 0.0, k: 0.0, rho: model.parameters.rho };
+                *p.slot(&mut unit) = 1.0;
+                Some(self.visible(&unit, &model.parameters, m))
+            }
+            Free::Effect(effect, i) => {
+                let mode = Hidden::of_effect(effect, model, self.sides())?;
+                let (at, by) = self.entry(mode.side, m);
+                let mut gains = [[C::default(); 2]; 2];
+                gains[at][at] = *mode.inertia_gains(self.spread[m], self.dt).get(i)? * by;
+                Some(gains)
+            }
+            Free::Loop(_) => None,
+        }
     }
 
     /// Noise of each encoder that the equations see.
@@ -255,20 +276,12 @@ impl Band {
         model: &Model,
         residual: &TorqueResidual,
         s: Discrepancy,
-        base: &[(BaseParameter, f64, usize)],
+        stiffens: &[(Free, f64, usize)],
         columns: &mut [[Vec<C>; 2]],
     ) -> Vec<Vec<f64>> {
         let both = self.sight == Sight::Both;
         let one = C::new(1.0, 0.0);
-        let mut grows = vec![vec![0.0; self.omega.len()]; base.len()];
-        let units: Vec<Parameters> = base
-            .iter()
-            .map(|(p, ..)| {
-                let mut unit = Parameters { i1: 0.0, i2: 0.0, b: 0.0, k: 0.0, rho: model.parameters.rho };
-                *p.slot(&mut unit) = 1.0;
-                unit
-            })
-            .collect();
+        let mut grows = vec![vec![0.0; self.omega.len()]; stiffens.len()];
         let modes: Vec<Hidden> = Hidden::modes(model, self.sides()).collect();
         for (m, weight) in self.weight.iter().enumerate() {
             let (a, b, c, _) = self.factor(residual.weights[m], s);
@@ -304,10 +317,10 @@ impl Band {
                 [of(&inverse, &sc, 0, 0), of(&inverse, &sc, 0, 1)],
                 [of(&inverse, &sc, 1, 0), of(&inverse, &sc, 1, 1)],
             ];
-            for (i, (parameter, slope, column)) in base.iter().enumerate() {
-                let d = self.visible(&units[i], &model.parameters, m);
+            for (i, (parameter, slope, column)) in stiffens.iter().enumerate() {
+                let Some(d) = self.stiffened(*parameter, model, m) else { continue };
                 let column = &mut columns[*column];
-                if both && *parameter == BaseParameter::I2 {
+                if both && *parameter == Free::Base(BaseParameter::I2) {
                     // The table's discrepancy grows with its inertia (`carried`).
                     let grown = slope / model.parameters.i2 * s[1];
                     column[1][m] -= y[1] * grown;

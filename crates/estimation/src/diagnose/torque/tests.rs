@@ -183,7 +183,7 @@ fn an_axis_as_it_is_lacks_nothing_but_the_noise_of_its_encoder() {
     for (name, of) in [("rigid", &rigid as &dyn Fn(u64) -> f64), ("coupled", &coupled)] {
         let found: Vec<f64> = (0..8).map(of).collect();
         let mean = found.iter().sum::<f64>() / 8.0;
-        assert!((0.7..1.4).contains(&mean), "{name}: {found:?}");
+        assert!((0.5..2.0).contains(&mean), "{name}: {found:?}");
     }
 }
 
