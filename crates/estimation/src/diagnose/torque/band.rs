@@ -198,7 +198,7 @@ impl Beyond {
 }
 
 /// Value and slope outward, a sample, of a series at its first or last sample: of the parabola through so many at that end.
-fn end(y: &[f64], samples: usize, last: bool) -> [f64; 2] {
+fn tangent(y: &[f64], samples: usize, last: bool) -> [f64; 2] {
     let of = |k: usize| if last { y[y.len() - 1 - k] } else { y[k] };
     let powers = |k: usize| Vector3::new(1.0, k as f64, (k * k) as f64);
     let mut normal = Matrix3::zeros();
@@ -233,7 +233,7 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     // What passes `late` samples late does so with the line that is taken out of it, too.
     let filter =
         |y: &[f64], beyond: Beyond, every: usize, late: f64, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
-            let ends = [end(y, near, false), end(y, near, true)];
+            let ends = [tangent(y, near, false), tangent(y, near, true)];
             let at = |i: isize| -> f64 {
                 let last = n as isize - 1;
                 if i < 0 {

@@ -158,6 +158,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
     let n = record.len();
     let parts = (n / WINDOW).max(LEAST_PARTS).min(n);
     let ranges: Vec<std::ops::Range<usize>> = (0..parts).map(|p| p * n / parts..(p + 1) * n / parts).collect();
+    let weights = band.weights(&fits[2].model);
     let (errors, residuals): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
         .par_iter()
         .map(|fit| {
@@ -168,7 +169,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
             let planner = &mut FftPlanner::new();
             let mut rows = band.torque_residual(&fit.model, &tracked, Some(fit.discrepancy), planner).rows;
             for vibration in any_vibrations(band, &fits[2].model, planner) {
-                vibration.take_out(band, &band.weights(&fits[2].model), fits[2].discrepancy, &mut rows);
+                vibration.take_out(band, &weights, fits[2].discrepancy, &mut rows);
             }
             let series = [0, 1].map(|i| band.in_time(&rows[i]));
             let power = |i: usize, r: &std::ops::Range<usize>| -> f64 {

@@ -197,11 +197,9 @@ fn a_coupling_that_one_encoder_hardly_shows_is_as_likely_as_it_is() {
         let problem = Problem::of(&p.record, &p.band, model, p.peak);
         let of = |f: &Fit| f.log_likelihood + f.log_prior;
         let truth = of(&problem.given(&model).expect("runs"));
-        for (ratio, fit) in
-            [1.06, 1.0 / 1.06].iter().flat_map(|r| problem.held_stiffnesses(*r, [f64::MAX; 2])).enumerate()
-        {
+        for fit in [1.06, 1.0 / 1.06].iter().flat_map(|r| problem.held_stiffnesses(*r, [f64::MAX; 2])) {
             let gained = of(&fit) - truth;
-            assert!(gained < 5.0, "{seed} {ratio}: {} {gained}", fit.model.parameters.k);
+            assert!(gained < 5.0, "{seed}: {} {gained}", fit.model.parameters.k);
         }
     }
 }
@@ -448,8 +446,8 @@ fn inertias_whose_sum_alone_slow_motion_shows_are_told_apart_by_the_little_that_
     let found = o.models[1].parameters;
     let off = [found.i1 / screw.i1, found.i2 / screw.i2, found.k / screw.k].map(|r| (r - 1.0).abs());
     assert!(off.iter().all(|o| *o < 0.03), "{off:?}");
-    // The mean of some 150 squares is 1 within three of its standard deviations, sqrt(2/150).
-    assert!(o.diagnosis.remainder.noise_multiple.powi(2) < 1.35, "{:?}", o.diagnosis.remainder);
+    // The mean of some 150 squares is 1 within two of its standard deviations, sqrt(2/150).
+    assert!(o.diagnosis.remainder.noise_multiple.powi(2) < 1.23, "{:?}", o.diagnosis.remainder);
 }
 
 #[test]
