@@ -18,25 +18,49 @@ fn courses(p: &Probe) -> Vec<(&str, u32)> {
     p.d.variables.iter().filter(kept).take(MOST).map(|v| (v.name.as_str(), v.value_reference)).collect()
 }
 
-/// The course of variables with constant inputs: steps of the sizes given by turns, values after each step.
-fn course(p: &Probe, references: &[u32], sizes: &[f64], count: usize) -> Result<Vec<Vec<f64>>, HostError> {
-    let mut instance = p.instantiate()?;
-    instance.initialize(p.start, None)?;
+/// What the inputs do over a course.
+#[derive(Clone, Copy, PartialEq)]
+enum Inputs {
+    /// They keep their start values.
+    Constant,
+    /// They vary, the same at the same time.
+    Varied,
+}
+
+/// The course of variables: steps of the sizes given by turns, values after each step.
+fn course(
+    p: &Probe,
+    references: &[u32],
+    inputs: Inputs,
+    sizes: &[f64],
+    count: usize,
+) -> Result<Vec<Vec<f64>>, HostError> {
+    let mut instance = match inputs {
+        Inputs::Constant => {
+            let mut instance = p.instantiate()?;
+            instance.initialize(p.start, None)?;
+            instance
+        }
+        Inputs::Varied => p.ready()?,
+    };
     let mut rows = vec![instance.get_real(references)?];
     let whole: f64 = sizes.iter().sum();
     for k in 0..count {
         let turn = k % sizes.len();
         let passed: f64 = sizes[..turn].iter().sum();
         let time = p.start + ((k / sizes.len()) as f64 * whole + passed) * p.step;
+        if inputs == Inputs::Varied {
+            p.drive(&mut instance, time)?;
+        }
         instance.do_step(time, sizes[turn] * p.step)?;
         rows.push(instance.get_real(references)?);
     }
     Ok(rows)
 }
 
-/// As [`course`], for FMUs that refuse such steps, or end before.
+/// As [`course`] with constant inputs, for FMUs that refuse such steps, or end before.
 fn try_course(p: &Probe, references: &[u32], sizes: &[f64], count: usize) -> Result<Vec<Vec<f64>>, super::Stop> {
-    match course(p, references, sizes, count) {
+    match course(p, references, Inputs::Constant, sizes, count) {
         Err(HostError::OnlyOnce) => Err(HostError::OnlyOnce.into()),
         Err(error) => not_tested(format!("the FMU does not take these steps: {error}")),
         Ok(rows) => Ok(rows),
@@ -55,7 +79,7 @@ pub(super) fn two_sizes(p: &Probe, count: usize) -> Result<Courses<'_>, super::S
     // The finest course of the rules on step sizes takes eight times as many steps.
     p.affordable(8 * count)?;
     let whole = try_course(p, &references, &[1.0], count)?;
-    match course(p, &references, &[0.5], 2 * count) {
+    match course(p, &references, Inputs::Constant, &[0.5], 2 * count) {
         Ok(half) => Ok((variables, whole, half)),
         Err(HostError::OnlyOnce) => Err(HostError::OnlyOnce.into()),
         Err(error) => not_tested(format!("the FMU refuses half the step size: {error}")),
@@ -88,18 +112,8 @@ fn skips_calls<'a>(p: &Probe, variables: &[(&'a str, u32)]) -> Option<(&'a str, 
     /// Of the calls that stand still, and of those that do not.
     const FEW: usize = 3;
     let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
-    let driven = |size: f64| -> Result<Vec<Vec<f64>>, HostError> {
-        let mut instance = p.ready()?;
-        let mut rows = vec![instance.get_real(&references)?];
-        for k in 0..CALLS {
-            let time = p.start + k as f64 * size * p.step;
-            p.drive(&mut instance, time)?;
-            instance.do_step(time, size * p.step)?;
-            rows.push(instance.get_real(&references)?);
-        }
-        Ok(rows)
-    };
-    let (whole, half) = (driven(1.0).ok()?, driven(0.5).ok()?);
+    let driven = |size: f64| course(p, &references, Inputs::Varied, &[size], CALLS).ok();
+    let (whole, half) = (driven(1.0)?, driven(0.5)?);
     variables.iter().enumerate().find_map(|(at, (name, _))| {
         let still = |rows: &[Vec<f64>]| -> Vec<usize> {
             (1..=CALLS).filter(|&k| rows[k][at].to_bits() == rows[k - 1][at].to_bits()).collect()
@@ -250,7 +264,7 @@ pub(in super::super) fn variable(p: &Probe) -> Tested {
     let (variables, whole, half) = courses;
     let references: Vec<u32> = variables.iter().map(|v| v.1).collect();
     let quarter = try_course(p, &references, &[0.25], 4 * count)?;
-    let mixed = course(p, &references, &[1.0, 0.5, 0.25, 0.25, 2.0, 0.75, 1.25, 2.0], 8)?;
+    let mixed = course(p, &references, Inputs::Constant, &[1.0, 0.5, 0.25, 0.25, 2.0, 0.75, 1.25, 2.0], 8)?;
     let mut problems = Vec::new();
     for (at, (name, _)) in variables.iter().enumerate() {
         let ends = [&whole, &half, &quarter, &mixed].map(|rows| rows[rows.len() - 1][at]);
