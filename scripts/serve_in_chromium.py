@@ -104,6 +104,7 @@ class Tab:
         wide = await self.value("document.documentElement.scrollWidth")
         assert wide <= width, f"{name}: {wide} pixels wide in a window of {width}"
         if width < 600:
+            await self.value("document.getElementById('printed').open = true")
             said = await self.value("(e => [e.scrollWidth, e.clientWidth])(document.getElementById('said'))")
             assert said[0] <= said[1], f"{name}: what was printed is {said[0]} pixels wide in a box of {said[1]}"
         shot = await self.call("Page.captureScreenshot", captureBeyondViewport=True)
@@ -137,6 +138,11 @@ async def drive(port, address, log, work, pictures):
     # How much the torque's column is, a person knows.
     if await one.value(shown("constant-field")):
         await one.value("document.getElementById('constant').value = 0.5")
+    # A plot tells the value under the pointer, in the column's unit.
+    x, y = await one.value("(s => { s.scrollIntoView({block: 'center'}); const r = s.getBoundingClientRect(); "
+                           "return [r.x + r.width / 2, r.y + r.height / 2] })(document.querySelectorAll('#rows svg')[1])")
+    await one.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    await one.until("/^row \\d+: [−\\d].* A$/.test(document.querySelectorAll('#rows .range')[1].children[1].textContent)", 10)
     for width, dark in ((1280, False), (390, False), (1280, True)):
         await one.picture(pictures, "confirm", width, dark)
     await one.tab_to("document.querySelector('#columns button')")
@@ -164,13 +170,16 @@ async def drive(port, address, log, work, pictures):
     said = await one.value("document.getElementById('said').textContent")
     assert await one.value(shown("results")), said
     print(f"diagnosis: {time.monotonic() - begun:.1f} s")
-    print("\n".join(said.splitlines()[:3]))
+    verdict = await one.value("document.getElementById('verdict').innerText")
+    assert verdict.startswith("The model leaves out"), verdict
+    print(" ".join(verdict.split()))
     for width, dark in ((1280, False), (390, False), (390, True)):
         await one.picture(pictures, "done", width, dark)
     # What the diagnosis of a phone says is not cut.
     await two.call("Emulation.setDeviceMetricsOverride", width=390, height=900, deviceScaleFactor=1, mobile=True)
     await two.value("document.getElementById('run').click()")
     await two.until(shown("results"), 600)
+    await two.value("document.getElementById('printed').open = true")
     box = await two.value("(b => [b.scrollWidth, b.clientWidth])(document.getElementById('said'))")
     assert box[0] <= box[1], f"the box of {box[1]} pixels holds lines of {box[0]}"
     await two.picture(pictures, "phone", 390, False)

@@ -75,12 +75,16 @@
   document.addEventListener("drop", (e) => {
     e.preventDefault();
     $("drop").classList.remove("over");
+    // The field names the log that was dropped, as one that was chosen.
+    if (e.dataTransfer.files.length) $("file").files = e.dataTransfer.files;
     bring(e.dataTransfer.files[0]);
   });
 
   // 2
-  const short = (v) => (v === 0 ? "0" : Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5 ? v.toExponential(2) : String(Number(v.toPrecision(4))));
-  function drawn(points) {
+  const plain = (v) => (v === 0 ? "0" : Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5 ? v.toExponential(2) : String(Number(v.toPrecision(4))));
+  const short = (v) => plain(v).replaceAll("-", "−");
+  // The column over the rows, the value under the pointer told below; `unit` is the field beside it.
+  function drawn(points, unit) {
     const NS = "http://www.w3.org/2000/svg";
     const svg = document.createElementNS(NS, "svg");
     svg.setAttribute("viewBox", "0 0 1000 84");
@@ -94,9 +98,28 @@
     const x = (i) => (1000 * (i - first)) / (last - first || 1);
     const y = (v) => 80 - (76 * (v - low)) / (high - low || 1);
     line.setAttribute("points", points.map(([i, v]) => `${x(i).toFixed(1)},${y(v).toFixed(1)}`).join(" "));
-    svg.append(line);
+    if (low < 0 && high > 0) {
+      const zero = document.createElementNS(NS, "path");
+      zero.setAttribute("d", `M0 ${y(0).toFixed(1)}H1000`);
+      svg.append(zero);
+    }
+    const at = document.createElementNS(NS, "path");
+    svg.append(line, at);
+    const [least, reading, greatest] = [make("span"), make("span"), make("span")];
     const range = make("div", "", { class: "range" });
-    range.append(make("span", `least ${short(low)}`), make("span", `greatest ${short(high)}`));
+    range.append(least, reading, greatest);
+    const value = (v) => `${short(v)} ${unit.value.trim()}`.trim();
+    const told = () => { least.textContent = `least ${value(low)}`; greatest.textContent = `greatest ${value(high)}`; };
+    unit.addEventListener("input", told);
+    told();
+    svg.addEventListener("pointermove", (e) => {
+      const box = svg.getBoundingClientRect();
+      const row = first + ((e.clientX - box.left) / box.width) * (last - first);
+      const [i, v] = points.reduce((a, b) => (Math.abs(b[0] - row) < Math.abs(a[0] - row) ? b : a));
+      reading.textContent = `row ${i + 1}: ${value(v)}`;
+      at.setAttribute("d", `M${x(i).toFixed(1)} 0V84`);
+    });
+    svg.addEventListener("pointerleave", () => { reading.textContent = ""; at.removeAttribute("d"); });
     const box = make("div");
     box.append(svg, range);
     return box;
@@ -123,7 +146,7 @@
       if (!c.sure) choice.append(make("span", "please check", { class: "check" }));
       left.append(choice);
       row.append(left);
-      if (c.points.length) row.append(drawn(c.points));
+      if (c.points.length) row.append(drawn(c.points, unit));
       $("rows").append(row);
       select.addEventListener("change", () => {
         // A signal has one column.
@@ -153,6 +176,7 @@
     show("dt-field", !columns.time);
     const torque = chosen().find((s) => s.value === "T");
     const unit = torque ? document.querySelector(`[data-unit="${torque.dataset.column}"]`).value.trim() : "";
+    $("constant-of").textContent = torque ? unit || `of ${log.columns[torque.dataset.column].name}` : "";
     show("constant-field", Boolean(torque) && !TORQUES.test(unit));
   }
   $("columns").addEventListener("submit", async (e) => {
@@ -249,6 +273,26 @@
     done: "The diagnosis is done.", refused: "No verdict: the record is not to be believed as it is.",
     failed: "The diagnosis could not run.", stopped: "The diagnosis was stopped.",
   };
+  // The head of what was printed: its sentences as one text, its figures by name.
+  function verdict(said) {
+    const box = $("verdict");
+    box.textContent = "";
+    let sentences = "";
+    const figures = make("dl");
+    for (const line of said.split("\n\n")[0].split("\n")) {
+      const pair = line.match(/^ {2}(\S.*?) {2,}(\S.*)$/);
+      if (pair) {
+        const figure = make("div");
+        figure.append(make("dt", pair[1]), make("dd", pair[2]));
+        figures.append(figure);
+      }
+      else sentences += ` ${line.replace(/^[!?i✓] /, "").trim()}`;
+    }
+    const [, first, rest] = sentences.trim().match(/^(.*?[.:])(?: (?=[A-Z])(.*))?$/) || [null, sentences.trim()];
+    box.append(make("p", first, { class: "first" }));
+    if (rest) box.append(make("p", rest));
+    if (figures.childElementCount) box.append(figures);
+  }
   function working(told) {
     const running = told.state === "running";
     const list = $("steps");
@@ -259,6 +303,9 @@
       told.steps.forEach((s, k) => list.append(make("li", s, running && k === told.steps.length - 1 ? { "aria-current": "step" } : {})));
       say(ENDS[told.state] || told.steps[told.steps.length - 1]);
     }
+    // While it runs its steps are what there is to see; then they make room.
+    if ($("course").dataset.state !== told.state) $("course").open = running;
+    $("course").dataset.state = told.state;
     $("clock").textContent = running ? `${told.seconds.toFixed(0)} s so far` : `${ENDS[told.state]} (${told.seconds.toFixed(1)} s)`;
     show("stop", running);
     $("stop").disabled = false;
@@ -266,7 +313,10 @@
     $("said").textContent = told.state === "failed" ? "" : told.said;
     // By it a narrow window sets the size of the letters.
     $("said").style.setProperty("--longest", Math.max(60, ...$("said").textContent.split("\n").map((line) => line.length)));
-    show("said", !running && Boolean($("said").textContent));
+    const printed = !running && Boolean($("said").textContent);
+    show("printed", printed);
+    show("verdict", printed && told.state !== "stopped");
+    if (printed) verdict(told.said);
     problem("work-problem", told.state === "failed" ? told.said.trim() : told.aside ? `The circle could not be drawn: ${told.aside.trim()}` : "");
     show("trust", told.state === "refused");
     if (told.state === "done") results(told.files);
