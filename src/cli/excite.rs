@@ -117,11 +117,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let resolution = 1.0 / (args.samples as f64 * args.dt);
     let harmonic = |k: Option<&crate::identify::excitation::Line>| k.map_or(0.0, |l| l.harmonic as f64 * resolution);
     out_line!(
-        "{}: {} samples at dt = {} s, {} period(s) of {:.6} s",
+        "{}: {} samples at dt = {} s, {} {} of {:.6} s",
         args.output.display(),
         total,
         args.dt,
         args.periods,
+        if args.periods == 1 { "period" } else { "periods" },
         args.samples as f64 * args.dt
     )?;
     out_line!(

@@ -506,23 +506,30 @@ fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
     if made.is_rigid() {
         let _ =
             writeln!(out, "structure = \"rigid\"               # one encoder: the flexible mode is out of its reach");
-        let _ =
-            writeln!(out, "\n[parameters]\n{origin}\nI1 = {}    # {inertia}, motor and all that it moves", four(i1));
+        let _ = writeln!(
+            out,
+            "\n[parameters]\n{origin}\n{:<34} # {inertia}, motor and all that it moves",
+            format!("I1 = {}", four(i1))
+        );
     } else {
         let _ = writeln!(out, "\n[parameters]\n{origin}");
-        let _ = writeln!(out, "I1 = {}    # {inertia}, motor side", four(i1));
-        let _ = writeln!(out, "I2 = {}    # {inertia}, table side", four(i2));
-        let _ = writeln!(out, "B = {}     # {damping}, damping of the coupling", four(b));
-        let _ = writeln!(out, "K = {}     # {stiffness}, stiffness of the coupling", four(k));
+        let _ = writeln!(out, "{:<34} # {inertia}, motor side", format!("I1 = {}", four(i1)));
+        let _ = writeln!(out, "{:<34} # {inertia}, table side", format!("I2 = {}", four(i2)));
+        let _ = writeln!(out, "{:<34} # {damping}, damping of the coupling", format!("B = {}", four(b)));
+        let _ = writeln!(out, "{:<34} # {stiffness}, stiffness of the coupling", format!("K = {}", four(k)));
     }
     if made.of(Signal::X2).is_some() {
         let _ = match rho {
             Some(rho) => writeln!(
                 out,
-                "rho = {}    # m/rad, the lead of the screw over 2*pi, as the log has it: x2 = rho*theta2",
-                four(rho)
+                "{:<34} # m/rad, the lead of the screw over 2*pi, as the log has it: x2 = rho*theta2",
+                format!("rho = {}", four(rho))
             ),
-            None => writeln!(out, "rho = 1.0    # m/rad, the lead of the screw over 2*pi: x2 = rho*theta2. PUT IT IN"),
+            None => writeln!(
+                out,
+                "{:<34} # m/rad, the lead of the screw over 2*pi: x2 = rho*theta2. PUT IT IN",
+                "rho = 1.0"
+            ),
         };
     }
     let _ = writeln!(out, "\n[units]\nmotion = \"{}\"", if linear { "linear" } else { "rotary" });
@@ -532,7 +539,7 @@ fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
             let _ = writeln!(out, "time = {}", entry(time, table, 1.0, &text, ""));
         }
         (None, dt) => {
-            let _ = writeln!(out, "dt = {}                         # s, sampling interval", dt.unwrap_or(1e-3));
+            let _ = writeln!(out, "{:<34} # s, sampling interval", format!("dt = {}", dt.unwrap_or(1e-3)));
         }
     }
     for signal in Signal::ALL {

@@ -53,7 +53,9 @@ pub(super) fn short(plan: &Plan, rows: &[Placed]) -> Vec<Block> {
 fn failures(rows: &[Placed]) -> Option<Table> {
     let mut table = Table::new("Traces that could not be used", ["machine", "trace", "why"]);
     for p in rows.iter().filter(|p| !p.row.done) {
-        table.row(vec![Cell::text(&*p.machine), Cell::text(&*p.row.trace), Cell::text(&*p.row.message)]);
+        // The message begins with the file, which stands beside it.
+        let why = p.row.message.strip_prefix(&format!("{}: ", p.row.trace)).unwrap_or(&p.row.message);
+        table.row(vec![Cell::text(&*p.machine), Cell::text(&*p.row.trace), Cell::text(why)]);
     }
     (!table.rows.is_empty()).then_some(table)
 }
@@ -215,11 +217,8 @@ fn traces(plan: &Plan, rows: &[Placed], trends: &[Trend]) -> Table {
     head.extend(shown(plan).map(|(_, name)| name.to_owned()));
     head.extend(names.iter().map(|n| format!("{n} since the first")));
     let mut table = Table::new("One row a trace, each with its report", head);
-    let firsts: BTreeMap<(&str, &str), f64> = trends
-        .iter()
-        .filter_map(|t| Some(((t.machine, t.parameter.name.as_str()), t.values.first()?.0)))
-        .filter(|(_, first)| *first != 0.0)
-        .collect();
+    let of: BTreeMap<(&str, &str), &Trend> =
+        trends.iter().map(|t| ((t.machine, t.parameter.name.as_str()), t)).collect();
     for p in rows {
         let file = p.item.path.file_name().map_or_else(|| p.row.trace.clone(), |n| n.to_string_lossy().into_owned());
         let mut cells = vec![Cell::text(&*p.machine), link(p, file), date(p)];
@@ -229,8 +228,7 @@ fn traces(plan: &Plan, rows: &[Placed], trends: &[Trend]) -> Table {
         }
         for name in &names {
             let own = p.row.parameters.iter().find(|t| t.name == *name);
-            let first = firsts.get(&(p.machine.as_str(), name));
-            let change = own.zip(first).map(|(t, first)| t.value / first - 1.0);
+            let change = own.zip(of.get(&(p.machine.as_str(), name))).and_then(|(own, trend)| trend.since_first(own));
             cells.push(change.map_or(Cell::Empty, Cell::Percent));
         }
         table.row(cells);

@@ -219,7 +219,8 @@ fn outcome_text(row: &Result<(Row, bool), FleetError>) -> String {
     match row {
         Ok((row, true)) if row.done => "done by an earlier run".to_owned(),
         Ok((row, _)) if row.done => row.facts.first().and_then(Value::as_str).unwrap_or("done").to_owned(),
-        Ok((row, _)) => row.message.clone(),
+        // The line begins with the file, as the message does.
+        Ok((row, _)) => row.message.strip_prefix(&format!("{}: ", row.trace)).unwrap_or(&row.message).to_owned(),
         Err(error) => error.to_string(),
     }
 }

@@ -78,6 +78,13 @@ impl<'a> Trend<'a> {
         (first != 0.0).then(|| last / first - 1.0)
     }
 
+    /// Change of a record's estimate from that of the first record that determined it, relative to that; none where the record did
+    /// not determine it itself.
+    pub fn since_first(&self, own: &Tracked) -> Option<f64> {
+        let first = self.values.first()?.0;
+        (first != 0.0 && self.values.contains(&(own.value, own.std))).then(|| own.value / first - 1.0)
+    }
+
     /// Rise of the line over the period, relative to the mean, and its standard error: from the scatter about the line, and no less
     /// than the estimates' own standard errors make it, as a few records lie on a line by chance. Needs three records.
     pub fn drift(&self) -> Option<(f64, f64)> {

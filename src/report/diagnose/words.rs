@@ -316,6 +316,9 @@ pub fn steps(d: &Diagnosis) -> Vec<String> {
             "Use the model as it is. A gap that this excitation does not show may still be there: repeat with the amplitudes and speeds of the real work."
         }
         Verdict::Parameters => "Put the re-identified parameters into the model.",
+        Verdict::Effect if d.causes.len() > 1 => {
+            "Put the effects into the model: the table above has their parameters for [effects] of axis.toml."
+        }
         Verdict::Effect => {
             "Put the effect into the model: the table above has its parameters for [effects] of axis.toml."
         }

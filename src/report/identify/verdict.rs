@@ -27,9 +27,11 @@ pub fn verdict(found: &Identification) -> Verdict {
             )
         }
         Some(o) => format!(
-            "{} identifies the axis: its simulation follows every output to {} or better ({} the least).",
+            "{} identifies the axis: its simulation follows every output to {}{} ({} the least).",
             best.title,
             fit_percent(o.fit_percent),
+            // ">99.99 %" says by itself that it is a bound.
+            if fit_percent(o.fit_percent).starts_with('>') { "" } else { " or better" },
             o.signal.name()
         ),
         None => format!("{} identifies the axis.", best.title),
