@@ -23,7 +23,7 @@ use crate::identify::result::{Estimate, Identification};
 use crate::identify::run::{Method, Request, identify_joined};
 use crate::identify::stream;
 use crate::report::driven::Driven;
-use crate::report::{Block, Cell, Table, terminal};
+use crate::report::{Block, terminal};
 use crate::trace::stream::Stream;
 use crate::trace::{Hold, Loaded, Machine, Signal, Trace, load_pieces, write_text};
 
@@ -376,16 +376,7 @@ fn blocks(result: &Identification) -> Vec<Block> {
 
 fn paper_tables(json: Option<&Path>) -> anyhow::Result<ExitCode> {
     let tables = crate::identify::tables::reproduce()?;
-    let mut blocks = Vec::new();
-    for t in &tables.tables {
-        let mut table = Table::new(format!("Table {}. {}", t.number, t.title), t.columns.clone());
-        for row in &t.rows {
-            table.row(row.iter().map(|c| Cell::text(c.clone())).collect());
-        }
-        blocks.push(Block::Table(table));
-        blocks.push(Block::Paragraph(t.verdict.clone()));
-    }
-    blocks.extend(tables.words.iter().cloned().map(Block::Paragraph));
+    let blocks = crate::report::demo::tables(&tables);
     out!("{}", terminal::blocks(&blocks, terminal::Layout { colour: false, ..super::stdout::layout(120) }))?;
     if let Some(path) = json {
         write_text(path, &serde_json::to_vec_pretty(&tables)?)?;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::chart::{Axis, Chart, Colour, Dash, Series};
+use super::chart::{Axis, Chart, Colour, DEGREES, Dash, Series};
 use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
@@ -75,7 +75,7 @@ const fn way(clockwise: bool) -> &'static str {
 }
 
 /// What belongs to the size, in words.
-fn detail(e: &Effect, turns: &[Turn]) -> String {
+fn detail(e: &Effect, turns: &[Turn], medium: Medium) -> String {
     let um = |m: f64| format::number(millionths(m), 3, Medium::Page);
     if e.size.abs() < SHOWN && e.ends.is_none() {
         return "none".to_owned();
@@ -95,7 +95,9 @@ fn detail(e: &Effect, turns: &[Turn]) -> String {
             let each = turns.iter().zip(&e.heights).map(|(t, h)| {
                 let [a, b] = quarters.map(|q| um(h[q]));
                 let name = axis.name();
-                format!("{} +{name} {a}, −{name} {b}", if t.clockwise { "cw" } else { "ccw" })
+                // A height stays on the line of its reversal.
+                let gap = format::space(medium);
+                format!("{} +{name}{gap}{a}, −{name}{gap}{b}", if t.clockwise { "cw" } else { "ccw" })
             });
             format!("height: {} µm", each.collect::<Vec<_>>().join("; "))
         }
@@ -124,8 +126,10 @@ fn detail(e: &Effect, turns: &[Turn]) -> String {
 #[must_use]
 pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table {
     let mut columns = vec!["deviation", "size", "±", "takes", "share", "X and Y"];
-    // A terminal has no room for the errors beside what they belong to.
-    if medium == Medium::Terminal {
+    // A terminal has no room for the errors beside what they belong to; a simulation has none.
+    let error = |e: &Effect| e.error.filter(|error| *error >= SHOWN);
+    let plain = medium == Medium::Terminal || !a.effects.iter().any(|e| error(e).is_some());
+    if plain {
         columns.retain(|c| *c != "±");
     }
     if model.is_some() {
@@ -142,9 +146,7 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table 
         let mut cells = vec![
             Cell::text(e.kind.name()),
             size(e),
-            e.error.map_or(Cell::Empty, |error| {
-                if error < SHOWN { Cell::Empty } else { size(&Effect { size: error, ..e.clone() }) }
-            }),
+            error(e).map_or(Cell::Empty, |error| size(&Effect { size: error, ..e.clone() })),
             micro(e.contribution),
             if a.circularity > 0.0 { Cell::Bar((e.contribution / a.circularity).max(0.0)) } else { Cell::Empty },
             e.pair.filter(|_| e.size.abs() >= SHOWN).map_or(Cell::Empty, micro),
@@ -159,10 +161,10 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table 
             };
             cells.push(model.effects.iter().find(same).map_or(Cell::Empty, size));
         }
-        if medium == Medium::Terminal {
+        if plain {
             cells.remove(2);
         }
-        cells.push(Cell::Text(detail(e, &a.turns)));
+        cells.push(Cell::Text(detail(e, &a.turns, medium)));
         if told.is_empty() && e.weight() > 0.0 {
             table.strong_row(cells)
         } else {
@@ -305,7 +307,7 @@ pub(super) fn unrolled(a: &Analysis) -> Vec<Figure> {
         let (degrees, d, m) = (column(|o| o.0), column(|o| o.1), column(|o| o.2));
         let chart = Chart::new(
             capital(way(turn.clockwise)),
-            Axis::linear("angle", "°").over(super::Range::Fixed(0.0, 360.0)),
+            Axis::linear("angle", "°").over(super::Range::Fixed(0.0, 360.0)).by(&DEGREES),
             Axis::linear("deviation", "m").over(range),
         )
         .with(Series::line("trace", degrees.clone(), d).in_colour(Colour::Ink).with_dash(Dash::Broad))

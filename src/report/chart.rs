@@ -52,12 +52,14 @@ pub struct Axis {
     pub log: bool,
     /// Limits.
     pub range: Range,
+    /// Steps between ticks, the finest first, that are asked before those of 1, 2 and 5 times a power of ten.
+    pub steps: &'static [f64],
 }
 
 impl Axis {
     /// A linear axis over all the data.
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { label: label.into(), unit: unit.into(), log: false, range: Range::Auto }
+        Self { label: label.into(), unit: unit.into(), log: false, range: Range::Auto, steps: &[] }
     }
 
     /// A logarithmic axis over all the data.
@@ -71,7 +73,17 @@ impl Axis {
         self.range = range;
         self
     }
+
+    /// The same axis with ticks at multiples of one of these steps, the finest first, where one of them suits what is shown.
+    #[must_use]
+    pub fn by(mut self, steps: &'static [f64]) -> Self {
+        self.steps = steps;
+        self
+    }
 }
+
+/// Steps of an axis of angles in degrees: the reversals of an axis, at right angles, are among the ticks.
+pub const DEGREES: [f64; 4] = [15.0, 30.0, 45.0, 90.0];
 
 /// Limits of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::ballbar::{self, micro};
-use super::chart::{Axis, Chart, Colour, Dash, Series, When};
+use super::chart::{Axis, Chart, Colour, DEGREES, Dash, Range, Series, When};
 use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace, Ring};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
@@ -85,8 +85,11 @@ impl Findings {
 #[must_use]
 pub fn report(f: &Findings) -> Report {
     let radius = f.test.radius;
-    let mut unrolled =
-        Chart::new("Radial deviation over the angle", Axis::linear("angle", "°"), Axis::linear("deviation", "m"));
+    let mut unrolled = Chart::new(
+        "Radial deviation over the angle",
+        Axis::linear("angle", "°").over(Range::Fixed(0.0, 360.0)).by(&DEGREES),
+        Axis::linear("deviation", "m"),
+    );
     for (k, run) in f.runs.iter().enumerate() {
         let (angle, deviation) = deviations(&run.paths[0], radius);
         let last = k + 1 == f.runs.len();

@@ -131,12 +131,26 @@ pub fn tables(tables: &PaperTables) -> Vec<Block> {
     for t in &tables.tables {
         let mut table = Table::new(format!("Table {}. {}", t.number, t.title), t.columns.clone());
         for row in &t.rows {
-            table.row(row.iter().map(|c| Cell::text(&**c)).collect());
+            table.row(row.iter().zip(&t.columns).map(|(text, column)| paper_cell(text, column)).collect());
         }
         blocks.push(Block::Table(table));
         blocks.push(Block::Paragraph(t.verdict.clone()));
     }
     blocks
+}
+
+/// A cell of the paper's tables: its figures with the digits that they have, so that all numbers of a page are written alike.
+fn paper_cell(text: &str, column: &str) -> Cell {
+    match text.parse::<f64>() {
+        // The unit of a number without one.
+        Ok(_) if column == "unit" => Cell::Empty,
+        Ok(value) => {
+            let mantissa = text.split(['e', 'E']).next().unwrap_or(text);
+            let digits = mantissa.trim_start_matches(['+', '-', '0', '.']).chars().filter(char::is_ascii_digit).count();
+            Cell::Number(value, digits.max(1), String::new())
+        }
+        Err(_) => Cell::text(text),
+    }
 }
 
 /// Largest error of the four parameters, as a share.
@@ -174,4 +188,30 @@ fn experiment(f: &Findings) -> Vec<(String, Cell)> {
         ("lines of the excitation".to_owned(), Cell::Count(f.lines as u64)),
         ("crest factor".to_owned(), Cell::number(f.crest_factor)),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::format::{Medium, cell};
+
+    #[test]
+    fn figures_of_the_paper_keep_their_digits_and_are_written_as_all_others() {
+        let written = |text: &str| cell(&paper_cell(text, "paper"), Medium::Page);
+        let cases = [
+            ("2.0480e3", "2048.0"),
+            ("5.88e+1", "58.8"),
+            ("1.14e-14", "1.14×10⁻¹⁴"),
+            ("2.3700e-4", "2.3700×10⁻⁴"),
+            ("0.00e0", "0"),
+            ("-0.042", "−0.042"),
+            ("+0.368", "0.368"),
+            ("I2 = Mm*rho*psi", "I2 = Mm*rho*psi"),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(written(text), expected);
+        }
+        assert_eq!(paper_cell("1", "unit"), Cell::Empty);
+        assert_eq!(cell(&paper_cell("kg.m2", "unit"), Medium::Page), "kg·m²");
+    }
 }

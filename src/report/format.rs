@@ -49,8 +49,8 @@ pub fn estimate(value: f64, std: f64, medium: Medium) -> String {
     };
     let common = if value == 0.0 { exponent_of(std) } else { exponent_of(value.abs().max(std)) };
     let last = exponent_of(std) - 1;
-    // A standard error in the tenth digit is that of rounding: it says nothing of the machine.
-    if common - last > 9 {
+    // A standard error beyond the digits that are printed without one is that of rounding: it says nothing of the machine.
+    if common - last > 7 {
         return number(value, 7, medium);
     }
     if (-2..6).contains(&common) {
@@ -109,7 +109,7 @@ fn with_unit(value: String, unit: &str, medium: Medium) -> String {
 }
 
 /// A value and its unit stay on one line.
-fn space(medium: Medium) -> char {
+pub(super) fn space(medium: Medium) -> char {
     match medium {
         Medium::Page => '\u{a0}',
         Medium::Terminal => ' ',
@@ -283,6 +283,8 @@ mod tests {
             (1.0, f64::NAN, "1.0000"),
             (1.0, 0.0, "1.0000"),
             (1.0, 1e-30, "1.000000"),
+            (54.532259, 2.1e-5, "54.532259 ± 0.000021"),
+            (54.532259, 2.1e-6, "54.53226"),
         ];
         for (value, std, expected) in cases {
             assert_eq!(estimate(value, std, Terminal), expected);

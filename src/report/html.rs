@@ -170,7 +170,7 @@ fn table(t: &Table) -> Markup {
                     @for r in &t.rows {
                         tr class=[r.strong.then_some("strong")] {
                             @for (c, cell) in r.cells.iter().enumerate() {
-                                td class=[class(c)] data-head=[t.columns.get(c).map(|n| heading(n))] { (cell_markup(cell)) }
+                                td class=[class(c).or(short(cell))] data-head=[t.columns.get(c).map(|n| heading(n))] { (cell_markup(cell)) }
                             }
                         }
                     }
@@ -178,6 +178,12 @@ fn table(t: &Table) -> Markup {
             }
         }
     }
+}
+
+/// Words as short as a date or an effect's name are not cut within, however narrow the page.
+fn short(cell: &Cell) -> Option<&'static str> {
+    let brief = |text: &str| text.chars().count() <= 16 && !text.is_empty();
+    matches!(cell, Cell::Text(text) | Cell::Link(text, _) if brief(text)).then_some("short")
 }
 
 /// A sentence of the page.

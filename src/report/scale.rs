@@ -113,7 +113,9 @@ impl Scale {
         (low, high) = (low - margin, high + margin);
         let ends = |step: f64| ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
         // Two ticks are the least that show a scale.
-        let steps = (wanted.max(1)..).map(|n| nice_step((high - low) / n as f64));
+        let room = (high - low) / wanted.max(1) as f64;
+        let own = axis.steps.iter().copied().find(|s| *s >= room * (1.0 - 1e-9));
+        let steps = own.into_iter().chain((wanted.max(1)..).map(|n| nice_step((high - low) / n as f64)));
         let step = steps.take(8).find(|s| ends(*s).1 > ends(*s).0).unwrap_or((high - low) / 4.0);
         let (first, last) = ends(step);
         let values: Vec<f64> = (first..=last.min(first + 50)).map(|i| i as f64 * step).collect();

@@ -123,12 +123,19 @@ fn by_section(v: &Validation) -> Section {
     let blocks = names.into_iter().map(|section| {
         let rules: Vec<_> = v.rules.iter().filter(|(rule, _)| of(v, rule) == section).collect();
         let found = rules.iter().filter(|(_, verdict)| *verdict == Result::Failed).count();
-        let mut table = Table::new("", ["rule", "what holds when it passes", "verdict", "why"]);
-        for (rule, verdict) in &rules {
-            let (word, why) = words(rule, verdict);
-            table.row(vec![Cell::text(rule.id), Cell::text(rule.title(v.fmi)), Cell::text(word), Cell::text(why)]);
+        let told: Vec<_> = rules.iter().map(|(rule, verdict)| (rule, words(rule, verdict))).collect();
+        let explained = told.iter().any(|(_, (_, why))| !why.is_empty());
+        let mut columns = vec!["rule", "what holds when it passes", "verdict"];
+        columns.extend(explained.then_some("why"));
+        let mut table = Table::new("", columns);
+        for (rule, (word, why)) in told {
+            let mut cells = vec![Cell::text(rule.id), Cell::text(rule.title(v.fmi)), Cell::text(word)];
+            cells.extend(explained.then(|| Cell::text(why)));
+            table.row(cells);
         }
-        let label = format!("Section {section}: {} rules, {found} with findings", rules.len());
+        let of_all = if rules.len() == 1 { "1 rule".to_owned() } else { format!("{} rules", rules.len()) };
+        let failed = if found == 0 { "no findings".to_owned() } else { format!("{found} with findings") };
+        let label = format!("Section {section}: {of_all}, {failed}");
         Block::Details(label, vec![Block::Table(table)])
     });
     Section::new(format!("Rules by section of {}", v.fmi.standard()), blocks.collect())

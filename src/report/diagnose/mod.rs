@@ -142,7 +142,7 @@ fn how_far(f: &Findings) -> Vec<Block> {
 fn which(d: &Diagnosis) -> Vec<Block> {
     let mut chart = Chart::new(
         "Noise-scaled error of each cause",
-        Axis::linear("place in the ranking", ""),
+        Axis::linear("place in the ranking", "").by(&[1.0]),
         Axis::log("chi2 a sample", ""),
     );
     let chi2: Vec<f64> = d.ranking.iter().map(|h| h.chi2).collect();

@@ -2,7 +2,6 @@
 
 use super::{has_estimates, has_reference};
 use crate::identify::result::{Estimate, Identification, MethodResult};
-use crate::report::format::{self, Medium};
 use crate::report::{Block, Cell, Table};
 
 /// Whether an estimate is one: finite, and larger than its standard error.
@@ -74,11 +73,7 @@ fn matrix(found: &Identification, caption: &str, units: bool, cell: impl Fn(&Est
     let methods: Vec<&MethodResult> = found.methods.iter().filter(|m| m.failure.is_none()).collect();
     let mut table = Table::new(caption, std::iter::once("parameter").chain(methods.iter().map(|m| m.method)));
     for (name, unit) in names(found) {
-        let label = if units && !unit.is_empty() && unit != "1" {
-            format!("{name} [{}]", format::unit(unit, Medium::Page))
-        } else {
-            name.to_owned()
-        };
+        let label = if units && !unit.is_empty() && unit != "1" { format!("{name} [{unit}]") } else { name.to_owned() };
         let mut cells = vec![Cell::Text(label)];
         cells.extend(
             methods

@@ -110,8 +110,8 @@ pub fn measured_and_simulated(found: &Identification, record: Option<&Joined>) -
         )
         .with(Series::line("measured", time.clone(), measured).in_colour(Colour::Ink).with_dash(Dash::Broad))
         .with(Series::line(format!("simulated with {}", best.title), time, simulated).in_colour(Colour::Blue));
-        let per = format::number(o.fit_percent, 4, Medium::Page);
-        Some(Figure::new(chart, format!("Fit {per} %: how much of the deviation from the mean is followed.")))
+        let share = format::percent(o.fit_percent / 100.0, Medium::Page);
+        Some(Figure::new(chart, format!("Fit {share}: how much of the deviation from the mean is followed.")))
     };
     let figures: Vec<Figure> = best.outputs.iter().filter_map(figure).take(DRAWN).collect();
     match figures.len() {
