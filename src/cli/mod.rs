@@ -6,6 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::fmu::isolation;
+
 /// Could not run: bad input, unreadable file, unwritable output.
 pub const COULD_NOT_RUN: u8 = 2;
 /// The command ran and has findings to report.
@@ -114,11 +116,15 @@ commands! {
 /// Parses the arguments, runs the command, prints an error with its causes, and gives the exit code.
 #[must_use]
 pub fn main() -> ExitCode {
+    outputs::survive_limits();
+    // A validation starts one child for each rule: they have no use for the parser of the command line.
+    if std::env::args_os().skip(1).eq(isolation::CHILD) {
+        return isolation::child();
+    }
     let cli = Cli::parse();
     if cli.quiet {
         stdout::be_quiet();
     }
-    outputs::survive_limits();
     match cli.command.run() {
         Ok(code) => code,
         Err(error) => {

@@ -52,7 +52,7 @@ Examples:
   eixo validate model.fmu --reference model_ref.csv --report validation.html")]
 pub struct Args {
     /// The FMU
-    #[arg(required_unless_present_any = ["rules", "child"])]
+    #[arg(required_unless_present = "rules")]
     fmu: Option<PathBuf>,
     /// Form of the report
     #[arg(long, value_enum, default_value_t = Format::Text)]
@@ -111,9 +111,6 @@ pub struct Args {
     /// Write the report as a page, with plots
     #[arg(long, value_name = "HTML")]
     report: Option<PathBuf>,
-    /// Do a job for a parent process, which comes through standard input
-    #[arg(long, hide = true)]
-    child: bool,
 }
 
 /// Runs the command.
@@ -121,9 +118,6 @@ pub struct Args {
 /// # Errors
 /// When the file cannot be read, a rule does not exist, or the report cannot be written.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if args.child {
-        return Ok(isolation::child());
-    }
     if args.rules {
         let text = match args.format {
             Format::Text => output::rules_text(),

@@ -126,7 +126,7 @@ mod linux {
     };
     use seccompiler::{
         BpfProgram, SeccompAction, SeccompCmpArgLen as Len, SeccompCmpOp as Op, SeccompCondition, SeccompFilter,
-        SeccompRule,
+        SeccompRule, sock_filter,
     };
 
     use super::{Fence, Strength};
@@ -206,7 +206,7 @@ mod linux {
         let programs = [
             filter(absent(), SeccompAction::Errno(libc::ENOSYS as u32)),
             filter(quiet, SeccompAction::Errno(libc::EPERM as u32)),
-            filter(trapped, action),
+            filter(trapped, action.clone()).map(|program| [x32(action), program].concat()),
         ];
         programs.iter().all(|p| p.as_ref().is_some_and(|p| seccompiler::apply_filter(p).is_ok()))
     }
@@ -222,7 +222,7 @@ mod linux {
 
     /// Calls that look as if the kernel had not got them; the C library has another way.
     fn absent() -> Rules {
-        with_twins(always(&[libc::SYS_clone3, libc::SYS_memfd_create, libc::SYS_io_uring_setup]))
+        always(&[libc::SYS_clone3, libc::SYS_memfd_create, libc::SYS_io_uring_setup])
     }
 
     /// Calls whatever their arguments.
@@ -244,13 +244,21 @@ mod linux {
         [(argument, Op::Ne, u64::from(std::process::id())), (argument, Op::Ne, 0)]
     }
 
-    /// Adds the 32-bit pointers' twin of each call on x86-64 (x32), which has the same number with this bit.
-    fn with_twins(mut rules: Rules) -> Rules {
-        #[cfg(target_arch = "x86_64")]
-        for call in rules.keys().copied().collect::<Vec<_>>() {
-            rules.insert(call | 0x4000_0000, vec![]);
+    /// The head of a filter that refuses every call with 32-bit pointers (x32): on x86-64 those have numbers with this bit, some
+    /// of their own, and no library for x86-64 makes one. By one test, as the kernel tries a new filter on every number.
+    fn x32(action: SeccompAction) -> BpfProgram {
+        /// `__X32_SYSCALL_BIT`, asm/unistd.h.
+        const BIT: u32 = 0x4000_0000;
+        if !cfg!(target_arch = "x86_64") {
+            return vec![];
         }
-        rules
+        let step = |code: u32, jf: u8, k: u32| sock_filter { code: code as u16, jt: 0, jf, k };
+        // The number is the first field of `seccomp_data`.
+        vec![
+            step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0),
+            step(libc::BPF_JMP | libc::BPF_JSET | libc::BPF_K, 1, BIT),
+            step(libc::BPF_RET | libc::BPF_K, 0, action.into()),
+        ]
     }
 
     /// That an argument is the number of an older process, or of the parent: two ways. A thread of this one has a number above
@@ -318,7 +326,7 @@ mod linux {
         for call in scheduling {
             rules.insert(call, elders(0).iter().map(|way| when(way)).collect::<seccompiler::Result<_>>()?);
         }
-        Ok(with_twins(rules))
+        Ok(rules)
     }
 
     /// Calls that are refused, and told.
@@ -400,7 +408,7 @@ mod linux {
         rules.insert(libc::SYS_fcntl, vec![when(&owner)?, when(&[(1, Op::Eq, F_SETOWN_EX)])?]);
         let control = [FIOSETOWN, SIOCSPGRP, TIOCSTI].map(|what| when(&[(1, Op::Eq, what)]));
         rules.insert(libc::SYS_ioctl, control.into_iter().collect::<seccompiler::Result<_>>()?);
-        Ok(with_twins(rules))
+        Ok(rules)
     }
 
     static REFUSED: AtomicPtr<AtomicU32> = AtomicPtr::new(std::ptr::null_mut());

@@ -40,7 +40,7 @@ pub(super) fn run(place: &Place<'_>, job: Job) -> io::Result<Outcome> {
     let watched: Vec<_> = fence.iter().flat_map(|f| f.write.iter().cloned()).collect();
     let (ours, theirs) = UnixStream::pair()?;
     let mut command = Command::new(place.program);
-    command.args(["validate", "--child"]).current_dir(&workplace);
+    command.args(super::CHILD).current_dir(&workplace);
     command.stdin(Stdio::from(OwnedFd::from(theirs))).stdout(Stdio::piped()).stderr(Stdio::piped());
     if place.fence.is_some() {
         command.env("TMPDIR", &private);
