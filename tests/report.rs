@@ -195,12 +195,12 @@ fn example(samples: usize, name: &str) -> Report {
                             ("probability".into(), Cell::Percent(0.9991)),
                         ],
                     }),
-                    Block::Figure(Figure::new(chain(), "Share of the gap at each place.")),
+                    Block::figure(Figure::new(chain(), "Share of the gap at each place.")),
                 ],
             ),
             Section::new(
                 "How far the gap shrinks",
-                vec![Block::Figure(Figure::new(long_chart(samples, name), "Three model runs on data that no fit has seen."))],
+                vec![Block::figure(Figure::new(long_chart(samples, name), "Three model runs on data that no fit has seen."))],
             ),
             Section::new("Where", vec![Block::Warning(format!("One encoder only: {name}")), Block::Figures(figures())]),
             Section::new(
@@ -328,7 +328,7 @@ fn a_reference_line_is_named_in_the_legend_and_only_far_off_in_the_plot() {
         let chart = Chart::new("t", Axis::linear("x", ""), Axis::linear("y", ""))
             .with(Series::line("data", vec![0.0, 1.0], vec![-1.0, 1.0]))
             .mark(Mark::Y(at, "the noise".into()));
-        let sections = vec![Section::new("", vec![Block::Figure(Figure::new(chart, ""))])];
+        let sections = vec![Section::new("", vec![Block::figure(Figure::new(chart, ""))])];
         html::page(&Report { sections, ..Report::default() })
     };
     let page = drawn(0.5);
@@ -350,7 +350,7 @@ fn a_figure_that_is_alone_in_its_row_is_drawn_for_the_whole_width() {
     let page =
         |block: Block| html::page(&Report { sections: vec![Section::new("", vec![block])], ..Report::default() });
     let figure = Figure::new(chart, "");
-    assert_eq!(page(Block::Figures(vec![figure.clone()])), page(Block::Figure(figure)));
+    assert_eq!(page(Block::Figures(vec![figure.clone()])), page(Block::figure(figure)));
 }
 
 #[test]

@@ -324,7 +324,7 @@ pub fn report(f: &Findings) -> Report {
         "",
         vec![
             Block::Verdict(verdict(f)),
-            Block::Figure(Figure::new(
+            Block::figure(Figure::new(
                 polar(f),
                 "About the least-squares centre of all turns. Grey: the nominal circle.",
             )),

@@ -115,7 +115,7 @@ pub fn report(f: &Findings) -> Report {
         vec![
             Block::Verdict(verdict(f)),
             Block::Figures(polars.collect()),
-            Block::Figure(Figure::new(unrolled, format!("Turning {}.", f.directions()[0]))),
+            Block::figure(Figure::new(unrolled, format!("Turning {}.", f.directions()[0]))),
         ],
     )];
     if !f.without.is_empty() {

@@ -242,7 +242,7 @@ mod tests {
         );
         let blocks = vec![Block::Details(
             "the torque".into(),
-            vec![Block::Table(table), Block::Figure(Figure::new(chart, "a torque"))],
+            vec![Block::Table(table), Block::figure(Figure::new(chart, "a torque"))],
         )];
         let text = format!("{:?}", driven.blocks(blocks));
         assert!(!text.contains("torque") && !text.contains("kg") && text.contains("A.s2/m"), "{text}");

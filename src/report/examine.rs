@@ -145,7 +145,7 @@ pub fn report(seen: &Inspected<'_>) -> Report {
     top.extend(findings(seen.examination));
     top.extend(pieces(seen));
     let sections =
-        vec![Section::new("", top), Section::new("The record", figures.into_iter().map(Block::Figure).collect())];
+        vec![Section::new("", top), Section::new("The record", figures.into_iter().map(Block::figure).collect())];
     Report {
         title: "Inspection of a record".to_owned(),
         subject: format!(

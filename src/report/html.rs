@@ -111,7 +111,7 @@ fn block(block: &Block) -> Markup {
         Block::Table(t) => table(t),
         Block::Figure(f) => html! { div class="full" { (figure(f, Size { width: 1040.0, height: 330.0 })) } },
         // One alone has the whole width, and is drawn for it: scaled up, its letters were twice those of the page.
-        Block::Figures(all) if all.len() == 1 => html! { @for f in all { (self::block(&Block::Figure(f.clone()))) } },
+        Block::Figures(all) if all.len() == 1 => html! { @for f in all { (self::block(&Block::figure(f.clone()))) } },
         Block::Figures(all) => {
             html! { div class="grid2" { @for f in all { (figure(f, Size { width: 510.0, height: 310.0 })) } } }
         }

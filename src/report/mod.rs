@@ -72,11 +72,19 @@ pub enum Block {
     /// A table.
     Table(Table),
     /// One figure over the full width.
-    Figure(Figure),
+    Figure(Box<Figure>),
     /// Figures side by side where the page is wide enough.
     Figures(Vec<Figure>),
     /// Blocks folded away on the screen and open in print; the text is the fold's label.
     Details(String, Vec<Block>),
+}
+
+impl Block {
+    /// One figure over the full width.
+    #[must_use]
+    pub fn figure(figure: Figure) -> Self {
+        Self::Figure(Box::new(figure))
+    }
 }
 
 /// How an answer is to be taken. Never carried by the colour alone: each has its own sign.

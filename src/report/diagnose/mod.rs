@@ -42,7 +42,7 @@ pub struct Findings<'a> {
 pub fn report(f: &Findings) -> Report {
     let d = f.diagnosis;
     let mut top = vec![Block::Verdict(verdict(d))];
-    top.push(Block::Figure(Figure::new(chain(d), words::gap_shows(&d.location.shown, Some(f.motion)))));
+    top.push(Block::figure(Figure::new(chain(d), words::gap_shows(&d.location.shown, Some(f.motion)))));
     // Behind the picture: a log has several of them, and the answer comes first.
     top.extend(f.warnings.iter().cloned().chain(words::warnings(d, Some(f.motion))).map(Block::Warning));
     let mut sections = vec![Section::new("", top)];
@@ -156,6 +156,6 @@ fn which(d: &Diagnosis) -> Vec<Block> {
                 .to_owned(),
         ),
         Block::Table(tables::ranking(d, usize::MAX)),
-        Block::Figure(Figure::new(chart, "The nearer to the noise, the more of the gap the cause explains.")),
+        Block::figure(Figure::new(chart, "The nearer to the noise, the more of the gap the cause explains.")),
     ]
 }

@@ -68,7 +68,7 @@ pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: Moti
         }
     };
     vec![
-        Block::Figure(Figure::new(chart, caption)),
+        Block::figure(Figure::new(chart, caption)),
         Block::Figures(vec![Figure::new(both, ""), Figure::new(remainder, "")]),
     ]
 }

@@ -22,7 +22,7 @@ pub fn excitation(found: &Identification) -> Vec<Block> {
     let torque =
         Chart::new("Excitation", Axis::linear("time", found.torque.x_unit), Axis::linear("T", found.torque.y_unit))
             .with(line("", &found.torque).in_colour(Colour::Ink));
-    let mut blocks = vec![Block::Figure(Figure::new(torque, ""))];
+    let mut blocks = vec![Block::figure(Figure::new(torque, ""))];
     let measured = line("measured", &found.torque_spectrum).in_colour(Colour::Ink);
     let spectrum = |title: &str| {
         let unit = found.torque_spectrum.y_unit;

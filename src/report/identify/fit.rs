@@ -116,7 +116,7 @@ pub fn measured_and_simulated(found: &Identification, record: Option<&Joined>) -
     let figures: Vec<Figure> = best.outputs.iter().filter_map(figure).take(DRAWN).collect();
     match figures.len() {
         0 => None,
-        1 => figures.into_iter().next().map(Block::Figure),
+        1 => figures.into_iter().next().map(Block::figure),
         _ => Some(Block::Figures(figures)),
     }
 }
