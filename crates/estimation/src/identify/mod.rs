@@ -1,7 +1,6 @@
 //! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
 
 mod assessment;
-mod bridged;
 pub mod excitation;
 pub mod extended;
 pub mod frequency;
@@ -27,7 +26,5 @@ pub mod statistics;
 pub mod stream;
 pub mod tables;
 
-#[cfg(test)]
-mod coverage;
 #[cfg(test)]
 mod tests;
