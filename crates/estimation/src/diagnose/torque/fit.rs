@@ -104,6 +104,8 @@ pub struct Problem<'a> {
     /// Spectra of the measured motion; `None` where it is not measured whole.
     motion: Option<Arc<Motion>>,
     resolution: Resolution,
+    /// Whether the axis' own parameters stay at what a model begins with.
+    holds_parameters: bool,
     /// Steps simulated so far.
     steps: Arc<AtomicU64>,
 }
@@ -134,6 +136,7 @@ impl<'a> Problem<'a> {
             scales: None,
             motion: band.motion(record).map(Arc::new),
             resolution: Resolution::Full,
+            holds_parameters: false,
             steps: Arc::default(),
         }
     }
@@ -144,6 +147,12 @@ impl Problem<'_> {
     #[must_use]
     pub fn coarse(&self) -> Self {
         Self { resolution: Resolution::Coarse, ..self.clone() }
+    }
+
+    /// The same with the axis' own parameters held.
+    #[must_use]
+    pub fn with_parameters_held(&self) -> Self {
+        Self { holds_parameters: true, ..self.clone() }
     }
 
     /// Steps simulated so far: of all that runs side by side only once it has ended the same on any number of threads.
@@ -163,7 +172,7 @@ impl Problem<'_> {
     }
 
     pub fn free(&self, terms: &[Term]) -> Vec<Free> {
-        let mut free = self.base();
+        let mut free = if self.holds_parameters { Vec::new() } else { self.base() };
         for (e, v) in terms {
             free.extend(e.info().variants[*v].free.iter().map(|i| Free::Effect(*e, *i)));
             free.extend(e.loops().then_some(Free::Loop(*e)));
@@ -347,7 +356,7 @@ impl Problem<'_> {
 
     /// Whether physics lets the effects be what they are in a model.
     pub fn admits(&self, model: &Model, terms: &[Term]) -> bool {
-        self.scales.as_ref().is_none_or(|s| s.admit(model, terms.iter().map(|t| t.0)))
+        self.scales.as_ref().is_none_or(|s| s.admit(self.record, model, terms.iter().map(|t| t.0)))
     }
 
     /// A model along the record, and the discrepancy that it leaves.

@@ -12,6 +12,8 @@ const MATERIAL: f64 = 0.25;
 const FIRST: f64 = 0.1;
 /// Share of the gap's variance below which an effect is no main cause: a twentieth of its torque.
 pub const MINOR: f64 = 0.0025;
+/// Share of what was left below which a cause explains next to all of that: then it is one, however small beside the gap.
+const NEXT_TO_ALL: f64 = 0.03;
 /// Share of the torque that a gap must have for causes to be looked for in it: drives measure their current no better. A coupling with an
 /// encoder on each side shows less of it in its twist.
 pub const NEGLIGIBLE: f64 = 2e-3;
@@ -66,9 +68,11 @@ impl Search<'_> {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
         let explained = [0, 1].map(|i| (before[i] - after[i]).max(0.0));
+        let is_next_to_all = |i: usize| after[i] <= NEXT_TO_ALL * before[i];
         self.band().torque_rms(explained) >= self.negligible()
-            && (0..self.band().equations())
-                .any(|i| after[i] <= (1.0 - share) * before[i] && explained[i] >= MINOR * self.gap[i])
+            && (0..self.band().equations()).any(|i| {
+                after[i] <= (1.0 - share) * before[i] && (explained[i] >= MINOR * self.gap[i] || is_next_to_all(i))
+            })
     }
 
     /// What causes are measured by: what the axis lacks with its parameters alone, but no more than the torque itself, and without a

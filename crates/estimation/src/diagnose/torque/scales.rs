@@ -1,9 +1,12 @@
 //! The scales of a record: what an effect's starts are multiples of, and what bounds it.
 
+use std::sync::Arc;
+
 use super::super::model::Model;
+use super::super::record::Record;
 use super::fit::{Fit, Problem};
 use crate::axis::Structure;
-use crate::effects::{Effect, Extent, Place, Scale};
+use crate::effects::{Effect, Extent, Place, Scale, TorqueHistory};
 use crate::numerics::level::deviation;
 
 #[derive(Clone)]
@@ -22,8 +25,12 @@ pub struct Scales {
     positions: [Vec<f64>; 2],
     /// Twist as measured, sorted; empty where not both sides are.
     twists: Vec<f64>,
-    /// Work of the torque, and what weights and springs of no more than its peak can have given between the record's ends, J.
+    /// Work of the logged torque, J.
     work: f64,
+    /// What weights and springs of no more than its peak can have given between the record's ends, J.
+    given: f64,
+    /// Way of the driven side from sample to sample, rad.
+    moved: Arc<[f64]>,
     /// Square of the speed at which the record begins, (rad/s)^2.
     begins: f64,
     /// Way of motor and table to and fro, rad, and reversals.
@@ -63,6 +70,31 @@ fn way(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
     (way + from.map_or(0.0, |start| (farthest - start).abs()), reversals)
 }
 
+/// Whether the torque acts in a model when and as it was logged.
+fn is_as_logged(model: &Model) -> bool {
+    let (on_time, ahead) = model.on_time();
+    ahead == 0.0 && on_time.effects.active().inputs().is_empty()
+}
+
+/// Work of the torque that acts in a model along a motion, J: what comes late, through a lag or cut off did other work than what was
+/// logged, where the motion swings as fast as that even of the other sign. `moved`: way from sample to sample, rad.
+fn work_of(model: &Model, record: &Record, moved: &[f64]) -> f64 {
+    let (model, ahead) = model.on_time();
+    let per = record.instants();
+    let h = record.dt / per as f64;
+    let on = model.effects.active();
+    let mut history = TorqueHistory::settled(record.torque[0]);
+    let mut work = 0.0;
+    for (k, way) in moved.iter().enumerate() {
+        for j in 0..per {
+            let logged = record.ramp(k, j, per, ahead);
+            let acts = model.effects.transform_input(&on, logged, h, &mut history);
+            work += 0.5 * (acts.start + acts.end) * way / per as f64;
+        }
+    }
+    work
+}
+
 impl Scales {
     pub fn new(p: &Problem<'_>, fit: &Fit) -> Option<Self> {
         // Parameters that have gone far may not bear the feedback that their discrepancy asks for.
@@ -79,13 +111,9 @@ impl Scales {
         let (r2, t2) = side(2);
         let torque = &p.record.torque;
         let driven = usize::from(p.record.channels[0].is_none() && p.record.channels[1].is_none());
-        let moved = |k: usize| t.motion[k + 1][2 * driven] - t.motion[k][2 * driven];
-        let acting = |k: usize| {
-            let ramp = p.record.ramp(k, 0, 1, 0.0);
-            0.5 * (ramp.start + ramp.end)
-        };
+        let moved: Arc<[f64]> = t.motion.windows(2).map(|m| m[1][2 * driven] - m[0][2 * driven]).collect();
         let last = t.motion.len() - 1;
-        let work: f64 = (0..last).map(|k| acting(k) * moved(k)).sum();
+        let work = work_of(&p.nominal, p.record, &moved);
         let shifted = (t.motion[last][2 * driven] - t.motion[0][2 * driven]).abs();
         let peak = p.peak;
         let ways = [0, 1].map(|i: usize| {
@@ -103,7 +131,9 @@ impl Scales {
         Some(Self {
             torque: deviation(torque),
             peak,
-            work: work.max(0.0) + peak * shifted,
+            work,
+            given: peak * shifted,
+            moved,
             begins: t.motion[0][2 * driven + 1].powi(2),
             ways,
             speed: [rms(&|m| m[1]), rms(&|m| m[3])],
@@ -121,10 +151,11 @@ impl Scales {
     }
 
     /// Whether every one of these effects of the model is one that the record could show.
-    pub fn admit(&self, model: &Model, effects: impl Iterator<Item = Effect>) -> bool {
+    pub fn admit(&self, record: &Record, model: &Model, effects: impl Iterator<Item = Effect>) -> bool {
         let rigid = self.structure == Structure::Rigid;
         let p = &model.parameters;
         let all = p.i1 + p.i2;
+        let work = if is_as_logged(model) { self.work } else { work_of(model, record, &self.moved) };
         effects.into_iter().all(|e| {
             let info = e.info();
             let side = usize::from(info.place == Place::Table);
@@ -149,7 +180,7 @@ impl Scales {
                     all,
                 ],
                 stiffness: if rigid { 0.0 } else { p.k },
-                energy: self.work + 0.5 * all * self.begins,
+                energy: work.max(0.0) + self.given + 0.5 * all * self.begins,
                 way: self.ways[side],
             };
             (info.bounds)(model.effects.of(e), &extent)
@@ -176,5 +207,41 @@ impl Scales {
             Scale::Travel if f > 0.0 => self.travel[1][1] - f * (self.travel[1][1] - self.travel[1][0]),
             Scale::Travel => self.travel[1][0] - f * (self.travel[1][1] - self.travel[1][0]),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Hold, Parameters};
+    use crate::effects::Settings;
+
+    #[test]
+    fn a_torque_that_comes_late_works_as_much_as_its_phase_at_the_motion_says() {
+        // T = cos(w (t - delay)) along theta' = cos(w t): a mean power of cos(w delay)/2.
+        let (n, dt, w) = (20_000, 1e-3, 25.0);
+        let record = Record {
+            start: 0.0,
+            dt,
+            hold: Hold::Linear,
+            torque: (0..=n).map(|k| (w * dt * f64::from(k)).cos()).collect(),
+            between: None,
+            channels: [None, None, None, None],
+            noise: [0.0; 4],
+            corner: [0.0; 2],
+            common_noise: 0.0,
+            settling: 0.0,
+            idle: Vec::new(),
+        };
+        let angle = |k: i32| (w * dt * f64::from(k)).sin() / w;
+        let moved: Vec<f64> = (0..n).map(|k| angle(k + 1) - angle(k)).collect();
+        let mut model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
+        assert!(is_as_logged(&model));
+        for delay in [0.0, 0.021, 0.05, 0.09] {
+            model.effects.of_mut(Effect::Delay)[0] = delay;
+            let power = work_of(&model, &record, &moved) / (f64::from(n) * dt);
+            assert!((power - 0.5 * (w * delay).cos()).abs() < 5e-3, "{delay} {power}");
+        }
+        assert!(!is_as_logged(&model));
     }
 }

@@ -21,6 +21,7 @@ use super::likelihood::Band;
 use super::pool::Pool;
 use super::scales::Scales;
 use super::starts::{Look, StartPoint};
+use crate::axis::Structure;
 use crate::effects::Effect;
 
 /// Starts that are fitted of those that the regression ranks first.
@@ -94,6 +95,17 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
         search.extended(&parameters, 0, &mut pool);
     }
     let mut chosen = search.stepwise(known.unwrap_or_else(|| parameters.clone()), &mut pool);
+    // A rigid axis has one inertia, which runs off with no more than a share of any cause.
+    let coupled = search.problem.nominal.structure == Structure::TwoInertia;
+    if coupled && !search.at_floor(&chosen) && !search.is_negligible(&chosen) && search.have_moved(&parameters, MOVED) {
+        (search.progress)("beside the data sheet's parameters");
+        if let Some(other) = search.beside_the_data_sheet(&given) {
+            pool.push(other.clone());
+            if search.is_likelier(&other, &chosen) {
+                chosen = search.stepwise(other, &mut pool);
+            }
+        }
+    }
     if !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
         // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
@@ -238,7 +250,9 @@ impl Search<'_> {
             }
             let enough = self.is_enough(&best);
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
-            if !enough && let Some(next) = self.joined(&best, pool) {
+            if !self.is_negligible(&best)
+                && let Some(next) = self.joined(&best, pool)
+            {
                 best = self.pruned(next, pool);
                 continue;
             }
@@ -349,13 +363,43 @@ impl Search<'_> {
         added
     }
 
+    /// Whether an axis' own parameter is that far from its nominal value in a fit, in its logarithm.
+    fn have_moved(&self, fit: &Fit, far: f64) -> bool {
+        let nominal = &self.problem.nominal;
+        let moved = |c: &Coordinate| c.is_base() && (c.value(&fit.model) / c.value(nominal)).ln().abs() >= far;
+        fit.coordinates.iter().any(moved)
+    }
+
+    /// Effects added beside the axis as its data sheet has it, and only then its parameters freed: of several causes each shows itself
+    /// beside the true parameters, while free ones run off with what all of them do.
+    fn beside_the_data_sheet(&self, given: &Fit) -> Option<Fit> {
+        let held = Search {
+            problem: self.problem.with_parameters_held(),
+            reference: self.reference,
+            suspects: self.suspects.clone(),
+            gap: self.gap,
+            cut_short: AtomicBool::new(false),
+            progress: self.progress,
+        };
+        let fit = held.forward(given.clone(), &mut Pool::default());
+        if fit.terms.is_empty() {
+            return None;
+        }
+        let freed = self.problem.fit(&fit.model, &fit.terms, fit.discrepancy, STEPS)?;
+        self.problem.deepen(&freed)
+    }
+
+    #[cfg(test)]
+    pub fn alone_beside_the_data_sheet(&mut self) -> Option<Fit> {
+        let begun = self.begun();
+        self.beside_the_data_sheet(&begun.given)
+    }
+
     /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what
     /// an effect does, and free beside it take it again.
     fn put_back(&self, fit: &Fit) -> Vec<Fit> {
         let nominal = &self.problem.nominal;
-        let far = if fit.terms.is_empty() { MOVED } else { MOVED_BESIDE };
-        let moved = |c: &Coordinate| c.is_base() && (c.value(&fit.model) / c.value(nominal)).ln().abs() >= far;
-        if !fit.coordinates.iter().any(moved) {
+        if !self.have_moved(fit, if fit.terms.is_empty() { MOVED } else { MOVED_BESIDE }) {
             return Vec::new();
         }
         let back = self.problem.given(&Model { parameters: nominal.parameters, ..fit.model });
@@ -547,7 +591,7 @@ fn forms(effect: Effect, richer: bool) -> Vec<Term> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{Parameters, Structure};
+    use crate::axis::Parameters;
     use crate::effects::{EFFECTS, Settings};
 
     fn fit(terms: &[Term]) -> Fit {

@@ -324,7 +324,7 @@ fn one(
     let info = effect.info();
     let free = info.variants[form].free;
     if info.parameters.iter().all(|q| !matches!(q.start, Start::Linear))
-        && !scales.admit(&Model { effects: *shapes, ..fit.model }, std::iter::once(effect))
+        && !scales.admit(p.record, &Model { effects: *shapes, ..fit.model }, std::iter::once(effect))
     {
         return None;
     }
@@ -430,7 +430,7 @@ fn one(
             }
         }
     }
-    if !scales.admit(&model, std::iter::once(effect)) {
+    if !scales.admit(p.record, &model, std::iter::once(effect)) {
         return None;
     }
     Some(StartPoint { term: (effect, form), model, gain })

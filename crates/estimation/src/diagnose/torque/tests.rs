@@ -288,6 +288,49 @@ fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
     assert!((o.improved.effects.of(Effect::TorqueRipple)[1] / 30.0 - 1.0).abs() < 1e-3);
 }
 
+#[test]
+fn a_small_cause_that_explains_next_to_all_that_a_large_one_leaves_is_named_beside_it() {
+    let hidden = [
+        (Effect::CoulombMotor, 0, 30.0),
+        (Effect::TorqueRipple, 0, 0.8),
+        (Effect::TorqueRipple, 1, 11.0),
+        (Effect::TorqueRipple, 2, 0.4),
+    ];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 1e-3, |_| 0.0, 9), INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "torque_ripple"], "{:#?}", told(&o));
+    // A fiftieth of what the friction makes.
+    assert!((o.improved.effects.of(Effect::TorqueRipple)[0] / 0.8 - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
+    let paper = Parameters::PAPER;
+    let acts =
+        |t: f64| [(2.1, 0.3), (9.7, 4.1), (31.1, 5.3), (61.0, 1.1)].iter().map(|(w, p)| 0.05 * (w * t + p).sin()).sum();
+    let mut record = moved(paper, with(&[(Effect::CoulombMotor, 0, 0.03)]), &acts, 0);
+    // The drive's torque comes three samples after its command.
+    record.torque = (0..record.torque.len()).map(|k| acts((k as f64 + 3.0) * record.dt)).collect();
+    let nominal = Model::new(paper, Structure::TwoInertia, Settings::default());
+    let case = Case {
+        machine: "axis".to_owned(),
+        nominal,
+        motion: Motion::Rotary,
+        train: &record,
+        noise: &estimate_noise(&record.torque, &[0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref()), None),
+        holdout: None,
+        suspects: EFFECTS.to_vec(),
+    };
+    let (searched, _) = prepared(&record, &nominal, Reach::Shown);
+    let suspects = EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, Motion::Rotary)).collect();
+    let mut search = searched.search(&case, suspects, &|_| ());
+    let fit = search.alone_beside_the_data_sheet().expect("causes");
+    assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
+    assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
+    assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
+    // Its parameters are free in the end.
+    assert!(fit.coordinates.iter().any(|c| c.is_base()) && (fit.model.parameters.i1 / paper.i1 - 1.0).abs() < 0.02);
+}
+
 /// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.
 fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, late: usize) -> Record {
     let acts = |t: f64| {
