@@ -27,7 +27,7 @@ pub use orphans::{adopt_orphans, end_orphans};
 pub(crate) use page::Page;
 pub use sandbox::{Fence, Strength};
 
-/// The command line by which a child of this program is known: it is to call [`child`], before all else.
+/// The command line by which a child of this program is known: it is to call [`child()`], before all else.
 pub const CHILD: [&str; 2] = ["validate", "--child"];
 
 /// How a child ended.
