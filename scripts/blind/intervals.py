@@ -22,6 +22,9 @@ TRUTH = {
     ("friction_drift", "viscous_rate"): ("vm_rate", 1),
 }
 
+# Asymmetry of a friction whose size differs with the direction.
+ASYMMETRY = {"vm": "vm_asym", "vt": "vt_asym", "fm_c": "fm_asym", "ft_c": "ft_asym"}
+
 
 def errors(seal: dict, answer: dict | None, right: bool) -> list[tuple[str, float]]:
     """(parameter, standard errors from the truth) of each value that is told with a standard error."""
@@ -33,5 +36,7 @@ def errors(seal: dict, answer: dict | None, right: bool) -> list[tuple[str, floa
         for name, p in (cause.get("parameters") or {}).items():
             of, sign = TRUTH.get((cause.get("id"), name), (None, 1))
             truth = plant.get(of)
+            if truth is not None and seal["drawn"].get("loop") == "one_way" and "asymmetry" not in cause["parameters"]:
+                truth *= 1 + plant.get(ASYMMETRY.get(of), 0.0)  # of one direction a record tells that direction's alone
             told.append((f"{cause.get('id')}.{name}", p.get("value"), p.get("std"), None if truth is None else sign * truth))
     return [(name, abs(value - truth) / std) for name, value, std, truth in told if truth is not None and value is not None and std]

@@ -121,7 +121,7 @@ def summary(rows: list[dict]) -> dict:
         "confidently_wrong": share(rows, lambda r: r["confidently_wrong"]), "false_alarms": share(healthy, lambda r: r["false_alarm"]),
         "healthy": share(healthy, lambda r: r["good"]), "verdict_exact": share(healthy, lambda r: r["verdict_exact"]),
         "two": share(of("two"), lambda r: r["good"]), "three": share(of("three"), lambda r: r["good"]),
-        "machine": share(of("machine"), lambda r: r["good"]), "place": share(places, bool), "intervals": covered(rows),
+        "machine": share(of("machine", "whole_machine"), lambda r: r["good"]), "place": share(places, bool), "intervals": covered(rows),
         "calibration": reliability.table([p for r in rows for p in r["probabilities"]]),
         "calibration_of_suspects": reliability.table([p for r in rows for p in r["probabilities_of_suspects"]]),
         "by": {"group": {}, "axis": {}, "condition": {}, "cause": {}, "sensors": {}},

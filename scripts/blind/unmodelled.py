@@ -10,8 +10,10 @@ from scipy.signal import butter, sosfilt
 import effects
 
 KINDS = ("wander", "warming", "mode", "jam")
+SEVERAL = "several"  # as a machine has them: two to four of them at once
 # An answer that names one of these for it names what is there, if under another law.
-KIN = {"wander": set(), "warming": {"drift"}, "mode": {"flexible_mode"}, "jam": {"position_friction"}}
+KIN = {"wander": set(), "warming": {"drift"}, "mode": {"flexible_mode"}, "jam": {"position_friction"},
+       SEVERAL: {"drift", "flexible_mode", "position_friction"}}
 
 
 @dataclass
@@ -27,6 +29,8 @@ def draw(kind: str, ref: effects.Reference, rng, share: float, length: int, para
     """A remainder of rms about share * the level of `ref`; params are the plant's with all causes (warming needs friction there).
 
     A mode's size is an inertia, of 3 to 12 % of the motor's."""
+    if kind == SEVERAL:
+        return _several(ref, rng, share, length, params, linear, rigid)
     size = share * ref.torque_rms
     if kind == "warming" and ("vm" in params or "fm_c" in params):
         return Rest(kind, share, {"warm": rng.uniform(0.03, 0.12), "warm_tau": rng.uniform(0.2, 0.8) * ref.duration})
@@ -45,3 +49,12 @@ def draw(kind: str, ref: effects.Reference, rng, share: float, length: int, para
     x *= size / max(float(np.std(x)), 1e-300)
     on_table = (not rigid) and rng.random() < 0.5
     return Rest("wander", share, {}, np.stack([0 * x, x] if on_table else [x, 0 * x], axis=1))
+
+
+def _several(ref: effects.Reference, rng, share: float, length: int, params: dict, linear: bool, rigid: bool) -> Rest:
+    """A torque that wanders, and one to three of the others beside it."""
+    others = [str(k) for k in rng.choice(KINDS[1:], int(rng.integers(1, 4)), replace=False)]
+    parts = [draw(k, ref, rng, share, length, params, linear, rigid) for k in ("wander", *others)]
+    plant = {k: v for p in parts for k, v in p.plant.items()}
+    extra = sum(p.extra for p in parts if p.extra is not None)
+    return Rest(SEVERAL, share, plant, extra)

@@ -313,3 +313,20 @@ def test_the_same_seed_writes_the_same_set_and_the_files_tell_no_answer(tmp_path
         header = (case / "train.csv").read_text().split("\n", 1)[0]
         assert ("T [N]" in header) == (seal["axis"] == "rigid_stage")
     capsys.readouterr()
+
+
+def test_whole_machines_are_of_any_kind_and_keep_several_things_unexplained(tmp_path):
+    name, entry, _ = conditions.make(tmp_path, 2, 3, "both", True)
+    seal = json.loads((tmp_path / "seals" / f"{name}.json").read_text())
+    low, high = conditions.WHOLE_REST
+    assert entry["axis"] == "ballscrew" and seal["rest"]["kind"] == unmodelled.SEVERAL and low <= seal["rest"]["share"] <= high
+    assert {"coulomb_motor", "presliding_motor"}.intersection(e["id"] for e in seal["effects"])
+    assert any(e["required"] for e in seal["effects"]) and not any(e["required"] for e in seal["effects"] if e["id"] == "load_motor")
+
+
+def test_several_remainders_are_a_wander_and_others():
+    m, exp, run = run_of("ballscrew")
+    ref = conditions.reference(m, exp, run)
+    for seed in range(5):
+        rest = unmodelled.draw(unmodelled.SEVERAL, ref, np.random.default_rng(seed), 0.05, exp.length, m.base | {"vm": 1e-3}, False, False)
+        assert rest.extra is not None and rest.plant and 0.03 < effects.rms(rest.extra.sum(axis=1)) / ref.torque_rms < 0.07
