@@ -22,7 +22,8 @@ impl Force for CubicStiffness {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |_, _| true,
+        // At the rms twist no more than the linear part, or it is a play that closes; softer than none it holds nothing.
+        bounds: |p, x| (-1.0 / 3.0..=1.0).contains(&(p[0] * x.twist.powi(2))),
         example: &[20.0],
         variants: &[Variant { name: "", free: &[0] }],
     };

@@ -167,6 +167,23 @@ mod tests {
     }
 
     #[test]
+    fn a_spring_that_is_all_cube_or_softer_than_none_is_none() {
+        let extent = Extent { twist: 0.1, ..resting() };
+        let admits = |k3: f64| (Effect::CubicStiffness.info().bounds)(&[k3], &extent);
+        assert!(admits(50.0) && admits(-30.0) && !admits(120.0) && !admits(-40.0));
+    }
+
+    #[test]
+    fn a_lead_error_is_small_and_its_period_is_there_to_be_seen() {
+        // Along a radian, at a radian a second.
+        let admits = |scale: f64, amplitude: f64, order: f64| {
+            (Effect::LeadError.info().bounds)(&[scale, amplitude, order, 0.0], &resting())
+        };
+        assert!(admits(0.05, 0.0, 1.0) && !admits(0.2, 0.0, 1.0));
+        assert!(admits(0.0, 0.01, 6.0) && !admits(0.0, 0.01, 3.0) && !admits(0.0, 0.2, 6.0) && !admits(0.0, 0.01, 2e3));
+    }
+
+    #[test]
     fn a_mode_whose_peak_reaches_into_the_band_is_one() {
         // Against an inertia of 1 kg.m2; the band ends at 1000 rad/s.
         let admits = |omega: f64, ratio: f64| {

@@ -287,7 +287,8 @@ impl Sensor for LeadError {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |_, _| true,
+        // More than a tenth is another gear or another sensor.
+        bounds: |p, x| p[0].abs() <= 0.1 && (p[1] == 0.0 || p[1].abs() <= 0.1 * x.travel() && x.turns(p[2])),
         example: &[0.01, 0.02, 2.0, 0.5],
         variants: &[
             Variant { name: "scale", free: &[0] },
