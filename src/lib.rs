@@ -8,7 +8,8 @@
 //! eixo_model         axis, drive, effects, scalar                depends on nothing
 //! eixo_fmu           fmi2, fmi3, variables                       -> eixo_model
 //! eixo_records       trace                                       -> eixo_model
-//! eixo_estimation    numerics, identify, examine, diagnose       -> eixo_model, eixo_records
+//! eixo_estimation    numerics, conditioning, hypothesis,
+//!                    identify, examine, diagnose                 -> eixo_model, eixo_records
 //! eixo_validator     fmu (all but fmu::package)                  -> eixo_records
 //! ```
 //!

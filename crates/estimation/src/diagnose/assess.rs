@@ -1,13 +1,13 @@
 //! What is diagnosed, and what comes of it.
 
+use super::conclusion::Decision;
 use super::diagnosis::Diagnosis;
-use super::model::Model;
-use super::noise::NoiseEstimate;
 use super::overlay::Overlay;
-use super::record::Record;
-use super::torque::Decision;
 use crate::axis::Motion;
+use crate::conditioning::NoiseEstimate;
+use crate::conditioning::Record;
 use crate::effects::Effect;
+use crate::hypothesis::model::Model;
 
 /// Share of a single record that is held out.
 pub(super) const HELD_OUT: f64 = 1.0 / 3.0;

@@ -4,12 +4,12 @@
 //! command that the drive needs for it says what the model leaves out. This looks at a record from the other side than
 //! the free-running windows do: nothing but the reference is given to the model, and no initial state is fitted.
 
-use super::diagnosis::Hypothesis;
-use super::model::Model;
-use super::record::Record;
-use super::torque::{Decision, Fit};
+use super::{Decision, Fit};
 use crate::axis::{Axis, Scheme, substeps};
+use crate::conditioning::Record;
 use crate::effects::{Ramp, Reading, TorqueHistory};
+use crate::hypothesis::Hypothesis;
+use crate::hypothesis::model::Model;
 use crate::trace::Controller;
 
 /// A hypothesis closes as much as another when their closures differ by less than this.

@@ -1,14 +1,12 @@
 //! The diagnosis as typed data. Its sentences, pages and files are made of it in the program's `report`.
 
-use std::fmt;
-
 use super::closed_loop::ClosedLoop;
+use super::conclusion::Confusable;
 use super::location::{Appearance, Location};
-use super::model::BaseParameter;
-use super::torque::Confusable;
 use super::verdict::Verdict;
 use crate::axis::{Motion, Structure};
 use crate::effects::{Effect, Place};
+use crate::hypothesis::{BaseParameter, Hypothesis};
 
 /// Where something acts, as far as an axis' structure tells it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,42 +48,6 @@ impl Site {
         match self {
             Self::At(place) => place.as_str(),
             Self::Axis => "axis",
-        }
-    }
-}
-
-/// What a record is explained by.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Hypothesis {
-    /// The model as given.
-    NoGap,
-    /// Its parameters, fitted.
-    Parameters,
-    /// Effects beside them, in the order they were found.
-    Effects(Vec<Effect>),
-}
-
-impl Hypothesis {
-    /// Its effects.
-    #[must_use]
-    pub fn effects(&self) -> &[Effect] {
-        match self {
-            Self::Effects(effects) => effects,
-            Self::NoGap | Self::Parameters => &[],
-        }
-    }
-}
-
-/// The name in files: ids joined by `+`, `parameters` or `no_gap`.
-impl fmt::Display for Hypothesis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoGap => f.write_str("no_gap"),
-            Self::Parameters => f.write_str("parameters"),
-            Self::Effects(effects) => {
-                let ids: Vec<&str> = effects.iter().map(|e| e.info().id).collect();
-                f.write_str(&ids.join("+"))
-            }
         }
     }
 }

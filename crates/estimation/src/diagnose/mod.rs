@@ -2,29 +2,38 @@
 
 mod assess;
 mod closed_loop;
-mod colour;
+mod conclusion;
+
 mod diagnosis;
-mod jitter;
+mod gap;
 pub mod location;
-mod model;
-mod noise;
+mod material;
+mod octaves;
 mod overlay;
+mod pool;
+mod prepared;
+mod procedure;
 mod quantisation;
-mod record;
-mod repair;
-mod torque;
+mod race;
+mod residual;
+mod search;
+
+mod summary;
+#[cfg(test)]
+mod tests;
 mod verdict;
 
+// What a diagnosis takes and gives stands with it.
+pub use crate::conditioning::{CHANNELS, NoiseEstimate, NoiseMethod, Record, TORQUE, estimate_noise, find_period};
+pub use crate::hypothesis::{BaseParameter, Fit, Hypothesis, Model};
 pub use assess::{Case, Outcome, Replay};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
+pub use conclusion::{Confusable, Decision, UNCAUSED, Weighed};
 pub use diagnosis::{
-    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Hypothesis, Levels, Ranked,
-    Remainder, Rounding, RoundingRole, Site, Undecided, Way, Where,
+    AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Levels, Ranked, Remainder,
+    Rounding, RoundingRole, Site, Undecided, Way, Where,
 };
 pub use location::Location;
-pub use model::{BaseParameter, Model};
-pub use noise::{NoiseEstimate, NoiseMethod, estimate_noise, find_period};
 pub use overlay::Overlay;
-pub use record::{CHANNELS, Record, TORQUE};
-pub use torque::{Confusable, Decision, Fit, UNCAUSED, Weighed, diagnose};
+pub use procedure::diagnose;
 pub use verdict::Verdict;

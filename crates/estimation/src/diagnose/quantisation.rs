@@ -6,9 +6,9 @@
 
 use super::assess::Case;
 use super::diagnosis::{Cause, Diagnosis, Rounding, RoundingRole, Site};
-use super::noise::NoiseEstimate;
-use super::record::CHANNELS;
 use super::verdict::Verdict;
+use crate::conditioning::CHANNELS;
+use crate::conditioning::NoiseEstimate;
 use crate::effects::{Effect, Place};
 
 /// Share of the step within which a model's own rounding is the record's.

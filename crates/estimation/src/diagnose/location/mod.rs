@@ -1,6 +1,6 @@
 //! Where the gap lies, whatever its cause: in the chain, in time, in frequency, in state.
 //!
-//! The residual torques `r1`, `r2` are what the model lacks to follow the record ([`super::torque`]), in the sign of
+//! The residual torques `r1`, `r2` are what the model lacks to follow the record ([`crate::diagnose::procedure`]), in the sign of
 //! `I1*a1 + B*(w1 - w2) + K*(th1 - th2) - T` and `I2*a2 - B*(w1 - w2) - K*(th1 - th2)`: positive where a torque drives the axis that the model does not know.
 
 mod appearance;
@@ -13,10 +13,10 @@ pub use by_frequency::{FrequencyPart, PartOf};
 pub use by_state::{Bin, Shape, StateCurve, StateVariable};
 pub use by_time::{Spread, TimeSlot};
 
-use super::diagnosis::Site;
-use super::noise::find_period;
-use super::record::Record;
 use crate::axis::{Parameters, Structure};
+use crate::conditioning::Record;
+use crate::conditioning::find_period;
+use crate::diagnose::diagnosis::Site;
 use crate::effects::Place;
 use crate::numerics::level::rms;
 

@@ -1,7 +1,7 @@
 //! What a record does not know of a fit's effects: their sizes and shapes beside the standard errors.
 
-use super::super::model::{Coordinate, Free};
 use super::fit::{Fit, PRICE};
+use super::model::{Coordinate, Free};
 use super::scatter;
 use crate::effects::Effect;
 
@@ -52,9 +52,9 @@ pub fn steadiness(fit: &Fit, effect: Effect, independent: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::fit::Term;
+    use super::super::model::Model;
     use super::*;
     use crate::axis::{Parameters, Structure};
-    use crate::diagnose::model::Model;
     use crate::effects::Settings;
 
     fn fit(terms: &[Term]) -> Fit {

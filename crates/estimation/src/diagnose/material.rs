@@ -1,9 +1,9 @@
 //! What is a cause, and what is a part of the remainder: by how much of the gap, of the torque and of the noise a fit leaves or explains.
 
-use super::discrepancy::Discrepancy;
-use super::fit::{Fit, STEPS};
-use super::likelihood::Sight;
 use super::search::Search;
+use crate::hypothesis::discrepancy::Discrepancy;
+use crate::hypothesis::fit::{Fit, STEPS};
+use crate::hypothesis::likelihood::Sight;
 use crate::numerics::level::rms;
 
 /// Share of the discrepancy's variance that a further cause must explain: less is a part of the remainder, not a main cause.

@@ -2,7 +2,7 @@
 //!
 //! A *free run* starts once, at the state of the record's beginning, and follows the torque alone to the end, as the FMU would. In
 //! *windows* the model starts anew every half thousand samples, from states fitted to each window. In *torque* it is held to the
-//! measured motion, and what it lacks is counted ([`super::tracking`]). All three models have the same freedom in each. The headline is
+//! measured motion, and what it lacks is counted ([`crate::hypothesis::tracking`]). All three models have the same freedom in each. The headline is
 //! the first of the three by which the best model follows the record.
 
 use nalgebra::{DMatrix, DVector, Vector4};
@@ -11,14 +11,14 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
-use super::super::diagnosis::{ClosureOf, Figures, Levels, Way};
-use super::super::model::Model;
-use super::super::record::{CHANNELS, Record};
-use super::Prepared;
-use super::fit::Fit;
-use super::hidden::any_vibrations;
-use super::likelihood::Sight;
-use super::tracking::{Resolution, Run, start_states, track};
+use super::diagnosis::{ClosureOf, Figures, Levels, Way};
+use super::prepared::Prepared;
+use crate::conditioning::{CHANNELS, Record};
+use crate::hypothesis::fit::Fit;
+use crate::hypothesis::hidden::any_vibrations;
+use crate::hypothesis::likelihood::Sight;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::tracking::{Resolution, Run, start_states, track};
 use crate::numerics::level::deviation;
 
 /// Samples in a window.

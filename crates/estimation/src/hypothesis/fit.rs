@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
-use super::super::diagnosis::Hypothesis;
-use super::super::model::{BaseParameter, Coordinate, Free, Model};
-use super::super::record::Record;
+use super::Hypothesis;
 use super::descent::{Along, Descent, differ};
 use super::discrepancy::Discrepancy;
 use super::likelihood::{Band, C, Motion, TorqueResidual};
+use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scales::Scales;
 use super::tracking::{Bandwidth, Resolution, Tracked, parts, track};
 use crate::axis::Structure;
+use crate::conditioning::Record;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 
 /// Prior standard deviation of the logarithm of a nominal parameter.
@@ -35,6 +35,8 @@ thread_local! { static PLANNER: std::cell::RefCell<FftPlanner<f64>> = std::cell:
 
 /// Steps of a fit at most.
 pub const STEPS: usize = 40;
+/// Steps of a fit that is looked at.
+pub const PROBE: usize = 5;
 
 /// An effect in one of its forms.
 pub type Term = (Effect, usize);

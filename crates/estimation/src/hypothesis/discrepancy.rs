@@ -1,7 +1,7 @@
 //! The size of what a model lacks beyond the noise: the one of largest likelihood.
 
-use super::super::model::Model;
 use super::likelihood::{Band, Sight, TorqueResidual};
+use super::model::Model;
 
 /// Variances of the discrepancy of each equation.
 pub type Discrepancy = [f64; 2];

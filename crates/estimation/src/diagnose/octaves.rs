@@ -12,9 +12,9 @@
 
 use std::ops::Range;
 
-use super::fit::{Fit, PRICE};
-use super::likelihood::{Band, TorqueResidual};
 use super::search::Search;
+use crate::hypothesis::fit::{Fit, PRICE};
+use crate::hypothesis::likelihood::{Band, TorqueResidual};
 use crate::numerics::distribution::of_log_odds;
 
 impl Search<'_> {

@@ -8,10 +8,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::model::{BaseParameter, Coordinate, Free, Model};
 use super::discrepancy::Discrepancy;
 use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
 use super::likelihood::{Band, C, Sight, TorqueResidual};
+use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scatter;
 use super::tracking::Bandwidth;
 use crate::axis::Structure;

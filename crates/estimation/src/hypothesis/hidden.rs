@@ -6,10 +6,10 @@
 
 use rustfft::FftPlanner;
 
-use super::super::model::Model;
 use super::discrepancy::Discrepancy;
 use super::fit::largest;
 use super::likelihood::{Band, C, Weight, mode_inertia, square};
+use super::model::Model;
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place};
 

@@ -12,17 +12,17 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::super::model::{Coordinate, Model};
 use super::conclusion::Decision;
-use super::determined::{is_lost, is_simpler};
-use super::discrepancy::Discrepancy;
-use super::fit::{Fit, Problem, STEPS, Term};
-use super::likelihood::Band;
 use super::pool::Pool;
-use super::scales::Scales;
-use super::starts::{Look, StartPoint};
 use crate::axis::Structure;
 use crate::effects::Effect;
+use crate::hypothesis::determined::{is_lost, is_simpler};
+use crate::hypothesis::discrepancy::Discrepancy;
+use crate::hypothesis::fit::{Fit, PROBE, Problem, STEPS, Term};
+use crate::hypothesis::likelihood::Band;
+use crate::hypothesis::model::{Coordinate, Model};
+use crate::hypothesis::scales::Scales;
+use crate::hypothesis::starts::{Look, StartPoint};
 
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
@@ -42,8 +42,6 @@ const BUDGET_BESIDE: u64 = 40_000_000;
 const MOVED: f64 = 0.2;
 /// The same beside effects, which let most parameters be what they are: a factor of two.
 const MOVED_BESIDE: f64 = 0.7;
-/// Steps of a fit that is looked at.
-pub const PROBE: usize = 5;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
 

@@ -1,17 +1,18 @@
 //! Rigid axes under control, made by the axis' own step: what a drive's log looks like.
 
-use super::super::assess::{Case, Outcome};
-use super::super::diagnosis::{ClosureOf, Site};
-use super::super::model::Model;
-use super::super::noise::estimate_noise;
-use super::super::record::Record;
-use super::super::verdict::Verdict;
-use super::band::Reach;
-use super::fit::{Fit, Problem};
-use super::tracking::{Resolution, track};
-use super::{diagnose, prepared};
+use super::assess::{Case, Outcome};
+use super::diagnose;
+use super::diagnosis::{ClosureOf, Site};
+use super::prepared::prepared;
+use super::verdict::Verdict;
 use crate::axis::{Axis, Hold, Motion, Parameters, Scheme, Structure};
+use crate::conditioning::Record;
+use crate::conditioning::estimate_noise;
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
+use crate::hypothesis::band::Reach;
+use crate::hypothesis::fit::{Fit, Problem};
+use crate::hypothesis::model::Model;
+use crate::hypothesis::tracking::{Resolution, track};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -108,7 +109,7 @@ fn named(o: &Outcome) -> Vec<&'static str> {
 
 /// What was tried, for a test that fails.
 fn told(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
-    let line = |w: &super::Weighed| {
+    let line = |w: &super::conclusion::Weighed| {
         let values = w.fit.terms.iter().map(|(e, _)| w.fit.model.effects.of(*e).to_vec()).collect();
         (w.fit.hypothesis().to_string(), w.evidence, values)
     };

@@ -2,16 +2,16 @@
 
 use std::sync::atomic::Ordering;
 
-use super::super::diagnosis::Undecided;
-use super::super::model::Model;
-use super::super::verdict::Verdict;
-use super::determined::{is_simpler, is_undetermined, steadiness};
-use super::fit::Fit;
+use super::diagnosis::Undecided;
 use super::material::MINOR;
 use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
+use super::verdict::Verdict;
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
+use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
+use crate::hypothesis::fit::Fit;
+use crate::hypothesis::model::Model;
 use crate::numerics::distribution::of_log_odds;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.

@@ -12,10 +12,10 @@
 //! output error) or the measured one (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a
 //! Kalman filter does.
 
-use super::super::model::Model;
-use super::super::record::Record;
 use super::hidden::Hidden;
+use super::model::Model;
 use crate::axis::{Axis, Scheme, Structure, substeps_at_speed};
+use crate::conditioning::Record;
 use crate::effects::TorqueHistory;
 
 /// What the model lacks, and the motion it was lacking it along.

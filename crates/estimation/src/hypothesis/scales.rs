@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::super::model::Model;
-use super::super::record::Record;
 use super::fit::{Fit, Problem};
+use super::model::Model;
 use crate::axis::Structure;
+use crate::conditioning::Record;
 use crate::effects::{Effect, Extent, Place, Scale, TorqueHistory};
 use crate::numerics::level::deviation;
 

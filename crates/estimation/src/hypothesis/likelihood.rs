@@ -14,12 +14,12 @@
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
-use super::super::model::{BaseParameter, Free, Model};
-use super::super::record::Record;
 use super::discrepancy::Discrepancy;
 use super::hidden::{Hidden, Vibration, vibrations};
+use super::model::{BaseParameter, Free, Model};
 use super::tracking::Tracked;
 use crate::axis::{Parameters, Structure};
+use crate::conditioning::Record;
 use crate::numerics::level::deviation;
 
 /// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor.

@@ -1,7 +1,7 @@
 //! What a search has fitted so far, so that nothing is fitted twice.
 
-use super::discrepancy::Discrepancy;
-use super::fit::{Fit, Term};
+use crate::hypothesis::discrepancy::Discrepancy;
+use crate::hypothesis::fit::{Fit, Term};
 
 /// Hypotheses fitted, in the order they were.
 #[derive(Default)]

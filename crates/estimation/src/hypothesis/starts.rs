@@ -1,12 +1,12 @@
 //! Where a fit of an effect starts: the shapes on the record's scales, the sizes by linear regression on what the model lacks.
 
-use super::super::model::Model;
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, Problem, Term};
+use super::fit::{Fit, PROBE, Problem, Term};
 use super::likelihood::{C, Weight};
+use super::model::Model;
 use super::scales::Scales;
-use super::search::PROBE;
+
 use crate::axis::Structure;
 use crate::effects::{Place, Role, Scale, Settings, Start};
 use nalgebra::{DMatrix, DVector};

@@ -1,8 +1,8 @@
 //! The band of the motion, and the samples that count.
 
-use super::super::record::Record;
 use super::likelihood::Sight;
 use crate::axis::Structure;
+use crate::conditioning::Record;
 use nalgebra::{Matrix3, Vector3};
 use rustfft::{FftPlanner, num_complex::Complex};
 

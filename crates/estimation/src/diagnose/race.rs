@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::fit::{Fit, STEPS};
 use super::search::{ALIKE, Search};
+use crate::hypothesis::fit::{Fit, STEPS};
 
 /// Fits that go on.
 const RACING: usize = 6;

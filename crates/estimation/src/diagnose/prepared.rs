@@ -1,0 +1,148 @@
+//! A record made ready for the search: in the band of its motion, at the rate of that band, its noise seen through the axis as it is.
+
+use super::assess::Case;
+use super::gap::Gap;
+use super::overlay::Overlay;
+use super::search::Search;
+use crate::axis::Structure;
+use crate::conditioning::{Record, TORQUE};
+use crate::effects::Effect;
+use crate::hypothesis::band::{self, Rate, Reach};
+use crate::hypothesis::fit::{Fit, Problem, largest};
+use crate::hypothesis::likelihood::Band;
+use crate::hypothesis::model::Model;
+use crate::numerics::level::deviation;
+
+/// Samples, at the rate of the band, that a search works on at most: the first of the record.
+const SEARCHED: usize = 16_384;
+
+/// Steps of the fit through which a band sees its noise.
+const REFERRED: usize = 24;
+
+/// Share of a window's height from which what it shows is drawn.
+const OPEN: f64 = 0.5;
+
+/// A record ready for the search: in the band of its motion, with that band.
+pub struct Prepared {
+    pub record: Record,
+    pub band: Band,
+    /// The axis' own parameters as they follow the record the best: through them the band sees its noise.
+    pub reference: Model,
+    pub rate: Rate,
+    /// Upper end of the band, Hz.
+    pub limit: f64,
+    /// Torque that shares are told of, rms about its mean, N.m.
+    pub torque_rms: f64,
+    /// Largest torque of the log, N.m.
+    pub peak: f64,
+}
+
+/// Noises up to which the parameters alone follow a record that is searched at its own rate: the one of the band is not that exact.
+const EXACT: f64 = 10.0;
+
+/// Turn of the axis' own vibration in a sample, rad, up to which both of its sides can be held to a record: a quarter.
+const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+
+/// The record in the band of its motion, as fast as it can be searched; and as exact as it can be, where accounts near the noise are
+/// settled, if that is something else.
+pub fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option<Prepared>) {
+    let whole = record.part(0..band::smooth(record.len()));
+    let limit = band::limit(&whole, &band::mask(&whole, nominal.structure), reach);
+    let [exact, fast] = match nominal.structure {
+        Structure::Rigid => [false, true].map(|straight| Rate { longest: f64::INFINITY, straight }),
+        Structure::TwoInertia => {
+            [0.0, QUARTER / nominal.parameters.modal().wn].map(|longest| Rate { longest, straight: false })
+        }
+    };
+    let peak = largest(&record.torque);
+    let at = |rate: Rate| {
+        let r = band::decimate(&whole, limit, rate);
+        r.part(0..band::smooth(r.len().min(SEARCHED)))
+    };
+    let [own, slow] = [exact, fast].map(at);
+    let alike = slow.len() == own.len() && slow.instants() == own.instants();
+    let referred = |record, rate, known: Option<&Model>| referred(record, nominal, known, limit, rate, peak);
+    let (own, left) = referred(own, exact, None);
+    if alike || left < EXACT {
+        return (own, None);
+    }
+    let (slow, left) = referred(slow, fast, Some(&own.reference));
+    if left.is_finite() { (slow, Some(own)) } else { (own, None) }
+}
+
+/// A record with its band, whose noise is seen through the axis as it is, not as its data sheet has it; and what its parameters leave,
+/// in noises.
+fn referred(
+    record: Record,
+    nominal: &Model,
+    known: Option<&Model>,
+    limit: f64,
+    rate: Rate,
+    peak: f64,
+) -> (Prepared, f64) {
+    let mask = band::mask(&record, nominal.structure);
+    let plain = Band::new(&record, nominal, limit, &mask);
+    let problem = Problem::new(&record, &plain, *nominal);
+    let fit = match known {
+        Some(known) => problem.parameters(known, [f64::MAX; 2], REFERRED),
+        None => problem.parameters_of_any_stiffness([f64::MAX; 2], REFERRED),
+    };
+    let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
+    let reference = fit.map_or(*nominal, |f| f.model);
+    let band = Band::new(&record, &reference, limit, &mask);
+    let torque_rms = deviation(&record.torque);
+    (Prepared { record, band, reference, rate, limit, torque_rms, peak }, left)
+}
+
+impl Prepared {
+    /// A search in it for some effects.
+    pub fn search<'a>(
+        &'a self,
+        case: &Case<'_>,
+        suspects: Vec<Effect>,
+        progress: &'a (dyn Fn(&str) + Sync),
+    ) -> Search<'a> {
+        let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak);
+        let reference = self.reference;
+        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
+    }
+
+    /// Share of the torque that a fit leaves.
+    pub fn left(&self, fit: &Fit) -> f64 {
+        self.band.torque_share(fit.discrepancy, &self.record)
+    }
+
+    /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.
+    pub fn alike(&self, record: &Record, model: &Model) -> Self {
+        let whole = record.part(0..band::smooth(record.len()));
+        let slow = band::decimate(&whole, self.limit, self.rate);
+        let record = slow.part(0..band::smooth(slow.len()));
+        let band = Band::new(&record, model, self.limit, &band::mask(&record, model.structure));
+        let torque_rms = deviation(&record.torque).max(self.torque_rms);
+        Self { record, band, torque_rms, ..*self }
+    }
+}
+
+impl Prepared {
+    /// The torque that moved the axis and what each model needs for that motion, in the band, where the window is open.
+    pub fn torque_overlay(&self, gap: &Gap) -> Overlay {
+        let (record, taper) = (&self.record, &self.band.taper);
+        let torque = self.band.filtered(&record.torque);
+        let mut o = Overlay {
+            channel: TORQUE,
+            time: Vec::new(),
+            measured: Vec::new(),
+            before: Vec::new(),
+            after: Vec::new(),
+            noise: self.band.noise_rms(),
+        };
+        let open = OPEN * taper.iter().copied().fold(0.0, f64::max);
+        for (k, w) in taper.iter().enumerate() {
+            let [before, after] = [0, 1].map(|m: usize| gap.runs[m][k][0] + gap.runs[m][k][1]);
+            let values = [torque[k], torque[k] + before, torque[k] + after];
+            let [measured, before, after] = if *w > open { values.map(|v| v / w) } else { [f64::NAN; 3] };
+            o.push([record.time(k), measured, before, after]);
+        }
+        o
+    }
+}

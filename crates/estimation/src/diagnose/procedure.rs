@@ -1,0 +1,107 @@
+//! A record diagnosed by the torque that its model lacks to follow it.
+//!
+//! [`super::search`] is the search for the hypothesis, top to bottom, [`super::material`] what counts as a cause in it,
+//! [`super::conclusion`] its end, [`super::gap`] how far the gap shrinks on data that no fit has seen; the one evidence is
+//! [`crate::hypothesis`]'s. A machine's log is made under control, its model never complete: its verdict must not be sought at the noise
+//! floor of a simulation (Gautier, Khalil, and the inverse dynamics of robot identification; Kennedy, O'Hagan, JRSS B 63(3), 2001, for
+//! the discrepancy).
+//!
+//! On a rigid axis motor, coupling and table are one place, called `axis`.
+
+use super::assess::{Case, HELD_OUT, Outcome, Replay};
+use super::conclusion::Decision;
+use super::diagnosis::ClosureOf;
+use super::gap::{self, Gaps};
+use super::location::without_offset;
+use super::material::NEGLIGIBLE;
+use super::prepared::{Prepared, prepared};
+use super::quantisation;
+use super::residual::located;
+use super::search::{decide, decide_further};
+use super::summary::{build, overlays};
+use crate::axis::Structure;
+use crate::conditioning::{Record, bridged};
+use crate::effects::Effect;
+use crate::hypothesis::band::Reach;
+use crate::hypothesis::fit::Fit;
+
+/// Noises that an account at the rate of the band may leave for it to be settled at the record's own.
+const NEAR: f64 = 30.0;
+/// Share of the torque that an account of a rigid axis leaves at most where the band that its motion rules is understood so far that what
+/// it lacks may be the edge of a cause that lies beyond.
+const UNDERSTOOD: f64 = 0.1;
+/// Hypotheses that are told, each with its own run over the held-out data.
+pub const TOLD: usize = 12;
+
+/// Diagnoses a record of a rigid axis.
+#[must_use]
+pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
+    let (train, held) = split(case);
+    let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
+    let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
+    // What leaves so little that the error of the band's rate counts is settled at the record's own.
+    let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
+    let settled = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
+        let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
+        progress("at the record's own rate");
+        let decision = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
+        (own, decision)
+    };
+    // A rigid axis is taken to be under control.
+    let rigid = case.nominal.structure == Structure::Rigid;
+    let (searched, own) = prepared(&train, &case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
+    let decision = decide(searched.search(case, suspects.clone(), progress), None);
+    let (mut searched, mut decision) = settled(searched, own, decision);
+    let left = searched.left(&decision.chosen);
+    if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
+        progress("beyond the band that the motion rules");
+        let (wide, own) = prepared(&train, &case.nominal, Reach::Whole);
+        let further = decide_further(wide.search(case, suspects, progress), &decision.chosen);
+        if let Some((wide, other)) = further.map(|d| settled(wide, own, d))
+            // More to explain and less left of it: what was missing is there.
+            && wide.left(&other.chosen) < left
+        {
+            (searched, decision) = (wide, other);
+        }
+    }
+    progress("held-out data");
+    let fits = [&decision.given, &decision.parameters, &decision.chosen];
+    let models = fits.map(|f| f.model);
+    let seen = searched.alike(&held, &models[2]);
+    let on_train = Gaps::measure(&searched.record, &searched, fits);
+    let on_held = Gaps::measure(&held, &seen, fits);
+    progress("where");
+    let located = located(&searched, &models[1], decision.parameters.bandwidth);
+    let closure = |of, fit: &Fit| gap::closure_by(of, &held, &seen, [fits[0], fits[1], fit]);
+    let mut diagnosis = build(case, &decision, &searched, &closure, &on_train, &on_held, located);
+    quantisation::attribute(case, &mut diagnosis);
+    let mut overlays = overlays(&held, on_held.shown());
+    let of_torque = seen.torque_overlay(on_held.by(ClosureOf::Torque));
+    let first = if on_held.headline().of == ClosureOf::Torque { 0 } else { overlays.len() };
+    overlays.insert(first, of_torque);
+    let replay = Replay { initial: on_held.shown().initial, record: held };
+    Outcome { diagnosis, improved: models[2], models, decision, overlays, replay }
+}
+
+/// The record that the fits see, and the one that they do not.
+fn split(case: &Case<'_>) -> (Record, Record) {
+    let n = case.train.len();
+    let own = |r: &Record| without_offset(&bridged(r).0, &case.nominal.parameters, case.nominal.structure);
+    match case.holdout {
+        Some(other) => (own(case.train), own(other)),
+        None => {
+            let split = n - (n as f64 * HELD_OUT) as usize;
+            let whole = own(case.train);
+            (whole.part(0..split), whole.part(split..n))
+        }
+    }
+}
+
+/// The effects of the likeliest hypotheses.
+fn likely(decision: &Decision) -> Vec<Effect> {
+    let mut effects: Vec<Effect> =
+        decision.ranking.iter().take(TOLD).flat_map(|w| w.fit.terms.iter().map(|t| t.0)).collect();
+    effects.sort_unstable();
+    effects.dedup();
+    effects
+}

@@ -1,0 +1,64 @@
+//! A hypothesis, a set of effects beside the axis' own parameters, fitted to a record; and its evidence.
+//!
+//! One likelihood ([`likelihood`]) with the sensors' noise and the model's own discrepancy in it: of the torque that a model lacks to
+//! follow the record ([`tracking`]), in the band of its motion ([`band`]). [`descent`] finds the likeliest parameters, [`scatter`] how well
+//! the record knows them and [`determined`] which of them it does not, [`scales`] what of an effect it could show, [`starts`] where a fit
+//! with one effect more begins. Which hypotheses are compared, and what is concluded from them, is
+//! [`crate::diagnose`]'s.
+
+pub(crate) mod band;
+pub(crate) mod descent;
+pub(crate) mod determined;
+pub(crate) mod discrepancy;
+pub(crate) mod fit;
+pub(crate) mod hidden;
+pub(crate) mod likelihood;
+pub(crate) mod model;
+mod parameters;
+pub(crate) mod scales;
+pub(crate) mod scatter;
+mod series;
+pub(crate) mod starts;
+pub(crate) mod tracking;
+
+use std::fmt;
+
+use crate::effects::Effect;
+pub use fit::Fit;
+pub use model::{BaseParameter, Model};
+
+/// What a record is explained by.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Hypothesis {
+    /// The model as given.
+    NoGap,
+    /// Its parameters, fitted.
+    Parameters,
+    /// Effects beside them, in the order they were found.
+    Effects(Vec<Effect>),
+}
+
+impl Hypothesis {
+    /// Its effects.
+    #[must_use]
+    pub fn effects(&self) -> &[Effect] {
+        match self {
+            Self::Effects(effects) => effects,
+            Self::NoGap | Self::Parameters => &[],
+        }
+    }
+}
+
+/// The name in files: ids joined by `+`, `parameters` or `no_gap`.
+impl fmt::Display for Hypothesis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoGap => f.write_str("no_gap"),
+            Self::Parameters => f.write_str("parameters"),
+            Self::Effects(effects) => {
+                let ids: Vec<&str> = effects.iter().map(|e| e.info().id).collect();
+                f.write_str(&ids.join("+"))
+            }
+        }
+    }
+}
