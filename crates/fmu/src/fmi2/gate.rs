@@ -1,4 +1,4 @@
-//! The one way in from C: null check, re-entry check, call sequence, `catch_unwind`, log.
+//! Every call from C passes here: null check, re-entry check, call sequence, `catch_unwind`, log.
 //!
 //! A refused call (a wrong place in the sequence, a bad argument) returns `fmi2Error`, logs why, and changes nothing.
 //! A motion that is no longer finite leaves the instance in [`Mode::Error`], from where a stored state, a reset or
@@ -190,7 +190,7 @@ functions! {
     fmi3ActivateModelPartition: NOWHERE;
 }
 
-/// What an instance marks itself with, so that a pointer to something else is noticed.
+/// First field of every instance, by which a pointer to something else is noticed.
 const MARK: u64 = 0x6569_786f_2d46_4d55;
 
 /// An instance, as the importer's pointer leads to it.
@@ -255,7 +255,7 @@ impl Write for Message {
 
 impl Log {
     /// Whether messages of a status go out.
-    fn wants(&self, status: Status) -> bool {
+    fn is_enabled(&self, status: Status) -> bool {
         let kind = status as usize;
         (1..=4).contains(&kind) && self.on[kind - 1]
     }
@@ -266,7 +266,7 @@ impl Log {
             Sink::Two(callbacks) => callbacks.logger.is_some(),
             Sink::Three { message, .. } => message.is_some(),
         };
-        if !there || !self.wants(status) {
+        if !there || !self.is_enabled(status) {
             return;
         }
         let mut text = Message { bytes: [0; 480], len: 0 };
@@ -293,7 +293,7 @@ impl Log {
 }
 
 impl Body {
-    /// What a call is refused with.
+    /// Logs why a call is refused, and gives its status.
     fn refuse(&self, function: Function, fault: &Fault) -> Status {
         self.log.send(Status::Error, format_args!("{}: {fault}", function.name()));
         Status::Error
@@ -430,7 +430,7 @@ pub(crate) unsafe fn enter(
 ) -> Status {
     // SAFETY: the caller's.
     let Some(instance) = (unsafe { instance(c) }) else { return Status::Error };
-    // Taken and looked at in one: two threads at once, which the standard forbids, do not both come in.
+    // Set and tested in one operation: of two threads at once, which the standard forbids, only one enters.
     if instance.busy.swap(true, Ordering::Acquire) {
         return Status::Error;
     }
@@ -470,7 +470,7 @@ pub(crate) unsafe fn text<'a>(text: super::abi::Text) -> &'a str {
 mod tests {
     use super::*;
 
-    fn quiet() -> Log {
+    fn silent_log() -> Log {
         let callbacks = Callbacks {
             logger: None,
             allocate: None,
@@ -483,7 +483,7 @@ mod tests {
 
     #[test]
     fn a_panic_becomes_fatal_and_only_freeing_is_left() {
-        let c = create(Starts::default(), quiet());
+        let c = create(Starts::default(), silent_log());
         // SAFETY: a live instance, freed at the end.
         unsafe {
             assert_eq!(enter(c, Function::fmi2Reset, |_| panic!("a fault on purpose")), Status::Fatal);
@@ -495,7 +495,7 @@ mod tests {
 
     #[test]
     fn the_logger_cannot_call_back_into_a_busy_instance() {
-        let c = create(Starts::default(), quiet());
+        let c = create(Starts::default(), silent_log());
         // SAFETY: a live instance, freed at the end; the inner calls are what is tested.
         unsafe {
             let outer = enter(c, Function::fmi2Reset, |_| {

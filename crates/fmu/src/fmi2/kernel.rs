@@ -152,7 +152,7 @@ impl Kernel {
         self.stop
     }
 
-    /// Sets an input or a parameter; what may be set when is the caller's to know.
+    /// Sets an input or a parameter; the caller checks that it may be set now.
     pub fn set(&mut self, index: usize, value: f64) {
         self.values.0[index] = value;
         // The torque is no part of the axis, so that setting it each step costs nothing; before the first step it
@@ -258,7 +258,7 @@ impl Kernel {
         self.state = state;
     }
 
-    /// The same with effects on the torque's way in or on the positions' way out.
+    /// The same with effects that transform the torque (an input) or the readings (a sensor).
     fn run_with_histories(&mut self, from: f64, torque: f64, count: u32, h: f64) -> Result<(), StepError> {
         let (axis, effects) = (&self.axis, self.axis.effects());
         let delay = |effect: Effect| effect.delay_parameter().map_or(0.0, |i| effects.of(effect)[i]);
@@ -268,7 +268,7 @@ impl Kernel {
                 return Err(too_long(effect, delay(effect)));
             }
         }
-        // What two delays of the readings need together is told of the longer one.
+        // The sum of the readings' delays must be covered; the error names the longest of them.
         let sensors = axis.on().sensors();
         let all: f64 = sensors.iter().map(|&e| delay(e)).sum();
         let longest = sensors.iter().copied().reduce(|a, b| if delay(b) > delay(a) { b } else { a });
@@ -413,21 +413,21 @@ impl Kernel {
         Ok(())
     }
 
-    /// Hands every number of the simulation to `word`, which may change it: the one way in and out of a stored state,
+    /// Calls `visit` on every number of the simulation, which it may change: a stored state is written and read by this function alone,
     /// but for the axis: see [`Kernel::restore`].
-    pub(super) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
-        self.values.0.iter_mut().for_each(&mut *word);
+    pub(super) fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
+        self.values.0.iter_mut().for_each(&mut *visit);
         for number in [&mut self.rate, &mut self.last_rate, &mut self.start, &mut self.stop, &mut self.time] {
-            word(number);
+            visit(number);
         }
         for flag in [&mut self.live, &mut self.stale] {
             let mut value = f64::from(u8::from(*flag));
-            word(&mut value);
+            visit(&mut value);
             *flag = value != 0.0;
         }
-        self.state.words(word);
-        self.torques.words(word);
-        self.readings.words(word);
+        self.state.visit_numbers(visit);
+        self.torques.visit_numbers(visit);
+        self.readings.visit_numbers(visit);
     }
 
     /// Length of the internal step last used, s.
@@ -435,21 +435,21 @@ impl Kernel {
         self.axis.h()
     }
 
-    /// Makes the axis anew for what [`Kernel::words`] has put in, with internal steps of `h` s; false when the values
-    /// are none that could have been stored.
+    /// Makes the axis anew from the numbers that [`Kernel::visit_numbers`] has set, with internal steps of `h` s; false when a
+    /// number is out of its bounds.
     pub(super) fn restore(&mut self, h: f64) -> bool {
         let within = |(value, v): (&f64, Variable)| {
             value.is_finite() && v.min.is_none_or(|m| m <= *value) && v.max.is_none_or(|m| *value <= m)
         };
-        let sound = self.values.0.iter().zip(all()).all(within)
+        let valid = self.values.0.iter().zip(all()).all(within)
             && [self.rate, self.last_rate, self.start, self.time].iter().all(|x| x.is_finite())
             && h > 0.0
             && h.is_finite();
-        if sound {
+        if valid {
             let v = &self.values;
             self.axis = Axis::new(v.parameters(), v.structure(), v.effects(), v.scheme(), h);
         }
-        sound
+        valid
     }
 }
 

@@ -1,8 +1,8 @@
 //! The FMU: FMI 2.0 co-simulation, its C ABI and the simulation behind it, which [`crate::fmi3`] shares.
 //!
-//! [`simulation`] is what runs, safe and without a heap: [`kernel`] the axis, [`drive`] the drive; [`stored`] is its state as bytes; `gate` the one way in from C (null
-//! check, call sequence, `catch_unwind`), and `exports` the functions of `fmi2Functions.h`. No globals: everything lives
-//! in the instance.
+//! [`simulation`] is what runs, in safe code and without a heap: [`kernel`] is the axis, [`drive`] the drive, [`stored`] its
+//! state as bytes. Every call from C passes `gate` (null check, call sequence, `catch_unwind`) to `exports`, the functions of
+//! `fmi2Functions.h`. No globals: everything lives in the instance.
 
 mod abi;
 mod baked;

@@ -31,7 +31,7 @@ impl Force for ExternalSpring {
         example: &[5e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
-    const CARRIED: bool = true;
+    const STATIC_LOAD: bool = true;
 
     fn rate(p: &[f64], inertia: f64) -> f64 {
         if inertia > 0.0 { (p[0] / inertia).sqrt() } else { 0.0 }

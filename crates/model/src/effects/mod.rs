@@ -118,11 +118,11 @@ macro_rules! effects {
                 }
             }
 
-            /// True for a force that is constant or given by the position alone: see [`Force::CARRIED`].
+            /// True for a static load, a force that is constant or given by the position alone: see [`Force::STATIC_LOAD`].
             #[must_use]
-            pub const fn is_carried(self) -> bool {
+            pub const fn is_static_load(self) -> bool {
                 match self {
-                    $(Self::$name => when!(force, $shape, <$law as Force>::CARRIED, false),)*
+                    $(Self::$name => when!(force, $shape, <$law as Force>::STATIC_LOAD, false),)*
                 }
             }
 
@@ -190,7 +190,7 @@ macro_rules! effects {
                 }
             }
 
-            /// Brings its internal states along when the speed at its place jumps: see [`Force::jumped`].
+            /// Corrects its internal states when the speed at its place jumps: see [`Force::jumped`].
             pub(crate) fn jumped<S: Scalar>(self, p: &[S], memory: &mut [S], jump: S) {
                 match self {
                     $(Self::$name => when!(force, $shape, <$law>::jumped(p, memory, jump), { let _ = (p, memory, jump); }),)*
@@ -204,7 +204,7 @@ macro_rules! effects {
                 }
             }
 
-            /// Does it with the effect's law on the motion.
+            /// Runs an operation with the effect's law on the motion.
             #[inline]
             pub fn with_law<W: WithLaw>(self, work: W) -> W::Output {
                 match self {

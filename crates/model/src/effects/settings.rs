@@ -144,7 +144,7 @@ impl<S: Scalar> Settings<S> {
 
     /// The same without derivatives.
     #[must_use]
-    pub fn plain(&self) -> Settings<f64> {
+    pub fn primal(&self) -> Settings<f64> {
         Settings { values: self.values.map(S::re) }
     }
 
@@ -214,8 +214,8 @@ impl<S: Scalar> Settings<S> {
         sum
     }
 
-    /// Sums the forces and what slides: torque on motor and table and the tangent; the internal states reach their end on
-    /// trial.
+    /// Sum of the forces and of sliding friction: torque on motor and table, N.m, and the tangent. It sets the internal states'
+    /// end on trial.
     #[inline]
     pub(crate) fn forces(
         &self,
@@ -237,7 +237,7 @@ impl<S: Scalar> Settings<S> {
             if moment.slides != 0.0 {
                 sum.add(coordinate, &self.reaction(effect, base, &moment, memory));
                 if self.is_loaded(effect) {
-                    // The level hangs on the motion of both inertias, through the load.
+                    // The level depends on the motion of both inertias, through the load.
                     let towards = if load.torque[0].re() < 0.0 { -moment.slides } else { moment.slides };
                     let per = effect.level(self.of(effect), &slip(&moment)).per_load * towards;
                     let row = usize::from(coordinate == Coordinate::Table);
@@ -251,7 +251,7 @@ impl<S: Scalar> Settings<S> {
         sum
     }
 
-    /// The torque of one effect on the motion; its internal states reach their end on trial.
+    /// The torque of one effect on the motion; it sets its internal states' end on trial.
     #[inline]
     fn reaction(&self, effect: Effect, base: &Base<S>, moment: &Moment<S>, memory: &mut Internals<S>) -> Reaction<S> {
         let memory = &mut memory[memory_of(effect)];
@@ -325,7 +325,7 @@ pub(crate) struct Forces<S> {
     pub torque: [S; 2],
     pub stiffness: [[f64; 2]; 2],
     pub damping: [[f64; 2]; 2],
-    /// Sum of the laws' bends: zero if all are straight.
+    /// Sum of the laws' curvature bounds, N.m/rad2: zero if all are linear.
     pub curvature: f64,
 }
 
@@ -426,7 +426,7 @@ mod tests {
     use super::*;
     use crate::axis::tests::shown;
 
-    /// Newton's method ends where the curvature says that its step has left nothing.
+    /// Newton's method ends where the curvature bounds the residual after its step.
     #[test]
     fn no_law_leaves_its_tangent_by_more_than_its_curvature_bound() {
         let base = Base { k: 1.76e-2, b: 5.4e-4, rigid: false };
