@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::gate::Mode;
 use super::kernel::StepError;
+use super::sequence::Mode;
 use crate::axis::ParameterError;
 use crate::variables::Named;
 

@@ -3,7 +3,7 @@
 //! Bytes read may come from anywhere and are not trusted: length, magic, GUID and checksum must fit, and a count or a flag,
 //! stored as `f64`, is clamped to its range.
 
-use super::gate::Mode;
+use super::sequence::Mode;
 use super::simulation::Simulation;
 use crate::variables::{Starts, guid};
 

@@ -4,7 +4,8 @@ use std::ffi::{c_int, c_uint};
 
 use super::super::abi::{Component, Status, Text};
 use super::super::fault::Fault;
-use super::super::gate::{self, Body, Function, Mode};
+use super::super::gate::{self, Body};
+use super::super::sequence::{Function, Mode};
 use super::{array, array_mut, call, typed};
 use crate::variables::{Causality, Model, Named, Type, Variability};
 
