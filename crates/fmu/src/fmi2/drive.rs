@@ -3,7 +3,7 @@
 //! A sample reads the inputs as they are at its time; what it computes is put out when the next one is due, as in a drive
 //! that computes during a sample. So no input reaches an output directly, and masters need no order.
 
-use super::kernel::{MOST_STEPS, StepError};
+use super::step_error::{MOST_STEPS, StepError};
 use crate::drive::{Drive, Gains};
 use crate::variables::{DRIVE, DriveSlot, Starts};
 

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::kernel::StepError;
 use super::sequence::Mode;
+use super::step_error::StepError;
 use crate::axis::ParameterError;
 use crate::variables::Named;
 

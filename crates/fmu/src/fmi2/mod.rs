@@ -12,8 +12,10 @@ mod fault;
 mod gate;
 pub mod kernel;
 mod log;
+mod outputs;
 mod sequence;
 pub mod simulation;
+pub mod step_error;
 pub mod stored;
 
 pub use abi::*;

@@ -1,7 +1,8 @@
 //! The simulation behind an instance: the axis or the drive.
 
 use super::drive::DriveKernel;
-use super::kernel::{Kernel, StepError};
+use super::kernel::Kernel;
+use super::step_error::StepError;
 use crate::axis::ParameterError;
 use crate::variables::{Model, Starts};
 
