@@ -6,28 +6,34 @@
 //! in [the list](EFFECTS)** (`tests/new_effect.rs` adds one). Everything else (the FMU's parameters, `--set`, the diagnosis, the documentation, the
 //! tests every effect must pass) iterates the list.
 
+mod active;
 mod encoders;
 mod extent;
 mod family;
+mod forces;
 mod hypotheses;
 mod info;
 mod input;
 mod law;
+mod lookup;
 mod sensor;
 mod settings;
 mod shapes;
 mod side;
 mod transmitted;
 
+pub use active::{ActiveEffects, effect_scope};
 pub use extent::Extent;
 pub use family::{Contrast, Family};
+pub(crate) use forces::{Forces, StepMotion};
 pub use info::{EffectInfo, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 use law::{Absent, Forced, Sliding};
 pub use law::{Law, WithLaw};
+pub use lookup::UnknownEffect;
 pub use sensor::{Reading, Seen, SensorHistory};
-pub use settings::{ActiveEffects, MEMORY, Memory, PARAMETERS, Settings, UnknownEffect, effect_scope, memory_of};
-pub(crate) use settings::{Forces, Internals, MEMORY_OF_ONE, StepMotion};
+pub(crate) use settings::{Internals, MEMORY_OF_ONE};
+pub use settings::{MEMORY, Memory, PARAMETERS, Settings, memory_of};
 pub(crate) use shapes::Modes;
 pub use shapes::{
     Base, Coordinate, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip,

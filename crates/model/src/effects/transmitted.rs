@@ -1,7 +1,9 @@
 //! The torque that the axis transmits, which is the load of a friction that grows with it.
 
 use super::Effect;
-use super::settings::{ActiveEffects, Forces, React, Settings, StepMotion};
+use super::active::ActiveEffects;
+use super::forces::{Forces, React, StepMotion};
+use super::settings::Settings;
 use super::shapes::{Base, Coordinate, Reaction};
 use crate::scalar::Scalar;
 
