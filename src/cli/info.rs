@@ -30,7 +30,7 @@ pub struct Args {
 
 fn causality(word: &str) -> Result<Causality, String> {
     word.parse().map_err(|()| {
-        let all: Vec<&str> = Causality::ALL.iter().map(|c| c.word()).collect();
+        let all: Vec<&str> = Causality::ALL.iter().map(|c| c.keyword()).collect();
         format!("one of {}", all.join(", "))
     })
 }
@@ -49,7 +49,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if document.root.name == "fmiModelDescription"
         && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3."))
     {
-        let words: Vec<String> = args.causality.iter().map(|c| c.word().to_owned()).collect();
+        let words: Vec<String> = args.causality.iter().map(|c| c.keyword().to_owned()).collect();
         let platforms = platforms(&archive);
         if args.json {
             out!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
@@ -282,10 +282,10 @@ fn as_json(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
             json!({
                 "name": v.name,
                 "valueReference": v.value_reference,
-                "type": v.base().word(),
-                "causality": v.causality.word(),
-                "variability": v.variability.word(),
-                "initial": v.initial().map(|i| i.word()),
+                "type": v.base().keyword(),
+                "causality": v.causality.keyword(),
+                "variability": v.variability.keyword(),
+                "initial": v.initial().map(|i| i.keyword()),
                 "start": match &v.start {
                     Some(Value::Real(x)) => json!(x),
                     Some(Value::Integer(x)) => json!(x),

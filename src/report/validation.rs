@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::chart::{Axis, Chart, Colour, Dash, Series};
 use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
 use crate::fmu::reference::Comparison;
-use crate::fmu::rules::{Outcome, Report as Validation, Rule, Severity, Verdict as Result};
+use crate::fmu::rules::{Outcome, Report as Validation, Rule, RuleStatus, Severity};
 
 /// Findings of one rule that are listed; the rest are counted.
 const MOST: usize = 200;
@@ -30,7 +30,7 @@ pub fn report(v: &Validation, comparison: Option<&Comparison>, strict: bool) -> 
     }
 }
 
-fn count(v: &Validation, wanted: fn(&Result) -> bool) -> u64 {
+fn count(v: &Validation, wanted: fn(&RuleStatus) -> bool) -> u64 {
     v.rules.iter().filter(|(_, verdict)| wanted(verdict)).count() as u64
 }
 
@@ -57,8 +57,8 @@ fn verdict(v: &Validation, comparison: Option<&Comparison>, strict: bool) -> Blo
             ("errors".to_owned(), number(Severity::Error)),
             ("warnings".to_owned(), number(Severity::Warning)),
             ("notes".to_owned(), number(Severity::Note)),
-            ("rules passed".to_owned(), Cell::Count(count(v, |r| *r == Result::Passed))),
-            ("not tested".to_owned(), Cell::Count(count(v, |r| matches!(r, Result::NotTested(_))))),
+            ("rules passed".to_owned(), Cell::Count(count(v, |r| *r == RuleStatus::Passed))),
+            ("not tested".to_owned(), Cell::Count(count(v, |r| matches!(r, RuleStatus::NotTested(_))))),
         ],
     })
 }
@@ -105,13 +105,13 @@ fn of(v: &Validation, rule: &Rule) -> &'static str {
 }
 
 /// A verdict in words, with its reason.
-fn words(rule: &Rule, verdict: &Result) -> (String, String) {
+fn words(rule: &Rule, verdict: &RuleStatus) -> (String, String) {
     match verdict {
-        Result::Passed => ("passed".into(), String::new()),
-        Result::Failed => (rule.severity.to_string(), String::new()),
-        Result::NotTested(why) => ("not tested".into(), why.clone()),
-        Result::NotApplicable(why) => ("not applicable".into(), why.clone()),
-        Result::Skipped => ("left out".into(), String::new()),
+        RuleStatus::Passed => ("passed".into(), String::new()),
+        RuleStatus::Failed => (rule.severity.to_string(), String::new()),
+        RuleStatus::NotTested(why) => ("not tested".into(), why.clone()),
+        RuleStatus::NotApplicable(why) => ("not applicable".into(), why.clone()),
+        RuleStatus::Skipped => ("left out".into(), String::new()),
     }
 }
 
@@ -122,7 +122,7 @@ fn by_section(v: &Validation) -> Section {
     names.dedup();
     let blocks = names.into_iter().map(|section| {
         let rules: Vec<_> = v.rules.iter().filter(|(rule, _)| of(v, rule) == section).collect();
-        let found = rules.iter().filter(|(_, verdict)| *verdict == Result::Failed).count();
+        let found = rules.iter().filter(|(_, verdict)| *verdict == RuleStatus::Failed).count();
         let told: Vec<_> = rules.iter().map(|(rule, verdict)| (rule, words(rule, verdict))).collect();
         let explained = told.iter().any(|(_, (_, why))| !why.is_empty());
         let mut columns = vec!["rule", "what holds when it passes", "verdict"];
@@ -144,7 +144,7 @@ fn by_section(v: &Validation) -> Section {
 fn untested(v: &Validation) -> Option<Section> {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     for (rule, verdict) in &v.rules {
-        if let Result::NotTested(why) = verdict {
+        if let RuleStatus::NotTested(why) = verdict {
             match reasons.iter_mut().find(|(reason, _)| reason == why) {
                 Some((_, rules)) => rules.push(rule.id),
                 None => reasons.push((why, vec![rule.id])),

@@ -22,7 +22,7 @@ pub(in super::super) fn load(setup: &Setup) -> Tested {
     }
 }
 
-/// Functions that a host needs, whatever the capability flags say.
+/// Functions that a host needs, whatever the capability flags declare.
 const CORE: [Call; 19] = [
     Call::get_types_platform,
     Call::get_version,
@@ -175,13 +175,13 @@ pub(in super::super) fn initialise(p: &Probe) -> Tested {
     Ok(vec![])
 }
 
-/// Initialises an instance, the only one; what to say where that fails.
+/// Initialises an instance, the only one; the message where that fails.
 fn initialises(p: &Probe, how: &str, tolerance: Option<f64>, stop: Option<f64>) -> Tested {
     let mut instance = p.instantiate()?;
     let begun = instance.setup_experiment(tolerance, p.start, stop);
     let ended = begun.and_then(|()| instance.enter_initialization()).and_then(|()| instance.exit_initialization());
-    let said = last_words(&instance);
-    Ok(ended.err().map(|error| format!("{how} the FMU does not initialise: {error}{said}")).into_iter().collect())
+    let message = last_log_message(&instance);
+    Ok(ended.err().map(|error| format!("{how} the FMU does not initialise: {error}{message}")).into_iter().collect())
 }
 
 /// "stopTimeDefined = fmi2False: no final value of the independent variable is defined" (section 2.1.6).
@@ -225,15 +225,15 @@ pub(in super::super) fn step_status(p: &Probe) -> Tested {
                 }
                 break;
             }
-            // Failing steps are the next rule's.
+            // Failing steps are reported by the next rule.
             _ => {}
         }
     }
     Ok(vec![])
 }
 
-/// What the FMU logged last, for a message.
-pub(super) fn last_words(instance: &Instance) -> String {
+/// The last log message of the FMU, as the end of a finding; empty where there is none.
+pub(super) fn last_log_message(instance: &Instance) -> String {
     instance.take_log().last().map_or(String::new(), |m| format!("; the FMU says: {}", m.message))
 }
 

@@ -125,7 +125,7 @@ fn skips_calls<'a>(p: &Probe, variables: &[(&'a str, u32)]) -> Option<(&'a str, 
     })
 }
 
-/// What there is to say of an FMU that does not go by the step size; none where it does.
+/// The message for an FMU that ignores the step size; none where it does not.
 fn other_size(p: &Probe, courses: &Courses<'_>) -> Option<String> {
     let (h, half) = (p.step, p.step / 2.0);
     if let Some(name) = ignores_size(courses) {
@@ -179,14 +179,14 @@ pub(in super::super) fn convergence(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// How far a variable goes.
+/// Range of a variable over a course.
 pub(super) fn range(rows: &[Vec<f64>], at: usize) -> f64 {
     let low = rows.iter().map(|row| row[at]).fold(f64::INFINITY, f64::min);
     let high = rows.iter().map(|row| row[at]).fold(f64::NEG_INFINITY, f64::max);
     high - low
 }
 
-/// Whether steps of half and of twice the size both fail, where those of the size do not; what to say then. One of the two
+/// Whether steps of half and of twice the size both fail, where those of the size do not; the message then. One of the two
 /// may fail where the FMU has a fixed step of its own, or ends.
 fn takes_one_size(p: &Probe) -> Result<Option<String>, HostError> {
     let fails = |size: f64| -> Result<Option<Status>, HostError> {
@@ -255,8 +255,8 @@ pub(in super::super) fn variable(p: &Probe) -> Tested {
     if !p.interface().can_handle_variable_step_size {
         return not_applicable("canHandleVariableCommunicationStepSize is false");
     }
-    if let Some(said) = takes_one_size(p)? {
-        return Ok(vec![said]);
+    if let Some(message) = takes_one_size(p)? {
+        return Ok(vec![message]);
     }
     let count = 8;
     let courses = two_sizes(p, count)?;
@@ -403,7 +403,7 @@ pub(in super::super) fn nan_input(p: &Probe) -> Tested {
     for value in [f64::NAN, f64::INFINITY, 1e300] {
         let mut instance = p.ready()?;
         p.run(&mut instance, 0, 2)?;
-        // Any status will do; coming back is what counts.
+        // Any status is allowed, as long as the call returns.
         let _ = instance.set_real(&references, &vec![value; references.len()]);
         for k in 2..4 {
             let _ = instance.do_step_status(p.time(k), p.step, true)?;
@@ -457,7 +457,7 @@ pub(in super::super) fn status_functions(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 1)?;
     instance.status_calls();
-    // There is no step to cancel; the call must come back all the same.
+    // There is no step to cancel; the call must return all the same.
     let _ = instance.cancel_step();
     Ok(vec![])
 }

@@ -37,11 +37,11 @@ pub(super) fn show(value: &Value) -> String {
     }
 }
 
-/// Whether two values are the same but for what printing takes off them.
+/// Whether two values are the same up to the digits that printing cuts.
 pub(super) fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Real(x), Value::Real(y)) => {
-            // What is next to nothing beside 1 may print as 0.
+            // A subnormal number may be printed as 0.
             x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= (PRINTED * x.abs().max(y.abs())).max(1e-300)
         }
         _ => a == b,
@@ -90,7 +90,7 @@ pub(in super::super) fn start_settable(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// What was set and read again: name, kind, as set, as read.
+/// A variable that was set and read again: name, kind, value set, value read.
 type Kept<'a> = (&'a str, &'static str, f64, f64);
 
 /// Sets Real parameters before initialisation and inputs after it, and reads them. An input that takes effect with the
@@ -106,7 +106,7 @@ fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
             written.push((v, value));
         }
     }
-    // Other parameters may not go together; then only inputs are tested.
+    // Other parameters may contradict each other; then only inputs are tested.
     if instance.initialize(p.start, None).is_err() {
         instance.free();
         instance = p.instantiate()?;
@@ -147,9 +147,10 @@ fn is_rounded(value: f64, read: f64) -> bool {
 }
 
 pub(in super::super) fn set_get(p: &Probe) -> Tested {
-    let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
+    let describe =
+        |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
     let mut problems: Vec<String> =
-        kept(p)?.into_iter().filter(|(_, _, value, read)| !is_rounded(*value, *read)).map(say).collect();
+        kept(p)?.into_iter().filter(|(_, _, value, read)| !is_rounded(*value, *read)).map(describe).collect();
     let mut instance = p.ready()?;
     for v in p.inputs() {
         let Some(value) = &v.start else { continue };
@@ -174,8 +175,9 @@ pub(in super::super) fn set_get(p: &Probe) -> Tested {
 
 pub(in super::super) fn set_get_rounded(p: &Probe) -> Tested {
     let rounded = kept(p)?.into_iter().filter(|(_, _, value, read)| value != read && is_rounded(*value, *read));
-    let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
-    Ok(rounded.map(say).collect())
+    let describe =
+        |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
+    Ok(rounded.map(describe).collect())
 }
 
 /// A tunable parameter that acts when it is set before the run acts when it is set during it.
@@ -184,8 +186,8 @@ pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
     p.comparable()?;
     let (n, cut) = (p.steps(), p.steps() / 3);
     p.affordable(12 * n)?;
-    // As far as the FMU goes: some end their run of themselves.
-    let as_far = |instance: &mut Instance, from: usize| -> Vec<Snapshot> {
+    // Up to the end of the run, which some FMUs set themselves.
+    let until_end = |instance: &mut Instance, from: usize| -> Vec<Snapshot> {
         let mut record = Vec::new();
         for k in from..3 * n {
             match p.run(instance, k, k + 1) {
@@ -195,9 +197,9 @@ pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
         }
         record
     };
-    let mut plain = p.ready()?;
-    let expected = as_far(&mut plain, 0);
-    plain.free();
+    let mut reference = p.ready()?;
+    let expected = until_end(&mut reference, 0);
+    reference.free();
     if expected.len() < n {
         return not_tested("the run is too short");
     }
@@ -219,9 +221,9 @@ pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
             let mut instance = p.ready()?;
             p.run(&mut instance, 0, cut)?;
             set(&mut instance, v, &value)?;
-            Ok(as_far(&mut instance, cut))
+            Ok(until_end(&mut instance, cut))
         };
-        // What cannot be set, or fails with that value, is another rule's.
+        // A value that cannot be set, or fails, is reported by another rule.
         let (early, late) = match (early(), late()) {
             (Err(HostError::OnlyOnce), _) | (_, Err(HostError::OnlyOnce)) => return Err(HostError::OnlyOnce.into()),
             (Ok(early), Ok(late)) => (early, late),
@@ -229,7 +231,7 @@ pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
         };
         any = true;
         let own = [v.value_reference];
-        if p.answers(&expected[..n], &early, &own) && !p.answers(&expected[cut..], &late, &own) {
+        if p.responds(&expected[..n], &early, &own) && !p.responds(&expected[cut..], &late, &own) {
             problems.push(format!(
                 "the tunable parameter \"{}\" set to {} during the run changes nothing; set before it, it does",
                 v.name,
@@ -260,12 +262,12 @@ pub(in super::super) fn get_consistent(p: &Probe) -> Tested {
     }
     let end = p.observe(&mut instance)?;
     instance.free();
-    let mut quiet = p.ready()?;
+    let mut unread = p.ready()?;
     for k in 0..n {
-        p.drive(&mut quiet, p.time(k))?;
-        quiet.do_step(p.time(k), p.step)?;
+        p.drive(&mut unread, p.time(k))?;
+        unread.do_step(p.time(k), p.step)?;
     }
-    let what = p.difference(&p.observe(&mut quiet)?, &end);
+    let what = p.difference(&p.observe(&mut unread)?, &end);
     Ok(what
         .map(|what| format!("reading values changes the run: {what} when values were read at every step"))
         .into_iter()
@@ -280,10 +282,11 @@ pub(in super::super) fn boolean_values(p: &Probe) -> Tested {
     }
     p.run(&mut instance, 0, 3)?;
     let references: Vec<u32> = booleans.iter().map(|v| v.value_reference).collect();
-    let say = |v: &Variable, value: i32| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name);
+    let describe =
+        |v: &Variable, value: i32| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name);
     let wrong = |values: Vec<i32>| -> Vec<String> {
         let odd = booleans.iter().zip(values).filter(|(_, value)| !matches!(value, 0 | 1));
-        odd.map(|(v, value)| say(v, value)).collect()
+        odd.map(|(v, value)| describe(v, value)).collect()
     };
     let found = wrong(instance.get_boolean_raw(&references)?);
     if !found.is_empty() {
@@ -292,7 +295,7 @@ pub(in super::super) fn boolean_values(p: &Probe) -> Tested {
     instance.free();
     let look = |instance: &mut Instance, time: f64| {
         let first = wrong(instance.get_boolean_raw(&references)?).into_iter().next();
-        Ok(first.map(|said| format!("{said}, at t = {time}")))
+        Ok(first.map(|problem| format!("{problem}, at t = {time}")))
     };
     Ok(watch(p, false, look)?.into_iter().collect())
 }
@@ -333,8 +336,8 @@ pub(in super::super) fn unchanging(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// Looks at an instance before each step of the default experiment, as far as time allows, until there is something to
-/// say; `driven` with varying inputs, and then as long as a comparison.
+/// Calls `look` on an instance before each step of the default experiment, as far as time allows, until it finds a problem;
+/// `driven` with varying inputs, and then for the length of a comparison.
 fn watch(
     p: &Probe,
     driven: bool,
@@ -348,14 +351,14 @@ fn watch(
     let steps = ((stop - p.start) / p.step * (1.0 - 1e-12)).ceil() as usize;
     let end = std::time::Instant::now() + std::time::Duration::from_millis(150);
     for k in 0..=steps {
-        let said = look(&mut instance, p.time(k))?;
-        if said.is_some() || k == steps || std::time::Instant::now() > end {
-            return Ok(said);
+        let problem = look(&mut instance, p.time(k))?;
+        if problem.is_some() || k == steps || std::time::Instant::now() > end {
+            return Ok(problem);
         }
         if driven {
             p.drive(&mut instance, p.time(k))?;
         }
-        // A run that ends early has shown what it has.
+        // A run that ends early has been seen to its end.
         if !instance.do_step_status(p.time(k), p.step, true)?.is_ok() {
             return Ok(None);
         }
@@ -376,7 +379,7 @@ pub(in super::super) fn finite(p: &Probe) -> Tested {
         Ok(bad.map(|(v, value)| format!("the output \"{}\" is {value} at t = {time}", v.name)))
     };
     let found = watch(p, false, look)?;
-    // Values chosen here count against an FMU that says which ones it takes.
+    // Values chosen here count as legal where the FMU declares which ones it takes.
     let bounded = |v: &Variable| {
         let r = p.d.resolved(v);
         v.base() != BaseType::Real || r.min.is_some() && r.max.is_some()
@@ -412,7 +415,7 @@ pub(in super::super) fn range(p: &Probe) -> Tested {
                 Value::Integer(i) => i as f64,
                 _ => continue,
             };
-            // A rounding error beyond the limit is none of the user's concern.
+            // A rounding error beyond the limit is not a finding.
             let slack = 1e-9 * value.abs().max(1.0);
             if value < low - slack || value > high + slack {
                 return Ok(Some(format!("\"{}\" is {value} at t = {time}, outside {low} to {high}", v.name)));
@@ -424,7 +427,7 @@ pub(in super::super) fn range(p: &Probe) -> Tested {
     // No input makes an enumeration leave its items.
     let items = watched.iter().any(|(.., items)| !items.is_empty());
     let driven = found.is_none() && items && p.learned.stimulus;
-    let found = if driven { watch(p, true, look)?.filter(|said| said.contains("no item")) } else { found };
+    let found = if driven { watch(p, true, look)?.filter(|problem| problem.contains("no item")) } else { found };
     Ok(found.into_iter().collect())
 }
 

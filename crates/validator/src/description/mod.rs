@@ -5,16 +5,16 @@
 //! report it (see `rules::schema`, which checks every attribute). [`Description::parse`] fails only on a document that
 //! is not well-formed or whose root is not a model description of FMI 2.0 or 3.0.
 
+mod keywords;
 mod read;
 pub mod three;
-mod words;
 
 use super::xml::{Document, Position, XmlError};
 
+pub use keywords::*;
 use read::*;
 pub use read::{parse_boolean, parse_integer, parse_real};
 pub use three::{Cell, Clock, Kind};
-pub use words::*;
 
 /// Why no description could be read.
 #[derive(Debug, thiserror::Error)]

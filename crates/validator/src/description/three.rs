@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use super::super::xml::{Element, Position};
-use super::read::{flag, head, number, parse_boolean, parse_real, real, text, type_attributes, word};
+use super::read::{flag, head, keyword, number, parse_boolean, parse_real, real, text, type_attributes};
 use super::{
     BaseType, Causality, DependencyKind, Description, Fmi, Interface, ModelStructure, SimpleType, TypeAttributes,
     Unknown, Value, Variability, Variable,
@@ -57,7 +57,7 @@ impl Kind {
 
     /// The element's name.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn keyword(self) -> &'static str {
         match self {
             Self::Float32 => "Float32",
             Self::Float64 => "Float64",
@@ -80,7 +80,7 @@ impl Kind {
     /// The type of an element's name.
     #[must_use]
     pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.word() == name)
+        Self::ALL.into_iter().find(|kind| kind.keyword() == name)
     }
 
     /// The type of FMI 2.0 that it is treated as; bytes are texts of hexadecimal digits, as the XML has them.
@@ -153,7 +153,7 @@ struct Raw<'a> {
 
 /// Variability, with the standard's defaults (section 2.4.7.4).
 pub(in super::super) fn variability(e: &Element, kind: Kind, causality: Causality) -> Variability {
-    word(e, "variability").unwrap_or(match kind {
+    keyword(e, "variability").unwrap_or(match kind {
         _ if matches!(
             causality,
             Causality::Parameter | Causality::CalculatedParameter | Causality::StructuralParameter
@@ -189,7 +189,7 @@ fn value(kind: Kind, text: &str) -> Option<Value> {
     })
 }
 
-/// A whole number; of 64 bits without a sign, those above the signed range wrap round, as they do on the way to the FMU.
+/// An integer. An unsigned one of 64 bits above the signed range wraps around, as it does in the call of the FMU.
 fn integer(text: &str) -> Option<i64> {
     let text = text.trim();
     text.parse().ok().or_else(|| text.parse::<u64>().ok().map(|x| x as i64))
@@ -291,7 +291,7 @@ impl Description {
         let clocks = raw.iter().filter(|r| r.kind == Kind::Clock).map(|r| Clock {
             name: text(r.element, "name").unwrap_or_default(),
             reference: r.reference,
-            causality: word(r.element, "causality").unwrap_or(Causality::Local),
+            causality: keyword(r.element, "causality").unwrap_or(Causality::Local),
             interval: text(r.element, "intervalVariability").unwrap_or_default(),
             position: r.element.position,
         });
@@ -360,12 +360,12 @@ fn types(root: &Element) -> Vec<SimpleType> {
 fn expand(r: &Raw<'_>, handles: &mut Handles, variables: &mut Vec<Variable>) {
     let e = r.element;
     let count: usize = r.sizes.iter().product();
-    let causality: Causality = word(e, "causality").unwrap_or(Causality::Local);
+    let causality: Causality = keyword(e, "causality").unwrap_or(Causality::Local);
     let starts = starts(e, r.kind);
     let name = text(e, "name").unwrap_or_default();
     let first = variables.len();
     for at in 0..count {
-        // A single start value stands for all elements.
+        // A single start value is that of all elements.
         let start = starts.as_ref().and_then(|s| if s.len() == 1 { s.first() } else { s.get(at) });
         variables.push(Variable {
             name: name.clone() + &indices(&r.sizes, at),
@@ -373,7 +373,7 @@ fn expand(r: &Raw<'_>, handles: &mut Handles, variables: &mut Vec<Variable>) {
             description: text(e, "description"),
             causality,
             variability: variability(e, r.kind, causality),
-            declared_initial: word(e, "initial"),
+            declared_initial: keyword(e, "initial"),
             can_handle_multiple_set: e.get("canHandleMultipleSetPerTimeInstant").and_then(parse_boolean),
             attributes: attributes(e, r.kind),
             declared_type: text(e, "declaredType"),
@@ -468,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn the_model_structure_is_told_by_elements_and_clocks_stand_apart() {
+    fn the_model_structure_is_listed_by_elements_and_clocks_are_kept_apart() {
         let d = read(
             "<Float64 name=\"x\" valueReference=\"1\" causality=\"output\"><Dimension start=\"2\"/></Float64>\
              <Float64 name=\"dx\" valueReference=\"2\" derivative=\"1\"><Dimension start=\"2\"/></Float64>\

@@ -62,7 +62,7 @@ pub struct Instance {
     pub(super) three: Option<Three>,
     log: Arc<LogSink>,
     freed: bool,
-    /// Whether steps may be taken back: what is told by `noSetFMUStatePriorToCurrentPoint`, turned round.
+    /// Whether steps may be taken back: the negation of `noSetFMUStatePriorToCurrentPoint`.
     pub(crate) may_go_back: bool,
     // Kept for FMUs that go on using the pointers handed to them.
     pub(super) texts: [Vec<u8>; 3],
@@ -239,8 +239,8 @@ impl Instance {
             _folder: folder,
         };
         if component.is_null() {
-            let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
-            return Err(HostError::Refused { function, said: said.join("; ") });
+            let log: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
+            return Err(HostError::Refused { function, log: log.join("; ") });
         }
         Ok(instance)
     }
@@ -388,7 +388,7 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn last_successful_time(&mut self) -> Result<f64, HostError> {
         if self.three.is_some() {
-            return Ok(self.told().time);
+            return Ok(self.step_result().time);
         }
         let mut time = f64::NAN;
         checked!(self, get_real_status(2, &raw mut time)).map(|()| time)
@@ -400,7 +400,7 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn terminated(&mut self) -> Result<bool, HostError> {
         if self.three.is_some() {
-            return Ok(self.told().terminate);
+            return Ok(self.step_result().terminate);
         }
         let mut value = 0;
         checked!(self, get_boolean_status(3, &raw mut value)).map(|()| value != 0)

@@ -6,7 +6,7 @@
 //! a constant where something else speaks of them.
 //!
 //! The first section is that of FMI 2.0.4, the second that of FMI 3.0; `-` stands for none: the rule is not one of that
-//! version, or not tested for it. Titles and advice are in the words of 2.0; [`super::words`] has those of 3.0. What the standard
+//! version, or not tested for it. Titles and advice are in the terms of 2.0; [`super::wording`] has those of 3.0. What the standard
 //! leaves undefined is robustness, never conformance; and what only an importer that breaks the standard can bring out (a call out of order, an unknown reference) is a note.
 
 use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
@@ -274,7 +274,7 @@ rules! { static {
         "Parameters and inputs read as they were set", "Store each value under its own reference.";
     "set-get-other" Error Conformance "2.1.7" "-" Indirect(settings::others);
         "Integer, Boolean and String parameters read as they were set", "Store each value under its own reference, and keep it during initialisation; store a text whole, however long it is, or return fmi2Error.";
-    "set-together" Error Conformance "2.1.7" "-" Indirect(settings::together);
+    "set-together" Error Conformance "2.1.7" "-" Indirect(settings::joint);
         "Values set in one call, or in another order, are those set one by one", "Take value[i] for the reference vr[i], and let no setter change another variable; compute what follows in fmi2ExitInitializationMode.";
     "set-twice" Error Conformance "2.1.7" "-" Indirect(settings::twice);
         "Of two values set at one instant the second counts", "Store the value in each call.";

@@ -17,16 +17,16 @@ pub(super) enum Type {
     Unsigned,
     Double,
     DateTime,
-    Word(&'static [&'static str]),
+    Keyword(&'static [&'static str]),
     UnsignedList,
-    WordList(&'static [&'static str]),
-    /// A whole number from one to another.
-    Whole(i128, i128),
+    KeywordList(&'static [&'static str]),
+    /// An integer from one to another, both included.
+    IntRange(i128, i128),
     /// `xs:unsignedLong`.
     UnsignedLong,
     /// Numbers, for the elements of an array.
     DoubleList,
-    WholeList(i128, i128),
+    IntRangeList(i128, i128),
     BoolList,
     /// `xs:hexBinary`.
     Hex,
@@ -61,8 +61,8 @@ pub(super) struct Node {
 pub(super) const MANY: usize = usize::MAX;
 const KINDS: &[&str] = &["dependent", "constant", "fixed", "tunable", "discrete"];
 use Type::{
-    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, Text, Unsigned, UnsignedList, UnsignedLong, Whole,
-    WholeList, Word, WordList,
+    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, IntRange, IntRangeList, Keyword, KeywordList, Text,
+    Unsigned, UnsignedList, UnsignedLong,
 };
 
 pub(super) const fn leaf(name: &'static str, attributes: &'static [Attr]) -> Node {
@@ -213,9 +213,9 @@ static SCALAR_VARIABLE: Node = Node {
         ("name", Text, true),
         ("valueReference", Unsigned, true),
         ("description", Text, false),
-        ("causality", Word(&["parameter", "calculatedParameter", "input", "output", "local", "independent"]), false),
-        ("variability", Word(&["constant", "fixed", "tunable", "discrete", "continuous"]), false),
-        ("initial", Word(&["exact", "approx", "calculated"]), false),
+        ("causality", Keyword(&["parameter", "calculatedParameter", "input", "output", "local", "independent"]), false),
+        ("variability", Keyword(&["constant", "fixed", "tunable", "discrete", "continuous"]), false),
+        ("initial", Keyword(&["exact", "approx", "calculated"]), false),
         ("canHandleMultipleSetPerTimeInstant", Bool, false),
     ],
     choice: &[&REAL, &INTEGER, &BOOLEAN, &STRING, &ENUMERATION],
@@ -224,7 +224,11 @@ static SCALAR_VARIABLE: Node = Node {
 static MODEL_VARIABLES: Node = parent("ModelVariables", &[], &[(&SCALAR_VARIABLE, 1, MANY)]);
 static UNKNOWN: Node = leaf(
     "Unknown",
-    &[("index", Unsigned, true), ("dependencies", UnsignedList, false), ("dependenciesKind", WordList(KINDS), false)],
+    &[
+        ("index", Unsigned, true),
+        ("dependencies", UnsignedList, false),
+        ("dependenciesKind", KeywordList(KINDS), false),
+    ],
 );
 static OUTPUTS: Node = parent("Outputs", &[], &[(&UNKNOWN, 1, MANY)]);
 static DERIVATIVES: Node = parent("Derivatives", &[], &[(&UNKNOWN, 1, MANY)]);
@@ -246,7 +250,7 @@ static ROOT: Node = parent(
         ("license", Text, false),
         ("generationTool", Text, false),
         ("generationDateAndTime", DateTime, false),
-        ("variableNamingConvention", Word(&["flat", "structured"]), false),
+        ("variableNamingConvention", Keyword(&["flat", "structured"]), false),
         ("numberOfEventIndicators", Unsigned, false),
     ],
     &[
@@ -418,15 +422,15 @@ fn fits(value: &str, kind: Type) -> Result<(), String> {
         Unsigned => (parse_integer::<u32>(value).is_some(), "an unsigned 32-bit integer".into()),
         Double => (parse_real(value).is_some(), "a number".into()),
         DateTime => (is_date_time(value), "a date and time such as 2009-12-08T14:33:22Z".into()),
-        Word(words) => (words.contains(&value), format!("one of {}", words.join(", "))),
+        Keyword(keywords) => (keywords.contains(&value), format!("one of {}", keywords.join(", "))),
         UnsignedList => {
             (value.split_whitespace().all(|v| v.parse::<u32>().is_ok()), "a list of unsigned integers".into())
         }
-        Whole(low, high) => (is_whole(value, low, high), format!("a whole number from {low} to {high}")),
+        IntRange(low, high) => (is_integer(value, low, high), format!("a whole number from {low} to {high}")),
         UnsignedLong => (value.trim().parse::<u64>().is_ok(), "an unsigned 64-bit integer".into()),
         DoubleList => (value.split_whitespace().all(|v| parse_real(v).is_some()), "a list of numbers".into()),
-        WholeList(low, high) => (
-            value.split_whitespace().all(|v| is_whole(v, low, high)),
+        IntRangeList(low, high) => (
+            value.split_whitespace().all(|v| is_integer(v, low, high)),
             format!("a list of whole numbers from {low} to {high}"),
         ),
         BoolList => (value.split_whitespace().all(|v| parse_boolean(v).is_some()), "a list of booleans".into()),
@@ -434,14 +438,14 @@ fn fits(value: &str, kind: Type) -> Result<(), String> {
             value.len().is_multiple_of(2) && value.bytes().all(|b| b.is_ascii_hexdigit()),
             "an even number of hexadecimal digits".into(),
         ),
-        WordList(words) => {
-            (value.split_whitespace().all(|v| words.contains(&v)), format!("a list of {}", words.join(", ")))
+        KeywordList(keywords) => {
+            (value.split_whitespace().all(|v| keywords.contains(&v)), format!("a list of {}", keywords.join(", ")))
         }
     };
     if good { Ok(()) } else { Err(expected) }
 }
 
-fn is_whole(text: &str, low: i128, high: i128) -> bool {
+fn is_integer(text: &str, low: i128, high: i128) -> bool {
     text.trim().parse::<i128>().is_ok_and(|value| (low..=high).contains(&value))
 }
 

@@ -127,7 +127,7 @@ pub enum SimulateError {
     Stopped {
         /// Communication point, s.
         time: f64,
-        /// What it said.
+        /// What it printed.
         what: String,
         /// Its last log messages.
         log: Vec<String>,
@@ -200,7 +200,7 @@ mod hold {
 
 /// What was recorded: the inputs, then the outputs.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Record {
+pub struct SimulationResult {
     /// Communication points, s.
     pub time: Vec<f64>,
     /// Communication step, s.
@@ -224,7 +224,7 @@ pub struct Column {
     pub input: bool,
 }
 
-impl Record {
+impl SimulationResult {
     /// The values of a variable.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&[f64]> {
@@ -281,7 +281,7 @@ impl Experiment {
         let default = description.default_experiment.unwrap_or_default();
         let start = options.start.or(inputs.time.first().copied()).or(default.start_time).unwrap_or(0.0);
         let stop = options.stop.or(inputs.time.last().copied()).or(default.stop_time).ok_or(SimulateError::NoStop)?;
-        // An FMU of FMI 3.0 may say by which step it goes on inside.
+        // An FMU of FMI 3.0 may declare its internal step.
         let own = || default.step_size.or(description.co_simulation.as_ref().and_then(|i| i.fixed_step));
         let step = options.step.or(inputs.dt).or_else(|| own().filter(|_| inputs.time.is_empty()));
         let step = step.ok_or(SimulateError::NoStep)?;
@@ -296,7 +296,7 @@ impl Experiment {
         if steps > MAX_ROWS {
             return fail("that is more rows than a record can hold: give a longer --step or an earlier --stop");
         }
-        // The end is reached up to rounding; a last part of a step is left out.
+        // The end is end_time up to rounding; a last part of a step is left out.
         Ok(Self { start, step, count: (steps * (1.0 + 1e-12) + 1e-6).floor() as usize })
     }
 
@@ -329,7 +329,7 @@ pub(crate) fn check(description: &Description, inputs: &Inputs, options: &Option
 ///
 /// # Errors
 /// See [`SimulateError`].
-pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Record, SimulateError> {
+pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<SimulationResult, SimulateError> {
     let experiment = Experiment::new(&fmu.description, inputs, options)?;
     let ports = Ports::find(&fmu.description, inputs, &options.outputs)?;
     let instance_options = InstanceOptions {
@@ -347,15 +347,15 @@ pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Record,
     done.map_err(|error| {
         let log = instance.take_log();
         let skip = log.len().saturating_sub(3);
-        let said = log.into_iter().skip(skip).map(|m| m.message).collect();
+        let messages = log.into_iter().skip(skip).map(|m| m.message).collect();
         match error {
-            SimulateError::Host(error) => SimulateError::Stopped { time: now, what: error.to_string(), log: said },
+            SimulateError::Host(error) => SimulateError::Stopped { time: now, what: error.to_string(), log: messages },
             other => other,
         }
     })
 }
 
-/// The run itself; `now` is left at the communication point reached.
+/// The run itself; `now` is left at the communication point end_time.
 fn run(
     fmu: &Fmu,
     instance: &mut Instance,
@@ -364,7 +364,7 @@ fn run(
     inputs: &Inputs,
     options: &Options,
     now: &mut f64,
-) -> Result<Record, SimulateError> {
+) -> Result<SimulationResult, SimulateError> {
     for setting in &options.settings {
         apply(instance, &fmu.description, setting)?;
     }
@@ -422,7 +422,7 @@ fn run(
             }
         }
     }
-    // What has been recorded stands, whatever the FMU says at the end.
+    // What has been recorded is kept, whatever status the FMU returns at the end.
     if let Err(error) = instance.terminate() {
         record.notes.push(format!("after the last step {error}"));
     }
@@ -441,18 +441,18 @@ fn step3(instance: &mut Instance, time: f64, step: f64, event_mode: bool) -> Res
         if !status.is_ok() {
             return Ok(status);
         }
-        let told = instance.told();
-        if told.event && event_mode {
+        let result = instance.step_result();
+        if result.event && event_mode {
             instance.handle_events(|_| Ok(()))?;
-            if instance.told().terminate {
+            if instance.step_result().terminate {
                 return Ok(Status::Discard);
             }
         }
         // What is left below rounding is nothing.
-        if !told.early || told.time.is_nan() || told.time >= end - 1e-9 * step {
+        if !result.early || result.time.is_nan() || result.time >= end - 1e-9 * step {
             return Ok(status);
         }
-        from = told.time;
+        from = result.time;
     }
     Err(HostError::Events(MOST_PARTS))
 }

@@ -1,9 +1,9 @@
-//! The closed sets of words of FMI 2.0 and 3.0.
+//! The enumerations of attribute values of FMI 2.0 and 3.0.
 
 use std::str::FromStr;
 
-/// A closed set of words of the standard.
-macro_rules! words {
+/// An enumeration whose values the standard spells as keywords.
+macro_rules! keywords {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal),* $(,)? }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -13,9 +13,9 @@ macro_rules! words {
             /// Every value.
             pub const ALL: &[Self] = &[$(Self::$variant),*];
 
-            /// The word as the XML spells it.
+            /// The keyword as the XML spells it.
             #[must_use]
-            pub fn word(self) -> &'static str {
+            pub fn keyword(self) -> &'static str {
                 match self { $(Self::$variant => $text),* }
             }
         }
@@ -29,13 +29,13 @@ macro_rules! words {
 
         impl std::fmt::Display for $name {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.pad(self.word())
+                f.pad(self.keyword())
             }
         }
     };
 }
 
-words! {
+keywords! {
     /// What a variable is to its environment.
     Causality {
         /// Constant during the simulation, set by the environment before it.
@@ -55,7 +55,7 @@ words! {
     }
 }
 
-words! {
+keywords! {
     /// When a variable may change.
     Variability {
         /// Never.
@@ -71,7 +71,7 @@ words! {
     }
 }
 
-words! {
+keywords! {
     /// How a variable is initialised.
     Initial {
         /// From its start value.
@@ -83,7 +83,7 @@ words! {
     }
 }
 
-words! {
+keywords! {
     /// The five types of variables.
     BaseType {
         /// `fmi2Real`.
@@ -99,7 +99,7 @@ words! {
     }
 }
 
-words! {
+keywords! {
     /// How an unknown depends on a known.
     DependencyKind {
         /// In no known way.
