@@ -14,7 +14,7 @@ use super::xml::{Document, Position, XmlError};
 pub use keywords::*;
 use read::*;
 pub use read::{parse_boolean, parse_integer, parse_real};
-pub use three::{Cell, Clock, Kind};
+pub use three::{Cell, Clock};
 
 /// Why no description could be read.
 #[derive(Debug, thiserror::Error)]

@@ -10,107 +10,9 @@ use std::collections::HashMap;
 use super::super::xml::{Element, Position};
 use super::read::{flag, head, keyword, number, parse_boolean, parse_real, real, text, type_attributes};
 use super::{
-    BaseType, Causality, DependencyKind, Description, Fmi, Interface, ModelStructure, SimpleType, TypeAttributes,
+    BaseType, Causality, DependencyKind, Description, Fmi, Interface, Kind, ModelStructure, SimpleType, TypeAttributes,
     Unknown, Value, Variability, Variable,
 };
-
-/// The types of FMI 3.0 (section 2.4.7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs, reason = "the names are the standard's")]
-pub enum Kind {
-    Float32,
-    Float64,
-    Int8,
-    UInt8,
-    Int16,
-    UInt16,
-    Int32,
-    UInt32,
-    Int64,
-    UInt64,
-    Boolean,
-    String,
-    Binary,
-    Enumeration,
-    Clock,
-}
-
-impl Kind {
-    /// Every type, in the order of the standard.
-    pub const ALL: [Self; 15] = [
-        Self::Float32,
-        Self::Float64,
-        Self::Int8,
-        Self::UInt8,
-        Self::Int16,
-        Self::UInt16,
-        Self::Int32,
-        Self::UInt32,
-        Self::Int64,
-        Self::UInt64,
-        Self::Boolean,
-        Self::String,
-        Self::Binary,
-        Self::Enumeration,
-        Self::Clock,
-    ];
-
-    /// The element's name.
-    #[must_use]
-    pub fn keyword(self) -> &'static str {
-        match self {
-            Self::Float32 => "Float32",
-            Self::Float64 => "Float64",
-            Self::Int8 => "Int8",
-            Self::UInt8 => "UInt8",
-            Self::Int16 => "Int16",
-            Self::UInt16 => "UInt16",
-            Self::Int32 => "Int32",
-            Self::UInt32 => "UInt32",
-            Self::Int64 => "Int64",
-            Self::UInt64 => "UInt64",
-            Self::Boolean => "Boolean",
-            Self::String => "String",
-            Self::Binary => "Binary",
-            Self::Enumeration => "Enumeration",
-            Self::Clock => "Clock",
-        }
-    }
-
-    /// The type of an element's name.
-    #[must_use]
-    pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.keyword() == name)
-    }
-
-    /// The type of FMI 2.0 that it is treated as; bytes are texts of hexadecimal digits, as the XML has them.
-    #[must_use]
-    pub fn base(self) -> BaseType {
-        match self {
-            Self::Float32 | Self::Float64 => BaseType::Real,
-            Self::Boolean | Self::Clock => BaseType::Boolean,
-            Self::String | Self::Binary => BaseType::String,
-            Self::Enumeration => BaseType::Enumeration,
-            _ => BaseType::Integer,
-        }
-    }
-
-    /// Smallest and largest value of an integer type.
-    #[must_use]
-    pub fn range(self) -> Option<(i128, i128)> {
-        Some(match self {
-            Self::Int8 => (i8::MIN.into(), i8::MAX.into()),
-            Self::UInt8 => (0, u8::MAX.into()),
-            Self::Int16 => (i16::MIN.into(), i16::MAX.into()),
-            Self::UInt16 => (0, u16::MAX.into()),
-            Self::Int32 => (i32::MIN.into(), i32::MAX.into()),
-            Self::UInt32 => (0, u32::MAX.into()),
-            Self::Int64 | Self::Enumeration => (i64::MIN.into(), i64::MAX.into()),
-            Self::UInt64 => (0, u64::MAX.into()),
-            _ => return None,
-        })
-    }
-}
 
 /// Where a scalar comes from: an element of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -281,7 +183,7 @@ impl Description {
         let raw: Vec<Raw<'_>> = all
             .iter()
             .filter_map(|element| {
-                let kind = Kind::parse(&element.name)?;
+                let kind = element.name.parse().ok()?;
                 let sizes = sizes(element, all);
                 let count = sizes.iter().try_fold(1_usize, |n, size| n.checked_mul(*size)).filter(|n| *n <= left)?;
                 left -= count;
@@ -346,7 +248,7 @@ impl Description {
 fn types(root: &Element) -> Vec<SimpleType> {
     let all = root.child("TypeDefinitions").into_iter().flat_map(|t| &t.children);
     all.filter_map(|e| {
-        let kind = Kind::parse(e.name.strip_suffix("Type")?)?;
+        let kind = e.name.strip_suffix("Type")?.parse().ok()?;
         Some(SimpleType {
             name: text(e, "name").unwrap_or_default(),
             attributes: attributes(e, kind),

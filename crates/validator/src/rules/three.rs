@@ -46,7 +46,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
 fn variables(root: &Element) -> Vec<Named<'_>> {
     let all = root.child("ModelVariables").into_iter().flat_map(|v| &v.children);
     all.filter_map(|element| {
-        let kind = Kind::parse(&element.name)?;
+        let kind = element.name.parse::<Kind>().ok()?;
         let name = element.get("name").unwrap_or("");
         Some(Named { element, kind, name, reference: element.get("valueReference").unwrap_or("").trim() })
     })
