@@ -1,6 +1,7 @@
 //! Validation rules: what each is ([`list`]), the static ones, and running them.
 
 mod clocks;
+mod date;
 mod document;
 pub mod finding;
 #[cfg(test)]
@@ -9,6 +10,7 @@ pub mod list;
 mod names;
 mod package;
 mod schema;
+mod schema2;
 mod schema3;
 mod structure;
 mod three;
@@ -239,7 +241,7 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
         return None;
     }
     match result.fmi {
-        Fmi::Two => schema::check(&document.root, findings),
+        Fmi::Two => schema2::check(&document.root, findings),
         Fmi::Three => schema3::check(&document.root, findings),
     }
     // What the schema refuses reads as its default below; findings that follow from that would mislead.
