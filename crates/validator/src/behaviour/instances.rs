@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use super::super::description::Causality;
 use super::super::host::{HostError, Status};
-use super::lifecycle::diverted;
 use super::probe::{Learned, Probe, STEPS, Tested, not_applicable, not_tested};
+use super::reset::diverted;
 
 /// Longest trial of what an FMU can be asked for.
 const TRIAL: Duration = Duration::from_secs(2);

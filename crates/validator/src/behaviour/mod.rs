@@ -1,5 +1,6 @@
 //! Behavioural rules: each loads the FMU in a process of its own (see [`super::isolation`]) and observes what it does.
 
+pub(super) mod changes;
 pub(super) mod delay;
 pub(super) mod dependencies;
 pub(super) mod effects;
@@ -10,9 +11,11 @@ pub(super) mod leaks;
 pub(super) mod lifecycle;
 mod measure;
 mod no_set_prior;
+pub(super) mod observed;
 pub(super) mod partial;
 pub(crate) mod probe;
 pub(super) mod references;
+pub(super) mod reset;
 pub(super) mod rounded;
 pub(super) mod settings;
 pub(super) mod slope;
@@ -20,6 +23,7 @@ pub(super) mod start;
 pub(super) mod state;
 pub(super) mod steps;
 pub(super) mod surroundings;
+pub(super) mod symbols;
 pub(super) mod three;
 pub(super) mod values;
 

@@ -3,9 +3,9 @@
 use super::super::description::{Causality, Variability};
 use super::super::host::{HostError, Instance};
 use super::no_set_prior;
+use super::observed::get_consistent;
 use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
 use super::settable_real;
-use super::values::get_consistent;
 
 fn needs_state(p: &Probe) -> Result<(), super::Stop> {
     if !p.interface().can_get_and_set_state {
@@ -176,7 +176,7 @@ pub(in super::super) fn serialise(p: &Probe) -> Tested {
 /// (section 2.1.8). Nothing where the FMU does not run so.
 fn serialise_diverted(p: &Probe) -> Result<Option<String>, HostError> {
     let _venture = super::super::host::venture();
-    let Some(mut instance) = super::lifecycle::diverted(p)? else { return Ok(None) };
+    let Some(mut instance) = super::reset::diverted(p)? else { return Ok(None) };
     let (n, cut) = (p.steps(), p.steps() / 2);
     instance.may_go_back = true;
     let state = instance.get_state()?;
