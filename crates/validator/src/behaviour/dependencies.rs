@@ -34,7 +34,7 @@ fn against_inputs(p: &Probe, soon: bool) -> Tested {
     if outputs.is_empty() {
         return not_applicable("no Real output has declared dependencies");
     }
-    super::steps::size_counts(p)?;
+    super::step_size::size_counts(p)?;
     let inputs: Vec<(usize, &Variable)> =
         p.inputs().enumerate().filter(|(_, v)| v.base() == BaseType::Real).take(MOST).collect();
     if inputs.is_empty() {

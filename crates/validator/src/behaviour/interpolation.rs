@@ -93,7 +93,7 @@ pub(in super::super) fn output_derivatives(p: &Probe) -> Tested {
     if outputs.is_empty() {
         return not_applicable("there is no continuous Real output");
     }
-    super::steps::size_counts(p)?;
+    super::step_size::size_counts(p)?;
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();

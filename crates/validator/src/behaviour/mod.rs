@@ -21,6 +21,7 @@ pub(super) mod settings;
 pub(super) mod slope;
 pub(super) mod start;
 pub(super) mod state;
+pub(super) mod step_size;
 pub(super) mod steps;
 pub(super) mod surroundings;
 pub(super) mod symbols;

@@ -5,7 +5,7 @@ use super::super::description::Variable;
 use super::super::host::{HostError, Instance};
 use super::interpolation::{change, continuous_inputs, effect};
 use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
-use super::steps::size_counts;
+use super::step_size::size_counts;
 
 /// Number of small steps in one.
 const PARTS: usize = 8;

@@ -6,7 +6,7 @@ use super::super::host::{HostError, Instance, Status};
 use super::lifecycle::last_log_message;
 use super::partial::{MOST, real};
 use super::probe::{Probe, Tested, not_applicable, not_tested};
-use super::steps::range;
+use super::step_size::range;
 
 /// A run from another start time.
 pub(in super::super) fn start_time(p: &Probe) -> Tested {

@@ -12,7 +12,7 @@
 use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
 use super::super::behaviour::{
     changes, delay, dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, observed, partial,
-    references, reset, rounded, settings, slope, start, state, steps, surroundings, symbols, three, values,
+    references, reset, rounded, settings, slope, start, state, step_size, steps, surroundings, symbols, three, values,
 };
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
@@ -326,15 +326,15 @@ rules! { static {
         "A state serialised and read back is the same, in another instance too", "Serialise the whole state, and no pointers.";
     "state-leak" Warning Robustness "2.1.8" "2.2.6.4" Indirect(leaks::state_leak);
         "States that are freed leave no memory behind", "Free in fmi2FreeFMUstate all that fmi2GetFMUstate and fmi2DeSerializeFMUstate took.";
-    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(steps::honoured);
+    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(step_size::honoured);
         "communicationStepSize is honoured", "Integrate to currentCommunicationPoint + communicationStepSize.";
-    "step-convergence" Warning Robustness "4.2.2" "4.2.1" Loaded(steps::convergence);
+    "step-convergence" Warning Robustness "4.2.2" "4.2.1" Loaded(step_size::convergence);
         "Results converge as the step shrinks", "Scale whatever happens once a call with the step size, or sub-step internally.";
     "output-delay" Warning Robustness "4.2.2" "4.2.1" Indirect(delay::delay);
         "Outputs are those at the end of the step", "Compute outputs after the integration, from the new states.";
-    "step-variable" Error Conformance "4.3.1" "4.4" Loaded(steps::variable);
+    "step-variable" Error Conformance "4.3.1" "4.4" Loaded(step_size::variable);
         "Steps of varying size give the results of equal ones", "Use the size of the present step, or clear canHandleVariableCommunicationStepSize.";
-    "step-rounding" Warning Robustness "4.2.2" "4.2.1" Indirect(steps::rounding);
+    "step-rounding" Warning Robustness "4.2.2" "4.2.1" Indirect(step_size::rounding);
         "Communication points and the stop time need not be met to the last digit", "Compare times with a tolerance of some units in the last place; importers that add step after step are off by their rounding.";
     "step-negative" Note Robustness "4.2.2" "4.2.1" Loaded(steps::negative);
         "A step backwards is refused", "Return fmi2Error or fmi2Discard for communicationStepSize < 0.";

@@ -3,151 +3,23 @@
 //! Row `k` of the record is the communication point `start + k*step`, after the inputs of that instant have been set:
 //! input and acceleration of a row then belong together. ([`Rows::StepEnd`] records before, as other importers do.)
 
+mod error;
 mod inputs;
+mod result;
 mod values;
 
 use super::description::{BaseType, Causality, Description, Fmi};
 use super::host::{Fmu, HostError, Instance, InstanceOptions, Layout, Status, needs_event_mode};
-use crate::trace::{Hold, Motion, Signal, Trace, TraceError, number};
+use crate::trace::Hold;
 
+pub use error::SimulateError;
 pub use inputs::Inputs;
+pub use result::{Column, SimulationResult};
 use values::{Ports, Which, apply};
 pub use values::{Setting, parse_setting};
 
 /// Most rows that a run records.
 const MAX_ROWS: f64 = 1e9;
-
-/// Why a run could not be made, or ended early.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulateError {
-    /// The FMU cannot be used.
-    #[error(transparent)]
-    Host(#[from] HostError),
-    /// The input file cannot be used.
-    #[error(transparent)]
-    Trace(#[from] TraceError),
-    /// The input file has no time.
-    #[error("{file}: no column named time; the columns are: {present}")]
-    NoTime {
-        /// The file.
-        file: String,
-        /// Its columns.
-        present: String,
-    },
-    /// No column of the input file is an input of the FMU.
-    #[error("{file}: no column is an input of the FMU; the columns are: {present}; the inputs are: {wanted}{near}")]
-    NoInput {
-        /// The file.
-        file: String,
-        /// Its columns.
-        present: String,
-        /// The FMU's inputs.
-        wanted: String,
-        /// A near miss.
-        near: String,
-    },
-    /// A part of the inputs that is none.
-    #[error(
-        "{left:.0} samples of the input lie from {from} s to {to} s at the steps asked for; give other --from, --to or --resample"
-    )]
-    Part {
-        /// From when, s.
-        from: f64,
-        /// Until when, s.
-        to: f64,
-        /// Samples there.
-        left: f64,
-    },
-    /// No column of the reference results is a variable of the FMU.
-    #[error("{file}: no column is a variable of the FMU; the columns are: {present}; the outputs are: {wanted}")]
-    NoReference {
-        /// The file.
-        file: String,
-        /// Its columns.
-        present: String,
-        /// The FMU's outputs.
-        wanted: String,
-    },
-    /// A unit that is not the FMU's.
-    #[error("{file}: column {column} is in [{unit}], but the FMU takes it in {wanted}: convert the column")]
-    Unit {
-        /// The file.
-        file: String,
-        /// The column.
-        column: String,
-        /// Its unit.
-        unit: String,
-        /// The FMU's unit.
-        wanted: String,
-    },
-    /// No such variable.
-    #[error("the FMU has no {what} named {name:?}{near}")]
-    Unknown {
-        /// What was looked for.
-        what: &'static str,
-        /// The name given.
-        name: String,
-        /// A near miss.
-        near: String,
-    },
-    /// A value that its variable cannot take.
-    #[error("{name} = {value}: {why}")]
-    Value {
-        /// The variable.
-        name: String,
-        /// The value given.
-        value: String,
-        /// What it must be.
-        why: String,
-    },
-    /// No step size to be found.
-    #[error(
-        "neither the input nor the FMU's default experiment gives a step: the input's times are not uniform, or there is \
-         no input; give --step"
-    )]
-    NoStep,
-    /// No end to be found.
-    #[error("neither the input nor the FMU's default experiment gives an end: give --stop")]
-    NoStop,
-    /// An experiment that cannot be run.
-    #[error("from {} s to {} s in steps of {} s: {why}", number(*start), number(*stop), number(*step))]
-    Experiment {
-        /// Start, s.
-        start: f64,
-        /// End, s.
-        stop: f64,
-        /// Step, s.
-        step: f64,
-        /// What is wrong.
-        why: &'static str,
-    },
-    /// The FMU refused to go on.
-    #[error("the FMU stopped at {time} s: {what}{}", log_text(.log))]
-    Stopped {
-        /// Communication point, s.
-        time: f64,
-        /// What it printed.
-        what: String,
-        /// Its last log messages.
-        log: Vec<String>,
-    },
-    /// Event mode or early return with an FMU that has none.
-    #[error("{option}: {why}")]
-    NotOffered {
-        /// What was asked for.
-        option: &'static str,
-        /// Why it cannot be.
-        why: &'static str,
-    },
-    /// What became of the child process that ran the FMU.
-    #[error("{0}")]
-    Child(String),
-}
-
-fn log_text(log: &[String]) -> String {
-    if log.is_empty() { String::new() } else { format!("; its log: {}", log.join("; ")) }
-}
 
 /// What a row of the record holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -195,77 +67,6 @@ mod hold {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Hold, D::Error> {
         bool::deserialize(from).map(|linear| if linear { Hold::Linear } else { Hold::Zoh })
-    }
-}
-
-/// What was recorded: the inputs, then the outputs.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SimulationResult {
-    /// Communication points, s.
-    pub time: Vec<f64>,
-    /// Communication step, s.
-    pub step: f64,
-    /// Each column.
-    pub columns: Vec<Column>,
-    /// What the user should know, in sentences.
-    pub notes: Vec<String>,
-}
-
-/// A column of a record.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Column {
-    /// Name of the variable.
-    pub name: String,
-    /// Its unit, where it has one.
-    pub unit: Option<String>,
-    /// One value a row.
-    pub values: Vec<f64>,
-    /// Whether it is an input.
-    pub input: bool,
-}
-
-impl SimulationResult {
-    /// The values of a variable.
-    #[must_use]
-    pub fn get(&self, name: &str) -> Option<&[f64]> {
-        self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
-    }
-
-    /// The columns that are signals of the axis, as a trace.
-    ///
-    /// # Errors
-    /// Never, as long as all columns have one length.
-    pub fn trace(&self, hold: Hold) -> Result<Trace, TraceError> {
-        let start = self.time.first().copied().unwrap_or(0.0);
-        let mut trace = Trace::new(start, self.step, hold);
-        for column in &self.columns {
-            if let Some(signal) = Signal::from_name(&column.name) {
-                trace.set(signal, column.values.clone())?;
-            }
-        }
-        Ok(trace)
-    }
-
-    /// Whether the columns are those of a linear axis.
-    #[must_use]
-    pub fn motion(&self) -> Motion {
-        let linear = |c: &Column| c.name == "T" && c.unit.as_deref() == Some("N");
-        if self.columns.iter().any(linear) { Motion::Linear } else { Motion::Rotary }
-    }
-
-    /// Headers and values of all columns with the time, for a CSV file.
-    #[must_use]
-    pub fn table(&self) -> Vec<(String, &[f64])> {
-        let mut table = vec![("time [s]".to_owned(), self.time.as_slice())];
-        for c in &self.columns {
-            let name = inputs::column_name(&c.name);
-            let header = match &c.unit {
-                Some(unit) => format!("{name} [{unit}]"),
-                None => name,
-            };
-            table.push((header, &c.values));
-        }
-        table
     }
 }
 
