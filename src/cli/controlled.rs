@@ -97,7 +97,7 @@ pub(super) fn simulate(machine: &Machine, input: &Path, settings: &[Setting]) ->
     Ok(SimulationResult { time, step: record.dt, columns, notes: Vec::new() })
 }
 
-/// What the loop says of an identification: the machine as given and as identified; nothing without a drive or reference.
+/// An identification in the closed loop: the machine as given and as identified; nothing without a drive or reference.
 ///
 /// # Errors
 /// When the trace cannot be read again.

@@ -28,8 +28,8 @@ pub struct Args {
     causality: Vec<Causality>,
 }
 
-fn causality(word: &str) -> Result<Causality, String> {
-    word.parse().map_err(|()| {
+fn causality(keyword: &str) -> Result<Causality, String> {
+    keyword.parse().map_err(|()| {
         let all: Vec<&str> = Causality::ALL.iter().map(|c| c.keyword()).collect();
         format!("one of {}", all.join(", "))
     })
@@ -49,12 +49,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if document.root.name == "fmiModelDescription"
         && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3."))
     {
-        let words: Vec<String> = args.causality.iter().map(|c| c.keyword().to_owned()).collect();
+        let keywords: Vec<String> = args.causality.iter().map(|c| c.keyword().to_owned()).collect();
         let platforms = platforms(&archive);
         if args.json {
-            out!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
+            out!("{:#}\n", info3::as_json(&document.root, &platforms, &keywords))?;
         } else {
-            out!("{}", info3::as_text(&document.root, &platforms, &words, width))?;
+            out!("{}", info3::as_text(&document.root, &platforms, &keywords, width))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -224,8 +224,8 @@ pub(super) fn fact(name: &str, value: &str, width: u16) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Least characters that a description is wrapped to beside its variable.
-const BESIDE: usize = 24;
+/// Least characters that a description in the line of its variable is wrapped to.
+const DESCRIPTION_WIDTH: usize = 24;
 
 /// The variables: name, type, causality, variability, start, unit, description. One a line where there is room for that; else the
 /// description goes on below itself, and in a narrow terminal all but name and start below these.
@@ -237,7 +237,7 @@ pub(super) fn variables(rows: &[[String; 7]], width: u16) -> String {
     let before: usize = widths.iter().map(|w| w + 2).sum();
     let width = usize::from(width);
     let mut out = String::new();
-    if before + BESIDE > width {
+    if before + DESCRIPTION_WIDTH > width {
         for [name, of_type, causality, variability, start, unit, description] in rows {
             let value = if start.is_empty() { String::new() } else { format!(" = {start}") };
             let unit = if unit.is_empty() { String::new() } else { format!(" [{unit}]") };

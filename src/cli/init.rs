@@ -115,7 +115,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let shown = loaded.trace.clone();
     super::examined::table_as_angle(&mut loaded.trace, &machine)?;
-    // A first idea of the parameters, from the log itself: it says whether units and signs are right.
+    // A first idea of the parameters, from the log itself: it shows whether units and signs are right.
     let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
     // Of a log that cannot be believed no number is written.
     let rough = if examination.refuses() { None } else { rough(&loaded.trace, &machine, &examination) };
@@ -134,7 +134,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write_text(&page, html::page(&driven.report(report(&seen))).as_bytes())?;
     write_text(&axis, text.as_bytes())?;
 
-    let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Verdict(verdict(&examination))];
+    let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Summary(verdict(&examination))];
     if let (Some(dt), None) = (made.dt, args.dt) {
         let word = format!(
             "No column is a time: {dt} s from row to row is assumed. All that is read from the log depends on it; give it with --dt."
@@ -170,7 +170,7 @@ fn quoted(name: &str) -> String {
     }
 }
 
-/// Asks a person, or takes the answer that is offered.
+/// Asks a person, or takes the default.
 struct Asker {
     yes: bool,
 }
@@ -187,7 +187,7 @@ impl Asker {
         match std::io::stdin().lock().read_line(&mut answer) {
             Ok(n) if n > 0 && !answer.trim().is_empty() => answer.trim().to_owned(),
             Ok(0) => {
-                // Nobody answers: not asked again.
+                // End of input: nothing is asked again.
                 self.yes = true;
                 eprintln!();
                 offered.to_owned()
@@ -214,7 +214,7 @@ impl Asker {
     }
 }
 
-/// What the columns are, asking where names and units do not say it.
+/// The roles of the columns, asking where names and units leave them open.
 fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
     let mut guesses = guess(table);
     given(table, args, &mut guesses)?;
@@ -264,7 +264,7 @@ fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
         || (!has(Signal::Theta1) && quantity(Signal::Theta2) == Some(Quantity::Length))
         || quantity(Signal::T) == Some(Quantity::Force);
     let motion = if length { Motion::Linear } else { Motion::Rotary };
-    // The position of a table in metres beside a motor in radians is x2.
+    // The position of a table in metres, where the motor's is in radians, is x2.
     if motion == Motion::Rotary {
         for g in &mut guesses {
             if g.role == Role::Signal(Signal::Theta2) && g.unit.is_some_and(|u| u.quantity == Quantity::Length) {
@@ -282,7 +282,7 @@ fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Result<Made> {
             };
         }
     }
-    // A column in a unit that its signal cannot have is none of it.
+    // A column in a unit that its signal cannot have is dropped.
     let fits = |g: &Guess| match (g.role, g.unit) {
         (Role::Signal(s), Some(u)) => {
             let needed = s.quantity(motion);
@@ -367,7 +367,7 @@ fn role_of(name: &str) -> anyhow::Result<Role> {
     Signal::from_name(name).map(Role::Signal).with_context(|| format!("{name}: {}", near()))
 }
 
-/// Puts what the user says in the place of what was guessed.
+/// Replaces guesses by what the user gives.
 fn given(table: &Table, args: &Args, guesses: &mut Vec<Guess>) -> anyhow::Result<()> {
     for (name, column) in &args.column {
         let role = role_of(name).context("--column")?;
@@ -409,7 +409,7 @@ fn given(table: &Table, args: &Args, guesses: &mut Vec<Guess>) -> anyhow::Result
     Ok(())
 }
 
-/// Inertias, damping and stiffness as the log has them, roughly; None where it says nothing.
+/// Inertias, damping and stiffness as the log has them, roughly; None where they cannot be estimated.
 fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<[f64; 4]> {
     let piece = examination.longest().map(|p| trace.slice(p));
     let found = identify(piece.as_ref().unwrap_or(trace), machine, &Request::default(), "", &mut |_| ()).ok();
@@ -445,7 +445,7 @@ fn lead(trace: &Trace) -> Option<f64> {
         tx += a * b;
         xx += b * b;
     }
-    // Of two that do not go together nothing is read.
+    // Of two that are not proportional nothing is read.
     let rho = tx / tt;
     (rho > 0.0 && rho.is_finite() && tx * tx > 0.5 * tt * xx).then_some(rho)
 }
@@ -457,7 +457,7 @@ fn four(value: f64) -> String {
         .map_or(text, |v| if (1e-3..1e4).contains(&v.abs()) || v == 0.0 { v.to_string() } else { format!("{v:e}") })
 }
 
-/// What the numbers of the log say of the axis.
+/// What is estimated of the axis from the numbers of the log.
 #[derive(Default)]
 struct Read {
     /// Inertias, damping and stiffness, roughly.

@@ -124,7 +124,7 @@ fn parse_noise(text: &str) -> Result<Noise, String> {
     }
 }
 
-/// Adds the noise; each column draws from a stream of its own, so that one column's noise does not hang on the others.
+/// Adds the noise; each column draws from a stream of its own, so that one column's noise does not depend on the others.
 fn add_noise(record: &mut SimulationResult, noise: &[Noise], seed: u64) -> anyhow::Result<()> {
     for wanted in noise {
         if let Noise::Column(name, _) = wanted

@@ -1,4 +1,4 @@
-//! What the trace of a circular test shows, as ballbar software tells it: every known deviation in its size, and what it
+//! What the trace of a circular test shows, as ballbar software reports it: every known deviation in its size, and what it
 //! takes of the circularity.
 //!
 //! All deviations are fitted at once, over both directions, and each one's share is what the circularity loses when that

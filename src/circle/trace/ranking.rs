@@ -16,7 +16,7 @@ use crate::circle::roundness::{Roundness, bidirectional};
 const MOST: usize = 7200;
 /// Most cyclic errors along one axis, and most vibrations.
 const TONES: usize = 2;
-/// A tone below this share of the circularity is not told.
+/// A tone below this share of the circularity is left to the remainder.
 const MATERIAL: f64 = 0.01;
 /// What deviates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,7 +156,7 @@ impl Measure {
         }
     }
 
-    /// The unit that it is told in, of which a metre (or metre per metre) has a million.
+    /// The unit that it is shown in, of which a metre (or metre per metre) has a million.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -167,7 +167,7 @@ impl Measure {
 }
 
 impl Effect {
-    /// What the ranking goes by: what it takes alone, or its half of what it takes with the same on the other axis, m.
+    /// The key of the ranking: the contribution alone, or half of the contribution together with the same on the other axis, m.
     #[must_use]
     pub fn weight(&self) -> f64 {
         self.pair.map_or(self.contribution, |both| self.contribution.max(0.5 * both))
@@ -272,7 +272,7 @@ pub fn analyse(turns: &[Turn], radius: f64, feed: Option<f64>) -> Option<Analysi
 /// Rounds in which the frequencies are refined with the known shapes in the fit, which had taken a part of each tone.
 const ROUNDS: usize = 3;
 
-/// Moves each tone to where it fits best beside all else.
+/// Moves each tone to where it fits best together with all other shapes.
 fn refine_tones(all: &[Point], keep: &[bool], fit: &mut Fit, tones: &mut [Tone], start: &[Shape], turns: usize) {
     for _ in 0..ROUNDS {
         for k in 0..tones.len() {
@@ -343,7 +343,7 @@ struct Trace {
 }
 
 impl Trace {
-    /// What some shapes make of each point.
+    /// The deviation that some shapes cause at each point, m.
     fn made(&self, wanted: impl Fn(Shape) -> bool + Copy) -> Vec<f64> {
         self.all.iter().map(|p| self.fit.at(p, wanted)).collect()
     }
@@ -373,7 +373,7 @@ impl Trace {
         let scaled = |(c, e): (f64, f64), by: f64| (c * by, e * by.abs());
         let both = self.fit.shapes.contains(&Shape::Servo);
         let mut effects = Vec::new();
-        // Everything that is told of a point, added up.
+        // The sum of all deviations at each point.
         let mut model = vec![0.0; n];
         let mut pairs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
         let mut add = |effects: &mut Vec<Effect>, effect: Effect, made: &[f64]| {

@@ -81,7 +81,7 @@ mod tests {
     use crate::effects::{Effect, Ramp, Settings};
 
     #[test]
-    fn friction_that_sticks_balances_the_present_torque() {
+    fn friction_that_sticks_answers_the_torque_of_now() {
         let mut effects = Settings::default();
         effects.of_mut(Effect::CoulombMotor)[0] = 0.01;
         let p = Parameters::PAPER;

@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn the_step_response_of_a_lag_is_an_exponential() {
+    fn a_lag_answers_a_step_as_an_exponential() {
         let (tau, h) = (3e-3_f64, 1e-3_f64);
         let mut history = TorqueHistory::default();
         for _ in 0..5 {

@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn the_model_structure_is_listed_by_elements_and_clocks_are_kept_apart() {
+    fn the_model_structure_is_told_by_elements_and_clocks_stand_apart() {
         let d = read(
             "<Float64 name=\"x\" valueReference=\"1\" causality=\"output\"><Dimension start=\"2\"/></Float64>\
              <Float64 name=\"dx\" valueReference=\"2\" derivative=\"1\"><Dimension start=\"2\"/></Float64>\
