@@ -4,7 +4,7 @@
 //! controls name them in words), Fanuc Series 16i/18i/21i, 0i, 30i (parameter numbers). Where a control has no one
 //! parameter for it, the text is what to look for.
 
-use super::ranking::Kind;
+use super::deviation::Kind;
 
 /// What to do about a deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
