@@ -134,15 +134,6 @@ fn in_base_units(unit: &Unit) -> String {
     text
 }
 
-fn show(value: &Value) -> String {
-    match value {
-        Value::Real(x) => x.to_string(),
-        Value::Integer(x) => x.to_string(),
-        Value::Boolean(x) => x.to_string(),
-        Value::String(x) => format!("{x:?}"),
-    }
-}
-
 /// Control characters of an FMU's texts must not steer the terminal.
 pub(super) fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
@@ -203,7 +194,7 @@ fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
             v.base().to_string(),
             v.causality.to_string(),
             v.variability.to_string(),
-            v.start.as_ref().map_or(String::new(), |s| plain(&show(s))),
+            v.start.as_ref().map_or(String::new(), |s| plain(&s.to_string())),
             plain(&d.resolved(v).unit.unwrap_or_default()),
             plain(v.description.as_deref().unwrap_or("")),
         ]

@@ -139,11 +139,8 @@ impl DriveKernel {
 
     /// Whether the numbers that [`DriveKernel::visit_numbers`] has set are finite and within their bounds.
     pub(super) fn is_valid(&self) -> bool {
-        let within = |(value, v): (&f64, &crate::variables::Variable)| {
-            value.is_finite() && v.min.is_none_or(|m| m <= *value) && v.max.is_none_or(|m| *value <= m)
-        };
         let numbers = [self.start, self.time, self.next, self.drive.integral];
-        self.values.iter().zip(DRIVE).all(within)
+        self.values.iter().zip(DRIVE).all(|(value, v)| v.allows(*value))
             && numbers
                 .iter()
                 .chain(&self.rates)

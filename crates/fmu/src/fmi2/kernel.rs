@@ -9,7 +9,7 @@ use super::step_error::{MOST_STEPS, StepError};
 use crate::axis::{Axis, ParameterError, State, Structure};
 use crate::effects::{Effect, Ramp, SensorHistory, TorqueHistory, effect_scope};
 use crate::scalar::Dual;
-use crate::variables::{Slot, Starts, Values, Variable, all, effect_of};
+use crate::variables::{Slot, Starts, Values, all, effect_of};
 
 /// A communication step that is longer than whole internal steps by less than this share is cut into that many.
 const SLACK: f64 = 1e-6;
@@ -371,10 +371,7 @@ impl Kernel {
     /// Makes the axis anew from the numbers that [`Kernel::visit_numbers`] has set, with internal steps of `h` s; false when a
     /// number is out of its bounds.
     pub(super) fn restore(&mut self, h: f64) -> bool {
-        let within = |(value, v): (&f64, Variable)| {
-            value.is_finite() && v.min.is_none_or(|m| m <= *value) && v.max.is_none_or(|m| *value <= m)
-        };
-        let valid = self.values.0.iter().zip(all()).all(within)
+        let valid = self.values.0.iter().zip(all()).all(|(value, v)| v.allows(*value))
             && [self.rate, self.last_rate, self.start, self.time].iter().all(|x| x.is_finite())
             && h > 0.0
             && h.is_finite();

@@ -123,7 +123,7 @@ mod tests {
                 assert_eq!(model.index_of(v.reference), Some(index), "{v}");
                 assert_eq!(v.start.is_none(), v.causality == Causality::Output, "{v}");
                 if let Some(start) = v.start {
-                    assert!(v.min.is_none_or(|m| m <= start) && v.max.is_none_or(|m| start <= m), "{v}");
+                    assert!(v.allows(start), "{v}");
                 }
                 assert!(v.nominal > 0.0 && !v.doc.is_empty(), "{v}");
             }

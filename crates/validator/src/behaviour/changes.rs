@@ -4,7 +4,7 @@ use super::super::description::{Causality, Value, Variability, Variable};
 use super::super::host::{HostError, Instance};
 use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
 use super::settable_real;
-use super::values::{set, show};
+use super::values::set;
 
 /// A tunable parameter that acts when it is set before the run acts when it is set during it.
 pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
@@ -60,8 +60,7 @@ pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
         if p.responds(&expected[..n], &early, &own) && !p.responds(&expected[cut..], &late, &own) {
             problems.push(format!(
                 "the tunable parameter \"{}\" set to {} during the run changes nothing; set before it, it does",
-                v.name,
-                show(&value)
+                v.name, value
             ));
         }
     }

@@ -7,7 +7,7 @@ use super::super::host::{HostError, Status};
 use super::lifecycle::last_log_message;
 use super::probe::{Learned, Probe, Snapshot, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
-use super::values::{get, same, set, show};
+use super::values::{get, same, set};
 
 /// Longest default run, in wall time; later steps are left out.
 const RUN: Duration = Duration::from_millis(500);
@@ -189,7 +189,7 @@ pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
             (Ok(before), within) => (before, within),
         };
         any = true;
-        let (name, value) = (&v.name, show(value));
+        let (name, value) = (&v.name, value.to_string());
         let own = [v.value_reference];
         match within {
             Err(error) => problems.push(format!(
@@ -197,8 +197,8 @@ pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
             )),
             Ok(within) if !same(&within.0, &before.0) => problems.push(format!(
                 "the parameter \"{name}\" was set to {value} in initialisation mode and reads {} after it; set before it, it reads {}",
-                show(&within.0),
-                show(&before.0)
+                within.0,
+                before.0
             )),
             Ok(within) if p.responds(&expected, &before.1, &own) && !p.responds(&expected, &within.1, &own) => problems
                 .push(format!(

@@ -4,7 +4,7 @@
 use super::super::description::{BaseType, Causality, Value, Variability, Variable};
 use super::super::host::{HostError, Instance};
 use super::probe::{Probe, Tested, not_applicable};
-use super::values::{get, show};
+use super::values::get;
 
 pub(in super::super) fn get_consistent(p: &Probe) -> Tested {
     p.comparable()?;
@@ -90,10 +90,7 @@ pub(in super::super) fn unchanging(p: &Probe) -> Tested {
         if before != after && !nan {
             problems.push(format!(
                 "the {} variable \"{}\" went from {} to {} during the run",
-                v.variability,
-                v.name,
-                show(&before),
-                show(&after)
+                v.variability, v.name, before, after
             ));
         }
     }

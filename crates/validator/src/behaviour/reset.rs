@@ -36,9 +36,8 @@ fn reset_settings(p: &Probe) -> Result<Option<String>, HostError> {
     let nan = |a: &Value, b: &Value| matches!((a, b), (Value::Real(x), Value::Real(y)) if x.is_nan() && y.is_nan());
     let changed =
         variables.iter().zip(fresh.iter().zip(&again)).find(|(_, (new, again))| new != again && !nan(new, again));
-    Ok(changed.map(|(v, (new, again))| {
-        format!("\"{}\" is {} instead of {} right after initialisation", v.name, values::show(again), values::show(new))
-    }))
+    Ok(changed
+        .map(|(v, (new, again))| format!("\"{}\" is {} instead of {} right after initialisation", v.name, again, new)))
 }
 
 pub(in super::super) fn reset(p: &Probe) -> Tested {

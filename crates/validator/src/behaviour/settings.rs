@@ -4,7 +4,7 @@ use super::super::description::{BaseType, Causality, Value, Variable};
 use super::super::host::{HostError, Instance, InstanceOptions};
 use super::probe::{Probe, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
-use super::values::{get, set, show};
+use super::values::{get, set};
 use std::sync::Arc;
 
 /// Most variables of a type that are set.
@@ -66,7 +66,7 @@ pub(in super::super) fn others(p: &Probe) -> Tested {
     let (mut problems, mut texts) = (Vec::new(), 0);
     for ((v, value), read) in found {
         if *value != read {
-            let (name, value, read) = (&v.name, show(value), show(&read));
+            let (name, value, read) = (&v.name, value.to_string(), read.to_string());
             problems.push(format!("the parameter \"{name}\" was set to {value} and reads {read}"));
         } else if let Value::String(text) = value
             && texts < 20

@@ -28,15 +28,6 @@ pub(super) fn set(instance: &mut Instance, v: &Variable, value: &Value) -> Resul
     }
 }
 
-pub(super) fn show(value: &Value) -> String {
-    match value {
-        Value::Real(x) => x.to_string(),
-        Value::Integer(x) => x.to_string(),
-        Value::Boolean(x) => x.to_string(),
-        Value::String(x) => format!("{x:?}"),
-    }
-}
-
 /// Whether two values are the same up to the digits that printing cuts.
 pub(super) fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
@@ -63,9 +54,7 @@ pub(in super::super) fn start_values(p: &Probe) -> Tested {
             if !same(start, &value) {
                 problems.push(format!(
                     "\"{}\" starts at {} in the binary, at {} in modelDescription.xml",
-                    v.name,
-                    show(&value),
-                    show(start)
+                    v.name, value, start
                 ));
             }
         }
@@ -161,12 +150,7 @@ pub(in super::super) fn set_get(p: &Probe) -> Tested {
                 found = get(&mut instance, v)?;
             }
             if found != *value {
-                problems.push(format!(
-                    "the input \"{}\" was set to {} and reads {}",
-                    v.name,
-                    show(value),
-                    show(&found)
-                ));
+                problems.push(format!("the input \"{}\" was set to {} and reads {}", v.name, value, found));
             }
         }
     }

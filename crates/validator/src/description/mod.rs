@@ -71,6 +71,18 @@ pub enum Value {
     String(String),
 }
 
+impl std::fmt::Display for Value {
+    /// Numbers as Rust writes them, a text in quotes.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Real(x) => x.fmt(f),
+            Self::Integer(x) => x.fmt(f),
+            Self::Boolean(x) => x.fmt(f),
+            Self::String(x) => write!(f, "{x:?}"),
+        }
+    }
+}
+
 /// The `ModelExchange` or `CoSimulation` element.
 #[derive(Debug, Clone)]
 pub struct Interface {
