@@ -285,6 +285,11 @@ pub trait Sensor {
     }
 }
 
+/// Undamped natural frequency of an inertia, kg.m2, on a spring, N.m/rad, in rad/s; zero without an inertia.
+pub(super) fn natural_frequency(stiffness: f64, inertia: f64) -> f64 {
+    if inertia > 0.0 { (stiffness / inertia).sqrt() } else { 0.0 }
+}
+
 /// `(1 - exp(-a))/a`, with its limit at zero.
 pub(super) fn mean_decay<S: Scalar>(a: S) -> S {
     if a.re().abs() < 1e-4 {
