@@ -8,7 +8,7 @@ use eixo::axis::{self, Hold, Parameters, Scheme, SimulateOptions, Structure};
 use eixo::effects::{Effect, Settings};
 use eixo::fmu::host::Fmu;
 use eixo::fmu::package::Package;
-use eixo::fmu::simulate::{Inputs, Options, Record, Rows, Setting, SimulateError, simulate};
+use eixo::fmu::simulate::{Inputs, Options, Rows, Setting, SimulateError, SimulationResult, simulate};
 use eixo::trace::{Machine, Signal, Trace};
 
 #[path = "program/run.rs"]
@@ -36,7 +36,7 @@ fn set(name: &str, value: &str) -> Setting {
     Setting { name: name.to_owned(), value: value.to_owned() }
 }
 
-fn run(fmu: &Fmu, torque: &[f64], hold: Hold, settings: Vec<Setting>) -> Record {
+fn run(fmu: &Fmu, torque: &[f64], hold: Hold, settings: Vec<Setting>) -> SimulationResult {
     simulate(fmu, &inputs(torque), &Options { hold, settings, ..Options::default() }).unwrap()
 }
 

@@ -8,7 +8,7 @@ use eixo::report::polar::{PolarTrace, Ring};
 use eixo::report::terminal::{self, Layout};
 use eixo::report::{
     Axis, Block, Cell, ChainDiagram, Chart, Colour, Dash, Figure, Mark, Place, PolarPlot, Range, Report, Section,
-    Series, Shape, Symbol, Table, Tone, Verdict, html,
+    Series, Shape, Summary, Symbol, Table, Tone, html,
 };
 use quick_xml::events::Event;
 
@@ -185,7 +185,7 @@ fn example(samples: usize, name: &str) -> Report {
             Section::new(
                 "",
                 vec![
-                    Block::Verdict(Verdict {
+                    Block::Summary(Summary {
                         tone: Tone::Finding,
                         sentence: "Dry friction at the motor, which the model leaves out, causes 91 % of the gap.".into(),
                         detail: "With it in the model the error on the held-out trace falls from 18.2 % to 0.9 %, the noise floor being 0.8 %.".into(),

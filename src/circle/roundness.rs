@@ -1,4 +1,4 @@
-//! What a followed circle says: circular and radial deviation (ISO 230-4), reversal peaks, ellipses.
+//! Measures of a circle that was followed: circular and radial deviation (ISO 230-4), reversal peaks, ellipses.
 
 use std::f64::consts::{PI, TAU};
 

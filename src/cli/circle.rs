@@ -219,7 +219,7 @@ pub(super) fn findings(axes: &[Machine; 2], found: Option<&[Machine; 2]>, wanted
     })
 }
 
-/// A parameter that differs by less than this share is not told as a difference of its own.
+/// A parameter that differs by less than this share is not shown as a difference of its own.
 const MATERIAL: f64 = 1e-3;
 
 /// What an effect's angle is on the table.

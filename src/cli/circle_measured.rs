@@ -81,8 +81,8 @@ fn setting(of: fn(Length) -> Option<usize>) -> Option<(&'static str, &'static st
 /// What the sizes are as parameters of the effects of a model whose screw is known.
 fn as_parameters(a: &Analysis, [x, y]: &[Machine; 2]) -> Vec<String> {
     let of = |axis: Axis| if axis == Axis::X { x.parameters.rho } else { y.parameters.rho };
-    let told = a.effects.iter().filter(|e| e.contribution > 0.0 && e.size.abs() > 3.0 * e.error.unwrap_or(0.0));
-    told.filter_map(|e| match e.kind {
+    let clear = a.effects.iter().filter(|e| e.contribution > 0.0 && e.size.abs() > 3.0 * e.error.unwrap_or(0.0));
+    clear.filter_map(|e| match e.kind {
         Kind::Backlash(axis) if e.size > 0.0 => {
             let (effect, parameter) = setting(|l| if let Length::HalfPlay(p) = l { Some(p) } else { None })?;
             Some(format!(

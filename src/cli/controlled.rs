@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 
 use super::examined::Part;
 use crate::diagnose::{Model, Record as Logged, UnderControl};
-use crate::fmu::simulate::{Column, Record, Setting};
+use crate::fmu::simulate::{Column, Setting, SimulationResult};
 use crate::report::Block;
 use crate::report::diagnose::errors_in_the_loop;
 use crate::trace::{Machine, Signal, Trace, load};
@@ -58,7 +58,7 @@ fn with(machine: &Machine, settings: &[Setting]) -> anyhow::Result<Machine> {
 ///
 /// # Errors
 /// When there is no drive, no reference, or the loop runs away.
-pub(super) fn simulate(machine: &Machine, input: &Path, settings: &[Setting]) -> anyhow::Result<Record> {
+pub(super) fn simulate(machine: &Machine, input: &Path, settings: &[Setting]) -> anyhow::Result<SimulationResult> {
     let controller = machine.controller.as_ref().context("--controlled needs a [controller] in the axis file")?;
     let machine = with(machine, settings)?;
     let loaded = load(input, &machine.signals)?;
@@ -94,10 +94,10 @@ pub(super) fn simulate(machine: &Machine, input: &Path, settings: &[Setting]) ->
         bail!("the loop runs away: the motion is no longer finite at {} s; lower the gains", record.time(k));
     }
     let time = (0..reference.len()).map(|k| record.time(k)).collect();
-    Ok(Record { time, step: record.dt, columns, notes: Vec::new() })
+    Ok(SimulationResult { time, step: record.dt, columns, notes: Vec::new() })
 }
 
-/// What the loop says of an identification: the machine as given and as identified; nothing without a drive or reference.
+/// An identification in the closed loop: the machine as given and as identified; nothing without a drive or reference.
 ///
 /// # Errors
 /// When the trace cannot be read again.

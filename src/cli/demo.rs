@@ -78,10 +78,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let machine = Machine { name: "the paper's X axis".to_owned(), ..Machine::default() };
     let methods = [Method::Ls, Method::Rls, Method::Els, Method::Iv, Method::Oe];
     let request = Request { methods: methods.to_vec(), reference: true, ..Request::default() };
-    let consistent = steps.during("identifying: ", |say| identify(&trace, &machine, &request, "trace.csv", say))?;
+    let consistent =
+        steps.during("identifying: ", |progress| identify(&trace, &machine, &request, "trace.csv", progress))?;
     let request = Request { methods: methods[..3].to_vec(), paper: true, ..request };
-    let euler = steps.during("identifying by the paper's Euler regression: ", |say| {
-        identify(&trace, &machine, &request, "trace.csv", say)
+    let euler = steps.during("identifying by the paper's Euler regression: ", |progress| {
+        identify(&trace, &machine, &request, "trace.csv", progress)
     })?;
 
     steps.next("computing the paper's tables again");
@@ -94,7 +95,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         lines: LINES,
     };
 
-    let Disagreement { said: disagreement, diagnosis: found, circle } =
+    let Disagreement { blocks: disagreement, diagnosis: found, circle } =
         disagreement(&fmu_file, &host, &args.output, dt, &steps)?;
 
     steps.next("writing the report");
@@ -138,7 +139,7 @@ const PERIODS: usize = 2;
 
 /// What the machine that disagrees showed: for the terminal, and the reports of the diagnosis and of the circle.
 struct Disagreement {
-    said: Vec<Block>,
+    blocks: Vec<Block>,
     diagnosis: Report,
     circle: Report,
 }
@@ -207,7 +208,7 @@ fn disagreement(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) 
     write_text(&file("circle.html"), html::page(&linked(drawn.clone(), "circle.html")).as_bytes())?;
     let mut blocks = diagnosis::short(&findings);
     blocks.extend(crate::report::circle::short(&circle).into_iter().take(1));
-    Ok(Disagreement { said: blocks, diagnosis: report, circle: drawn })
+    Ok(Disagreement { blocks, diagnosis: report, circle: drawn })
 }
 
 /// Progress on the terminal: a line that says what is being done.

@@ -194,7 +194,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let steps = args.progress.steps();
     let diagnosed = examine(trace, axis, args.holdout.as_deref(), suspects, args.believed, &|what| steps.step(what))?;
     steps.end();
-    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(&diagnosed.driven.words(w))));
+    diagnosed.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(&diagnosed.driven.convert(w))));
     let findings = diagnosed.findings();
     let outcome = &diagnosed.outcome;
     out!("{}", terminal::blocks(&diagnosed.driven.blocks(short(&findings)), layout(WIDTH)))?;
@@ -242,7 +242,8 @@ fn found(diagnosed: &Diagnosed) -> Found {
         json!(held.noise_floor),
     ];
     let driven = &diagnosed.driven;
-    let tracked = |name: String, e: &Estimate| Tracked { name, unit: driven.words(e.unit), value: e.value, std: e.std };
+    let tracked =
+        |name: String, e: &Estimate| Tracked { name, unit: driven.convert(e.unit), value: e.value, std: e.std };
     let base = d.parameters.iter().map(|p| tracked(p.parameter.name().to_owned(), &p.fitted));
     let of_causes = d.causes.iter().flat_map(|c| c.named().map(move |(name, e)| (c.effect.info().id, name, e)));
     let of_causes = of_causes.map(|(id, name, e)| tracked(format!("{id}.{name}"), e));
@@ -254,7 +255,7 @@ fn found(diagnosed: &Diagnosed) -> Found {
             .iter()
             .cloned()
             .chain(warnings(d, Some(diagnosed.machine.signals.motion)))
-            .map(|w| driven.words(&w))
+            .map(|w| driven.convert(&w))
             .collect(),
         result: driven.units(contract::value(d, &diagnosed.warnings)),
         report: driven.report(report(&diagnosed.findings())),

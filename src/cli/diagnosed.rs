@@ -15,7 +15,7 @@ use crate::variables::{Causality, Starts, Type, Values, all, at};
 /// Largest diagnosis that is read, bytes.
 const MOST: u64 = 64 << 20;
 
-/// The machine with what the file says: its parameters and effects.
+/// The machine with the parameters and effects of the file.
 ///
 /// # Errors
 /// When the file cannot be used.

@@ -1,4 +1,4 @@
-//! A record on its way to a verdict: cut, read, examined, and refused where it cannot carry one.
+//! A record on its way to a verdict: cut, read, examined, and refused where it does not allow one.
 
 use std::ops::Range;
 use std::path::Path;
@@ -68,9 +68,9 @@ pub struct Examined {
     pub driven: Driven,
 }
 
-/// A record that cannot carry a verdict.
+/// A record that does not allow a verdict.
 #[derive(Debug, thiserror::Error)]
-#[error("{file}: {}", words(.examination))]
+#[error("{file}: {}", reasons(.examination))]
 pub struct Refused {
     /// The file.
     pub file: String,
@@ -82,15 +82,16 @@ pub struct Refused {
     pub driven: Driven,
 }
 
-fn words(examination: &Examination) -> String {
+/// Why a record is refused.
+fn reasons(examination: &Examination) -> String {
     let refused = examination.findings.iter().filter(|f| f.severity == Severity::Refuse);
     refused.map(|f| f.seen.as_str()).collect::<Vec<_>>().join(" ")
 }
 
 impl Refused {
-    /// What is said of it in place of a verdict.
+    /// What is shown in place of a verdict.
     pub fn blocks(&self) -> Vec<Block> {
-        let mut blocks = vec![Block::Verdict(verdict(&self.examination))];
+        let mut blocks = vec![Block::Summary(verdict(&self.examination))];
         blocks.extend(findings(&self.examination));
         blocks.extend(self.warnings.iter().cloned().map(Block::Warning));
         blocks.push(Block::Paragraph(format!(
@@ -143,7 +144,7 @@ pub fn examined_log(
     if examination.refuses() && !trust {
         return Err(Refused { file: path.display().to_string(), examination, warnings, driven }.into());
     }
-    warnings.extend(told(&examination));
+    warnings.extend(noted(&examination));
     let usable = &examination.usable;
     let taken = match extent {
         Extent::Longest => examination.longest(),
@@ -181,7 +182,7 @@ pub struct ExaminedPieces {
     pub driven: Driven,
 }
 
-/// Least samples of a piece that is used beside others.
+/// Least samples of a piece that is used together with others.
 const LEAST_PIECE: usize = 64;
 /// Most pieces of a record that are used together, the longest ones: each has an initial state of its own to be fitted.
 const MOST_PIECES: usize = 64;
@@ -205,7 +206,7 @@ pub fn examined_pieces(
         let (file, examination) = (file.to_string(), first.examination);
         return Err(Refused { file, examination, warnings, driven }.into());
     }
-    warnings.extend(told(&first.examination));
+    warnings.extend(noted(&first.examination));
     let doubts = doubts(&first.examination, trust);
     let mut total = 0;
     let mut pieces = Vec::new();
@@ -223,7 +224,7 @@ pub fn examined_pieces(
         if other.examination.refuses() && !trust {
             warnings.push(format!(
                 "{file}: the piece from {start:.6} s to {end:.6} s is left out: {}",
-                words(&other.examination)
+                reasons(&other.examination)
             ));
             continue;
         }
@@ -262,13 +263,13 @@ pub fn examined_pieces(
 
 /// When the pieces are, in words; of many the first ones.
 fn spans(pieces: &[Trace]) -> String {
-    const TOLD: usize = 4;
-    let mut told: Vec<String> =
-        pieces.iter().take(TOLD).map(|p| format!("{:.6} s to {:.6} s", p.start, p.time(p.len() - 1))).collect();
-    if pieces.len() > TOLD {
-        told.push("...".to_owned());
+    const NAMED: usize = 4;
+    let mut named: Vec<String> =
+        pieces.iter().take(NAMED).map(|p| format!("{:.6} s to {:.6} s", p.start, p.time(p.len() - 1))).collect();
+    if pieces.len() > NAMED {
+        named.push("...".to_owned());
     }
-    told.join(", ")
+    named.join(", ")
 }
 
 /// A piece without gaps, and what was found in it.
@@ -302,8 +303,8 @@ fn doubts(examination: &Examination, trust: bool) -> Vec<String> {
     apart.map(|found| format!("{} {word}", found.seen)).into_iter().collect()
 }
 
-/// What is said of a record that is used.
-fn told(examination: &Examination) -> impl Iterator<Item = String> + '_ {
+/// The warnings about a record that is used.
+fn noted(examination: &Examination) -> impl Iterator<Item = String> + '_ {
     let material = examination.findings.iter().filter(|f| f.severity != Severity::Note);
     material.map(|f| format!("[{}] {}", f.id, f.sentence()))
 }

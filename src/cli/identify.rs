@@ -165,12 +165,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_vec_pretty(&refused.json())?)?;
     }
     let Identified { machine, result, record, driven } = done?;
-    let mut said = blocks(&result);
+    let mut shown = blocks(&result);
     if machine.controller.is_some() && result.recommended.is_some() {
-        said.extend(super::controlled::identified(path, args.believed.part, &machine, &improved(&machine, &result)?)?);
+        shown.extend(super::controlled::identified(path, args.believed.part, &machine, &improved(&machine, &result)?)?);
     }
-    let said = driven.blocks(said);
-    out!("{}", terminal::blocks(&said, super::stdout::layout(super::stdout::WIDTH)))?;
+    let shown = driven.blocks(shown);
+    out!("{}", terminal::blocks(&shown, super::stdout::layout(super::stdout::WIDTH)))?;
     if let Some(path) = &args.json {
         write_text(path, &serde_json::to_vec_pretty(&driven.units(json!(result)))?)?;
     }
@@ -231,7 +231,7 @@ fn examine(
         return Ok(Identified { machine, result, record: Vec::new(), driven: seen.driven });
     }
     let loaded = load_pieces(path, &args.believed.part.of(machine.signals.clone()))?;
-    // What is not there is said before what is there is examined.
+    // What is not there is shown before what is there is examined.
     let there = &loaded.longest.trace;
     let mut needed = vec![Signal::T, Signal::Theta1];
     if machine.structure == Structure::TwoInertia && !there.has(Signal::X2) {
@@ -243,8 +243,10 @@ fn examine(
     let joined = Joined::of(&pieces)?;
     let request = request(args, axis.is_some());
     let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file.clone())?;
-    let told = args.hold.is_some() || axis.is_some();
-    if !told && let Some(other) = hold::straight(&result, &pieces, &machine, &request, &file, progress).context(file)? {
+    let given = args.hold.is_some() || axis.is_some();
+    if !given
+        && let Some(other) = hold::straight(&result, &pieces, &machine, &request, &file, progress).context(file)?
+    {
         (result, pieces) = other;
         machine.signals.hold = Hold::Linear;
     }
@@ -285,11 +287,11 @@ fn found(result: &Identification, record: Option<&Joined>, driven: &Driven) -> a
         "not_explained"
     };
     let tracked =
-        |e: &Estimate| Tracked { name: e.name.to_owned(), unit: driven.words(e.unit), value: e.value, std: e.std };
+        |e: &Estimate| Tracked { name: e.name.to_owned(), unit: driven.convert(e.unit), value: e.value, std: e.std };
     Ok(Found {
-        facts: vec![json!(verdict), json!(method.method), json!(fit), json!(driven.words(&best.why))],
+        facts: vec![json!(verdict), json!(method.method), json!(fit), json!(driven.convert(&best.why))],
         parameters: method.parameters.iter().map(tracked).collect(),
-        warnings: result.warnings.iter().map(|w| driven.words(w)).collect(),
+        warnings: result.warnings.iter().map(|w| driven.convert(w)).collect(),
         result: driven.units(json!(result)),
         report: driven.report(crate::report::identify::report(result, record)),
     })
@@ -348,7 +350,7 @@ fn improved(machine: &Machine, result: &Identification) -> anyhow::Result<Machin
     Ok(machine)
 }
 
-/// What the terminal shows: the short report, then what each method has to say.
+/// What the terminal shows: the short report, then each method's failure and warnings.
 fn blocks(result: &Identification) -> Vec<Block> {
     let t = &result.trace;
     let mut blocks = vec![Block::Paragraph(format!(
@@ -363,10 +365,10 @@ fn blocks(result: &Identification) -> Vec<Block> {
         t.signals.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")
     ))];
     blocks.extend(crate::report::identify::short(result));
-    // Where none has an estimate, the head says why of each.
-    let told = result.methods.iter().all(|m| m.failure.is_some());
+    // Where none has an estimate, the head gives the reason of each.
+    let all_failed = result.methods.iter().all(|m| m.failure.is_some());
     for m in &result.methods {
-        if let Some(why) = m.failure.as_ref().filter(|_| !told) {
+        if let Some(why) = m.failure.as_ref().filter(|_| !all_failed) {
             blocks.push(Block::Warning(format!("{}: {why}", m.title)));
         }
         blocks.extend(m.notes.iter().map(|n| Block::Paragraph(format!("{}: {n}", m.title))));

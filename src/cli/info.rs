@@ -28,9 +28,9 @@ pub struct Args {
     causality: Vec<Causality>,
 }
 
-fn causality(word: &str) -> Result<Causality, String> {
-    word.parse().map_err(|()| {
-        let all: Vec<&str> = Causality::ALL.iter().map(|c| c.word()).collect();
+fn causality(keyword: &str) -> Result<Causality, String> {
+    keyword.parse().map_err(|()| {
+        let all: Vec<&str> = Causality::ALL.iter().map(|c| c.keyword()).collect();
         format!("one of {}", all.join(", "))
     })
 }
@@ -49,12 +49,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if document.root.name == "fmiModelDescription"
         && document.root.get("fmiVersion").is_some_and(|v| v.starts_with("3."))
     {
-        let words: Vec<String> = args.causality.iter().map(|c| c.word().to_owned()).collect();
+        let keywords: Vec<String> = args.causality.iter().map(|c| c.keyword().to_owned()).collect();
         let platforms = platforms(&archive);
         if args.json {
-            out!("{:#}\n", info3::as_json(&document.root, &platforms, &words))?;
+            out!("{:#}\n", info3::as_json(&document.root, &platforms, &keywords))?;
         } else {
-            out!("{}", info3::as_text(&document.root, &platforms, &words, width))?;
+            out!("{}", info3::as_text(&document.root, &platforms, &keywords, width))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -134,15 +134,6 @@ fn in_base_units(unit: &Unit) -> String {
     text
 }
 
-fn show(value: &Value) -> String {
-    match value {
-        Value::Real(x) => x.to_string(),
-        Value::Integer(x) => x.to_string(),
-        Value::Boolean(x) => x.to_string(),
-        Value::String(x) => format!("{x:?}"),
-    }
-}
-
 /// Control characters of an FMU's texts must not steer the terminal.
 pub(super) fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
@@ -203,7 +194,7 @@ fn as_text(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
             v.base().to_string(),
             v.causality.to_string(),
             v.variability.to_string(),
-            v.start.as_ref().map_or(String::new(), |s| plain(&show(s))),
+            v.start.as_ref().map_or(String::new(), |s| plain(&s.to_string())),
             plain(&d.resolved(v).unit.unwrap_or_default()),
             plain(v.description.as_deref().unwrap_or("")),
         ]
@@ -224,8 +215,8 @@ pub(super) fn fact(name: &str, value: &str, width: u16) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Least characters that a description is wrapped to beside its variable.
-const BESIDE: usize = 24;
+/// Least characters that a description in the line of its variable is wrapped to.
+const DESCRIPTION_WIDTH: usize = 24;
 
 /// The variables: name, type, causality, variability, start, unit, description. One a line where there is room for that; else the
 /// description goes on below itself, and in a narrow terminal all but name and start below these.
@@ -237,7 +228,7 @@ pub(super) fn variables(rows: &[[String; 7]], width: u16) -> String {
     let before: usize = widths.iter().map(|w| w + 2).sum();
     let width = usize::from(width);
     let mut out = String::new();
-    if before + BESIDE > width {
+    if before + DESCRIPTION_WIDTH > width {
         for [name, of_type, causality, variability, start, unit, description] in rows {
             let value = if start.is_empty() { String::new() } else { format!(" = {start}") };
             let unit = if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
@@ -282,10 +273,10 @@ fn as_json(d: &Description, platforms: &[(String, Vec<(String, u64)>)], shown: &
             json!({
                 "name": v.name,
                 "valueReference": v.value_reference,
-                "type": v.base().word(),
-                "causality": v.causality.word(),
-                "variability": v.variability.word(),
-                "initial": v.initial().map(|i| i.word()),
+                "type": v.base().keyword(),
+                "causality": v.causality.keyword(),
+                "variability": v.variability.keyword(),
+                "initial": v.initial().map(|i| i.keyword()),
                 "start": match &v.start {
                     Some(Value::Real(x)) => json!(x),
                     Some(Value::Integer(x)) => json!(x),

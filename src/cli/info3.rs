@@ -57,11 +57,11 @@ fn variables<'a>(root: &'a Element, causality: &[String]) -> (Vec<&'a Element>, 
 
 /// Capability flags that are set.
 fn flags(interface: &Element) -> Vec<String> {
-    let told = interface
+    let set = interface
         .attributes
         .iter()
         .filter(|a| a.name != "modelIdentifier" && !["false", "0"].contains(&a.value.as_str()));
-    told.map(|a| if a.value == "true" || a.value == "1" { a.name.clone() } else { format!("{} {}", a.name, a.value) })
+    set.map(|a| if a.value == "true" || a.value == "1" { a.name.clone() } else { format!("{} {}", a.name, a.value) })
         .collect()
 }
 

@@ -5,7 +5,7 @@ const BYTES: f64 = 8.0 + 20.0;
 /// Rows of a simulation an hour, at a microsecond a row and column group: more is not waited for.
 const AN_HOUR: f64 = 3.6e9;
 
-/// Memory that is free, bytes; None where the system does not say.
+/// Memory that is free, bytes; None where the system does not report it.
 fn free() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;

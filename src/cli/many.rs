@@ -101,11 +101,11 @@ impl Many {
             part: !self.part.is_empty(),
         };
         let bar = progress(items.len() as u64);
-        let done = run(&plan, &|item| work(item).map_err(|e| format!("{e:#}")), &|item, words| {
+        let done = run(&plan, &|item| work(item).map_err(|e| format!("{e:#}")), &|item, outcome| {
             bar.set_message(item.path.display().to_string());
             bar.inc(1);
             if bar.is_hidden() {
-                eprintln!("{}: {words}", item.path.display());
+                eprintln!("{}: {outcome}", item.path.display());
             }
         });
         bar.finish_and_clear();

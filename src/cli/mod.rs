@@ -129,11 +129,11 @@ pub fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             if let Some(refused) = error.downcast_ref::<examined::Refused>() {
-                let said = stdout::out!(
+                let written = stdout::out!(
                     "{}",
                     crate::report::terminal::blocks(&refused.blocks(), stdout::layout(stdout::WIDTH))
                 );
-                return ExitCode::from(if said.is_ok() { FINDINGS } else { COULD_NOT_RUN });
+                return ExitCode::from(if written.is_ok() { FINDINGS } else { COULD_NOT_RUN });
             }
             eprintln!("error: {}", crate::report::format::printable(&format!("{error:#}")));
             ExitCode::from(COULD_NOT_RUN)

@@ -1,4 +1,4 @@
-//! What a long command says while it works.
+//! The progress of a long command.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::serve::PROGRESS;
 
-/// How progress is told.
+/// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum How {
     /// In one line that changes, where standard error is a terminal
@@ -27,7 +27,7 @@ pub struct Progress {
     pub progress: How,
 }
 
-/// What is said of one work.
+/// The progress of one task.
 #[derive(Debug)]
 pub struct Steps {
     bar: ProgressBar,
@@ -90,9 +90,9 @@ impl Steps {
 
 /// `n` and `N` of `n of N ...`.
 fn count(what: &str) -> Option<(f64, f64)> {
-    let mut words = what.split(' ');
-    let done = words.next()?.parse().ok()?;
-    let all = words.next().filter(|of| *of == "of").and_then(|_| words.next())?.parse().ok()?;
+    let mut parts = what.split(' ');
+    let done = parts.next()?.parse().ok()?;
+    let all = parts.next().filter(|of| *of == "of").and_then(|_| parts.next())?.parse().ok()?;
     (1.0..=all).contains(&done).then_some((done, all))
 }
 

@@ -17,7 +17,7 @@ use super::stdout::out_line;
 use crate::fmu::contained::{self, Host, simulate};
 use crate::fmu::isolation;
 use crate::fmu::package::Package;
-use crate::fmu::simulate::{Inputs, Options, Record, Rows, Setting, parse_setting};
+use crate::fmu::simulate::{Inputs, Options, Rows, Setting, SimulationResult, parse_setting};
 use crate::report::format::printable;
 use crate::trace::{Hold, Machine, Table, load, nearest, write_columns};
 
@@ -124,8 +124,8 @@ fn parse_noise(text: &str) -> Result<Noise, String> {
     }
 }
 
-/// Adds the noise; each column draws from a stream of its own, so that one column's noise does not hang on the others.
-fn add_noise(record: &mut Record, noise: &[Noise], seed: u64) -> anyhow::Result<()> {
+/// Adds the noise; each column draws from a stream of its own, so that one column's noise does not depend on the others.
+fn add_noise(record: &mut SimulationResult, noise: &[Noise], seed: u64) -> anyhow::Result<()> {
     for wanted in noise {
         if let Noise::Column(name, _) = wanted
             && !record.columns.iter().any(|c| c.name == *name)
@@ -260,7 +260,7 @@ fn controlled(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Adds the noise, writes the trace, and says so.
-fn finish(mut record: Record, output: &Path, noise: &[Noise], seed: u64) -> anyhow::Result<ExitCode> {
+fn finish(mut record: SimulationResult, output: &Path, noise: &[Noise], seed: u64) -> anyhow::Result<ExitCode> {
     add_noise(&mut record, noise, seed)?;
     let table = record.table();
     let columns: Vec<(&str, &[f64])> = table.iter().map(|(name, values)| (name.as_str(), *values)).collect();

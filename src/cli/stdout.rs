@@ -6,28 +6,28 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::report::terminal::Layout;
 
-/// Whether a result goes to standard output: what is said to people then goes to standard error.
+/// Whether a result goes to standard output: text for people then goes to standard error.
 static RESULT_ON_OUTPUT: AtomicBool = AtomicBool::new(false);
 
-/// Whether nothing is said to people.
+/// Whether text for people is left out.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// From here on nothing is said.
+/// Leaves out text for people from here on.
 pub fn be_quiet() {
     QUIET.store(true, Ordering::Relaxed);
 }
 
-/// Whether nothing is said to people.
+/// Whether text for people is left out.
 pub fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
-/// From here on what is said goes to standard error.
+/// Sends text for people to standard error from here on.
 pub fn to_stderr() {
     RESULT_ON_OUTPUT.store(true, Ordering::Relaxed);
 }
 
-/// Characters a line where nobody says how many there are.
+/// Characters a line where neither the terminal nor `COLUMNS` sets them.
 pub const WIDTH: u16 = 100;
 
 /// How tables are laid out: as wide as the terminal or `COLUMNS` says, 60 to 200 characters; `otherwise` where output goes elsewhere.
@@ -38,7 +38,7 @@ pub fn layout(otherwise: u16) -> Layout {
     Layout { width, colour: std::io::stdout().is_terminal() }
 }
 
-/// Writes to standard output; a reader that has gone is no error.
+/// Writes to standard output; a closed pipe is no error.
 ///
 /// # Errors
 /// When the output cannot be written for another reason, as to a full disk.

@@ -12,7 +12,7 @@ const EXTENSIONS: [&str; 9] = ["csv", "tsv", "txt", "parquet", "pq", "mat", "xls
 const MOST: usize = 1_000_000;
 /// Deepest folder below the one that is named.
 const DEEPEST: usize = 32;
-/// The axis file that is looked for beside a trace and in the folders above it.
+/// The axis file that is looked for in the folder of a trace and in those above it.
 const AXIS: &str = "axis.toml";
 
 /// A trace and the axis file that goes with it.
@@ -58,7 +58,7 @@ pub fn find(arguments: &[PathBuf], axis: Option<&Path>, output: &Path) -> Result
         let mut own = BTreeSet::new();
         let nothing = |why: &str| FleetError::Nothing { what: argument.display().to_string(), why: why.to_owned() };
         if argument.is_dir() {
-            walk(argument, output.as_deref(), 0, &mut own)?;
+            collect_below(argument, output.as_deref(), 0, &mut own)?;
             if own.is_empty() {
                 return Err(nothing(&format!("no trace in this folder (files that end in {})", EXTENSIONS.join(", "))));
             }
@@ -74,7 +74,7 @@ pub fn find(arguments: &[PathBuf], axis: Option<&Path>, output: &Path) -> Result
                     FleetError::Read { path, reason: e.into() }
                 })?;
                 if found.is_dir() {
-                    walk(&found, output.as_deref(), 0, &mut own)?;
+                    collect_below(&found, output.as_deref(), 0, &mut own)?;
                 } else if !is_axis(&found) {
                     own.insert(found);
                 }
@@ -108,7 +108,12 @@ fn nearest(path: &Path) -> Option<PathBuf> {
     path.ancestors().skip(1).map(|folder| folder.join(AXIS)).find(|file| file.is_file())
 }
 
-fn walk(folder: &Path, output: Option<&Path>, depth: usize, paths: &mut BTreeSet<PathBuf>) -> Result<(), FleetError> {
+fn collect_below(
+    folder: &Path,
+    output: Option<&Path>,
+    depth: usize,
+    paths: &mut BTreeSet<PathBuf>,
+) -> Result<(), FleetError> {
     let failed = |reason| FleetError::Read { path: folder.to_owned(), reason };
     if depth > DEEPEST || paths.len() > MOST || output.is_some_and(|o| folder.canonicalize().is_ok_and(|f| f == o)) {
         return Ok(());
@@ -122,7 +127,7 @@ fn walk(folder: &Path, output: Option<&Path>, depth: usize, paths: &mut BTreeSet
         let kind = entry.file_type().map_err(failed)?;
         let path = entry.path();
         if kind.is_dir() {
-            walk(&path, output, depth + 1, paths)?;
+            collect_below(&path, output, depth + 1, paths)?;
         } else if path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)))
             && path.is_file()
         {

@@ -6,20 +6,20 @@ use serde_json::Value;
 
 use super::trend::{Moved, Trend};
 use super::{Placed, Plan, store};
-use crate::report::{Axis, Block, Cell, Chart, Colour, Figure, Report, Section, Series, Table, Tone, Verdict};
+use crate::report::{Axis, Block, Cell, Chart, Colour, Figure, Report, Section, Series, Summary, Table, Tone};
 
 /// Most plots of drifts, those that stand out first.
 const PLOTS: usize = 24;
 /// Most parameters with a column of their own: with more the tables are cut on paper and run out of the screen.
 const COLUMNS: usize = 4;
 
-/// What stands for a drift that the errors of the estimates would make by themselves.
+/// Shown for a drift that is within the errors of the estimates.
 const WITHIN: &str = "within its error";
 
 /// The report of a run.
 pub(super) fn report(plan: &Plan, rows: &[Placed]) -> Report {
     let trends = Trend::all(rows);
-    let mut sections = vec![Section::new("", vec![Block::Verdict(verdict(rows, &trends))])];
+    let mut sections = vec![Section::new("", vec![Block::Summary(verdict(rows, &trends))])];
     sections.push(Section::new("Machines", vec![Block::Table(machines(plan, rows, &trends, true))]));
     if !trends.is_empty() {
         sections.push(Section::new("Drift of the parameters", drifts(&trends)));
@@ -45,7 +45,7 @@ pub(super) fn report(plan: &Plan, rows: &[Placed]) -> Report {
 /// What the terminal shows: the verdict, the machines, what could not be used.
 pub(super) fn short(plan: &Plan, rows: &[Placed]) -> Vec<Block> {
     let trends = Trend::all(rows);
-    let mut blocks = vec![Block::Verdict(verdict(rows, &trends)), Block::Table(machines(plan, rows, &trends, false))];
+    let mut blocks = vec![Block::Summary(verdict(rows, &trends)), Block::Table(machines(plan, rows, &trends, false))];
     blocks.extend(failures(rows).map(Block::Table));
     blocks
 }
@@ -78,7 +78,7 @@ fn verdict_of<'a>(p: &'a Placed) -> &'a str {
     p.row.facts.first().and_then(Value::as_str).unwrap_or(if p.row.done { "" } else { "failed" })
 }
 
-fn verdict(rows: &[Placed], trends: &[Trend]) -> Verdict {
+fn verdict(rows: &[Placed], trends: &[Trend]) -> Summary {
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for p in rows {
         *counts.entry(verdict_of(p)).or_default() += 1;
@@ -98,16 +98,16 @@ fn verdict(rows: &[Placed], trends: &[Trend]) -> Verdict {
         let more = if out.len() > 6 { format!(" and {} more", out.len() - 6) } else { String::new() };
         format!("Beyond four standard errors: {}{more}.", out[..out.len().min(6)].join(", "))
     };
-    let figures = counts.into_iter().map(|(name, n)| (wording(name).to_owned(), Cell::Count(n))).collect();
-    Verdict { tone, sentence, detail, figures }
+    let figures = counts.into_iter().map(|(name, n)| (verdict_text(name).to_owned(), Cell::Count(n))).collect();
+    Summary { tone, sentence, detail, figures }
 }
 
 fn drifting(n: usize) -> String {
     if n == 1 { "1 parameter drifts".to_owned() } else { format!("{n} parameters drift") }
 }
 
-/// A verdict as people say it.
-fn wording(verdict: &str) -> &str {
+/// The name of a verdict, for people.
+fn verdict_text(verdict: &str) -> &str {
     match verdict {
         "no_gap" => "no gap",
         "effect" => "an effect",
@@ -126,7 +126,7 @@ fn cell(name: &str, value: Option<&Value>) -> Cell {
             || matches!(name, "probability" | "noise_floor" | "fit")
     };
     match value {
-        Some(Value::String(text)) => Cell::text(wording(text)),
+        Some(Value::String(text)) => Cell::text(verdict_text(text)),
         Some(v) => v.as_f64().map_or(Cell::Empty, |v| if share(name) { Cell::Percent(v) } else { Cell::number(v) }),
         None => Cell::Empty,
     }

@@ -130,7 +130,7 @@ pub struct Plan<'a> {
     pub command: &'static str,
     /// Names of the facts, the columns of the summary.
     pub facts: &'static [&'static str],
-    /// Everything that the results depend on beside trace and axis file.
+    /// Everything that the results depend on, other than trace and axis file.
     pub settings: String,
     /// The traces.
     pub items: &'a [Item],
@@ -158,15 +158,15 @@ pub struct Outcome {
     pub short: Vec<Block>,
 }
 
-/// Does the work on every trace that is not done yet, then writes summary and index. `tell(trace, words)` hears of each
-/// trace as it is finished, from any thread.
+/// Does the work on every trace that is not done yet, then writes summary and index. `finished(trace, outcome)` is called for
+/// each trace, from any thread.
 ///
 /// # Errors
 /// When the folder or an output cannot be written. A trace that cannot be used is a row that says why.
 pub fn run(
     plan: &Plan,
     work: &(dyn Fn(&Item) -> Result<Found, String> + Sync),
-    tell: &(dyn Fn(&Item, &str) + Sync),
+    finished: &(dyn Fn(&Item, &str) + Sync),
 ) -> Result<Outcome, FleetError> {
     if let Some(path) = plan.summary.filter(|_| !plan.part) {
         summary::check(path)?;
@@ -179,7 +179,7 @@ pub fn run(
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = plan.items.get(at) else { return };
             let row = one(&store, item, work);
-            tell(item, &outcome_text(&row));
+            finished(item, &outcome_text(&row));
             if let Ok(mut rows) = rows.lock() {
                 rows.insert(at, row);
             }

@@ -61,7 +61,7 @@ impl<'a> Trend<'a> {
     }
 
     /// Without the estimates that their records did not determine: those whose two standard errors are more of them, and of the largest
-    /// that was determined, than `identify` calls determined, and those without an error beside others that have one.
+    /// that was determined, than `identify` calls determined, and those without an error where others have one.
     fn determined(self) -> Self {
         let within = |std: f64, of: f64| 2.0 * std <= DETERMINED * of;
         let has_errors = self.values.iter().any(|(_, std)| std.is_some());
@@ -104,8 +104,8 @@ impl<'a> Trend<'a> {
         Some((slope * span / y.abs(), std * span / y.abs()))
     }
 
-    /// The drift, or of two records the change, and its standard error where anything tells one.
-    fn told(&self) -> Option<(f64, Option<f64>)> {
+    /// The drift, or of two records the change, and its standard error where it can be computed.
+    fn shown(&self) -> Option<(f64, Option<f64>)> {
         if let Some((drift, std)) = self.drift() {
             return Some((drift, Some(std)));
         }
@@ -114,9 +114,9 @@ impl<'a> Trend<'a> {
         Some((self.change()?, std))
     }
 
-    /// What the parameter did, as a table of many shows it: what lies within two standard errors says nothing of the machine.
+    /// What the parameter did, as a table of many shows it: a change within two standard errors is not one of the machine.
     pub fn moved(&self) -> Option<Moved> {
-        let (drift, std) = self.told()?;
+        let (drift, std) = self.shown()?;
         let within = std.is_some_and(|std| drift.abs() <= 2.0 * std) || drift.abs() <= LEAST;
         Some(if within { Moved::WithinItsError } else { Moved::By(drift) })
     }
@@ -170,7 +170,7 @@ mod tests {
         // Of two records: the errors of both, 0.2*sqrt(2).
         assert_eq!(moved(&[20.0, 20.56], Some(0.2)), Some(Moved::WithinItsError));
         assert!(matches!(moved(&[20.0, 20.58], Some(0.2)), Some(Moved::By(drift)) if (drift - 0.029).abs() < 1e-9));
-        // Where nothing tells the error, the change stands; one of rounding does not.
+        // Where the error is not known, the change is shown; one of rounding is not.
         assert!(matches!(moved(&[20.0, 20.1], None), Some(Moved::By(_))));
         assert_eq!(moved(&[20.0, 20.0 + 1e-9], None), Some(Moved::WithinItsError));
     }

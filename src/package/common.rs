@@ -1,5 +1,5 @@
 //! What `modelDescription.xml` has alike in FMI 2.0 and 3.0: the head, units, log categories, default experiment, and what a
-//! variable says of itself.
+//! variable declares.
 
 use std::borrow::Cow;
 use std::io;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::chart::{Axis, Chart, Colour, DEGREES, Dash, Series};
 use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace};
-use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
+use super::{Block, Cell, Figure, Report, Section, Summary, Table, Tone};
 use crate::circle::measured::Measured;
 use crate::circle::roundness::SHOWN;
 use crate::circle::trace::{Analysis, Effect, Kind, Measure, Turn, remedy};
@@ -46,7 +46,7 @@ pub struct Findings {
 
 /// A share of the circularity from which on something should be done.
 const WORTH: f64 = 0.05;
-/// Most deviations that are told what to do about.
+/// Most deviations that are shown what to do about.
 const MOST: usize = 5;
 
 /// In millionths; what is below all that such a test shows is zero.
@@ -122,7 +122,7 @@ fn detail(e: &Effect, turns: &[Turn], medium: Medium) -> String {
     }
 }
 
-/// The deviations by what each takes of the circularity; beside them those of a model.
+/// The deviations by what each contributes to the circularity, together with those of a model.
 #[must_use]
 pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table {
     let mut columns = vec!["deviation", "size", "±", "takes", "share", "X and Y"];
@@ -137,7 +137,7 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table 
     }
     columns.push("of which");
     let mut table = Table::new("What the trace shows", columns);
-    let mut told: Vec<Kind> = Vec::new();
+    let mut shown: Vec<Kind> = Vec::new();
     for e in &a.effects {
         let unseen = e.size.abs() < SHOWN || e.error.is_some_and(|error| e.size.abs() < 2.0 * error);
         if medium == Medium::Terminal && unseen && e.kind != Kind::Remainder {
@@ -165,12 +165,12 @@ pub fn ranking(a: &Analysis, model: Option<&Analysis>, medium: Medium) -> Table 
             cells.remove(2);
         }
         cells.push(Cell::Text(detail(e, &a.turns, medium)));
-        if told.is_empty() && e.weight() > 0.0 {
+        if shown.is_empty() && e.weight() > 0.0 {
             table.strong_row(cells)
         } else {
             table.row(cells)
         }
-        told.push(e.kind);
+        shown.push(e.kind);
     }
     table
 }
@@ -190,7 +190,7 @@ fn by_both(e: &Effect) -> bool {
 #[must_use]
 pub fn steps(a: &Analysis) -> Vec<String> {
     let worth = |e: &&Effect| e.weight() > WORTH * a.circularity && e.kind != Kind::Remainder;
-    let mut told: Vec<&str> = Vec::new();
+    let mut shown: Vec<&str> = Vec::new();
     let one = |e: &Effect| {
         let r = remedy(e.kind);
         let named = [("Siemens", r.siemens), ("Heidenhain", r.heidenhain), ("Fanuc", r.fanuc)];
@@ -208,8 +208,8 @@ pub fn steps(a: &Analysis) -> Vec<String> {
     };
     let new = |e: &&Effect| {
         let name = e.kind.of_both().unwrap_or(e.kind.id());
-        let first = !told.contains(&name);
-        told.push(name);
+        let first = !shown.contains(&name);
+        shown.push(name);
         first
     };
     a.effects.iter().filter(worth).filter(new).take(MOST).map(one).collect()
@@ -244,7 +244,7 @@ fn figures(f: &Findings) -> Table {
     table
 }
 
-fn verdict(f: &Findings) -> Verdict {
+fn verdict(f: &Findings) -> Summary {
     let a = &f.analysis;
     let what = if f.norm.both.is_some() { "The bi-directional circular deviation" } else { "The circular deviation" };
     let first = a.effects.first().filter(|e| e.weight() > 0.0);
@@ -265,7 +265,7 @@ fn verdict(f: &Findings) -> Verdict {
     for note in &f.measured.notes {
         detail += &format!(" {note}");
     }
-    Verdict { tone: Tone::Neutral, sentence, detail, figures: Vec::new() }
+    Summary { tone: Tone::Neutral, sentence, detail, figures: Vec::new() }
 }
 
 fn polar(f: &Findings) -> PolarPlot {
@@ -323,7 +323,7 @@ pub fn report(f: &Findings) -> Report {
     let mut sections = vec![Section::new(
         "",
         vec![
-            Block::Verdict(verdict(f)),
+            Block::Summary(verdict(f)),
             Block::figure(Figure::new(
                 polar(f),
                 "About the least-squares centre of all turns. Grey: the nominal circle.",
@@ -361,7 +361,7 @@ pub(super) fn shown(a: &Analysis, model: Option<&Analysis>) -> Vec<Section> {
 #[must_use]
 pub fn short(f: &Findings) -> Vec<Block> {
     let mut blocks = vec![
-        Block::Verdict(verdict(f)),
+        Block::Summary(verdict(f)),
         Block::Table(figures(f)),
         Block::Table(ranking(&f.analysis, f.model.as_ref(), Medium::Terminal)),
     ];

@@ -6,7 +6,7 @@ use super::ballbar::{self, micro};
 use super::chart::{Axis, Chart, Colour, DEGREES, Dash, Range, Series, When};
 use super::format::{self, Medium, capital};
 use super::polar::{PolarPlot, PolarTrace, Ring};
-use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
+use super::{Block, Cell, Figure, Report, Section, Summary, Table, Tone};
 use crate::circle::roundness::{Roundness, SHOWN, deviations};
 use crate::circle::trace::Analysis;
 use crate::circle::{CircleTest, Feedback, Path, Servo};
@@ -113,7 +113,7 @@ pub fn report(f: &Findings) -> Report {
     let mut sections = vec![Section::new(
         "",
         vec![
-            Block::Verdict(verdict(f)),
+            Block::Summary(verdict(f)),
             Block::Figures(polars.collect()),
             Block::figure(Figure::new(unrolled, format!("Turning {}.", f.directions()[0]))),
         ],
@@ -166,7 +166,7 @@ const STACKED: &str = "Y is stacked on X: X carries the mass of Y, which X's I2 
 /// The short form for the terminal.
 #[must_use]
 pub fn short(f: &Findings) -> Vec<Block> {
-    let mut blocks = vec![Block::Verdict(verdict(f)), Block::Table(table(f))];
+    let mut blocks = vec![Block::Summary(verdict(f)), Block::Table(table(f))];
     if !f.without.is_empty() {
         blocks.push(Block::Table(takes(f)));
     }
@@ -192,10 +192,10 @@ fn takes(f: &Findings) -> Table {
     table
 }
 
-fn verdict(f: &Findings) -> Verdict {
+fn verdict(f: &Findings) -> Summary {
     let text = |m: f64| format::cell(&micro(m), Medium::Page);
     let Some(run) = f.runs.last() else {
-        return Verdict { tone: Tone::Unsure, sentence: "No path.".into(), detail: String::new(), figures: Vec::new() };
+        return Summary { tone: Tone::Unsure, sentence: "No path.".into(), detail: String::new(), figures: Vec::new() };
     };
     let last = &run.roundness[0];
     let sentence = match f.runs.first() {
@@ -212,7 +212,7 @@ fn verdict(f: &Findings) -> Verdict {
     } else {
         format!("Effects on the axes: {}.", f.effects.join(", "))
     };
-    Verdict { tone: Tone::Neutral, sentence, detail, figures: Vec::new() }
+    Summary { tone: Tone::Neutral, sentence, detail, figures: Vec::new() }
 }
 
 type Figures = fn(&Run) -> f64;
@@ -259,7 +259,7 @@ fn drives(f: &Findings) -> Table {
     for (name, value, units) in rows {
         let cell = |(s, motion): (&Servo, &Motion)| {
             let value = value(s);
-            // A drive without a limit has none to tell.
+            // A drive without a limit shows none.
             if value.is_finite() {
                 Cell::quantity(value, units[usize::from(*motion == Motion::Linear)])
             } else {

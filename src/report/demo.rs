@@ -3,7 +3,7 @@
 
 use super::format::capital;
 use super::identify;
-use super::{Block, Cell, Report, Section, Table, Tone, Verdict};
+use super::{Block, Cell, Report, Section, Summary, Table, Tone};
 use crate::identify::joined::Joined;
 use crate::identify::result::{Identification, MethodResult};
 use crate::identify::tables::PaperTables;
@@ -51,7 +51,7 @@ pub fn linked(mut page: Report, own: &str) -> Report {
 pub const PLAYED: &str = "an FMU plays a machine with play in its nut, with friction, and with a torque that nothing accounts for; its log, \
                           with noise, is diagnosed with a model that knows of none of them.";
 
-/// Sections of the diagnosis that say where the gap lies, what causes it and how far it shrinks.
+/// Sections of the diagnosis on where the gap lies, what causes it and how far it shrinks.
 const DIAGNOSIS: usize = 3;
 
 /// The whole report, from the reports of the diagnosis and of the circle.
@@ -87,12 +87,12 @@ pub fn report(f: &Findings, diagnosis: &Report, circle: &Report) -> Report {
 fn paper(f: &Findings) -> Report {
     let mut report = identify::report(&f.consistent, Some(&Joined::one(&f.record)));
     report.title = "The XY table's axis, from FMU to parameters".to_owned();
-    let mut sections = vec![Section::new("", vec![Block::Verdict(verdict(f)), Block::KeyValues(experiment(f))])];
+    let mut sections = vec![Section::new("", vec![Block::Summary(verdict(f)), Block::KeyValues(experiment(f))])];
     // The identification's own head becomes a section like the others.
     for (k, mut section) in report.sections.into_iter().enumerate() {
         if k == 0 {
             section.heading = "What was identified".to_owned();
-            section.blocks.retain(|b| !matches!(b, Block::Verdict(_)));
+            section.blocks.retain(|b| !matches!(b, Block::Summary(_)));
         }
         sections.push(section);
     }
@@ -115,7 +115,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
     let mut euler = identify::errors(&f.euler);
     euler.caption = "Error against the reference, by the paper's Euler regression".to_owned();
     vec![
-        Block::Verdict(verdict(f)),
+        Block::Summary(verdict(f)),
         Block::KeyValues(experiment(f)),
         Block::Table(identify::compare(&f.consistent)),
         Block::Table(identify::errors(&f.consistent)),
@@ -124,7 +124,7 @@ pub fn short(f: &Findings) -> Vec<Block> {
     ]
 }
 
-/// The paper's tables with what is said of them.
+/// The paper's tables and the text about them.
 #[must_use]
 pub fn tables(tables: &PaperTables) -> Vec<Block> {
     let mut blocks: Vec<Block> = tables.words.iter().cloned().map(Block::Paragraph).collect();
@@ -158,7 +158,7 @@ fn worst(m: &MethodResult) -> Option<f64> {
     m.parameters.iter().filter_map(|e| e.error_percent).map(|e| e.abs() / 100.0).reduce(f64::max)
 }
 
-fn verdict(f: &Findings) -> Verdict {
+fn verdict(f: &Findings) -> Summary {
     let of = |found: &Identification| -> Vec<(String, Cell)> {
         let errors = found.methods.iter().filter_map(|m| Some((m.method.to_uppercase(), Cell::Percent(worst(m)?))));
         errors.collect()
@@ -169,7 +169,7 @@ fn verdict(f: &Findings) -> Verdict {
         Some(_) => "The parameters of the FMU are found again from its trace, some methods less exactly.",
         None => "No method found the parameters of the FMU again.",
     };
-    Verdict {
+    Summary {
         tone: if largest.is_some_and(|e| e < 1e-6) { Tone::Good } else { Tone::Unsure },
         sentence: sentence.to_owned(),
         detail: "The axis was exported as an FMU, driven by a Schroeder signal through the FMI, and identified from what it \

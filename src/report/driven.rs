@@ -1,5 +1,5 @@
 //! What drives the axis, in the words and units of the record: a force along a linear axis, and a current where no torque constant is
-//! given. The findings speak of a torque in N.m, as the model does; here a report is brought to what the user logged.
+//! given. The findings are of a torque in N.m, as the model is; here a report is converted to the quantity that the user logged.
 
 use serde_json::Value;
 
@@ -38,35 +38,35 @@ impl Driven {
     /// A result for programs, its units those of the log: keys and names are the contract's, and stay.
     #[must_use]
     pub fn units(&self, mut result: Value) -> Value {
-        fn walk(driven: &Driven, value: &mut Value) {
+        fn convert_units(driven: &Driven, value: &mut Value) {
             match value {
                 Value::Object(fields) => {
                     for (key, field) in fields {
                         match field {
-                            Value::String(unit) if key == "unit" => *unit = driven.words(unit),
+                            Value::String(unit) if key == "unit" => *unit = driven.convert(unit),
                             Value::String(unit) if key == "against_unit" => {
-                                *unit = driven.words(unit);
+                                *unit = driven.convert(unit);
                                 if driven.motion == Motion::Linear {
                                     *unit = unit.replacen("rad", "m", 1);
                                 }
                             }
-                            other => walk(driven, other),
+                            other => convert_units(driven, other),
                         }
                     }
                 }
-                Value::Array(all) => all.iter_mut().for_each(|v| walk(driven, v)),
+                Value::Array(all) => all.iter_mut().for_each(|v| convert_units(driven, v)),
                 _ => {}
             }
         }
         if self.unit.is_some() || self.motion == Motion::Linear {
-            walk(self, &mut result);
+            convert_units(self, &mut result);
         }
         result
     }
 
-    /// A sentence in these words.
+    /// A sentence with the quantity and the units of the log.
     #[must_use]
-    pub fn words(&self, text: &str) -> String {
+    pub fn convert(&self, text: &str) -> String {
         let mut text = text.to_owned();
         if self.motion == Motion::Linear || self.unit.is_some() {
             self.text(&mut text);
@@ -76,7 +76,7 @@ impl Driven {
 
     fn block(&self, block: &mut Block) {
         match block {
-            Block::Verdict(v) => {
+            Block::Summary(v) => {
                 self.text(&mut v.sentence);
                 self.text(&mut v.detail);
                 v.figures.iter_mut().for_each(|f| self.named(f));
@@ -137,7 +137,7 @@ impl Driven {
             let (word, next) = rest.split_at(end);
             let stop = word.trim_end_matches('.').len();
             let (word, stops) = word.split_at(stop);
-            match self.word(word) {
+            match self.replacement(word) {
                 Some(new) => out.push_str(&new),
                 None => out.push_str(word),
             }
@@ -149,8 +149,8 @@ impl Driven {
         *text = out;
     }
 
-    /// What stands for a word or a unit.
-    fn word(&self, word: &str) -> Option<String> {
+    /// The replacement of a word or a unit, where there is one.
+    fn replacement(&self, word: &str) -> Option<String> {
         if self.motion == Motion::Linear {
             for (rotary, linear) in
                 [("torque", "force"), ("torques", "forces"), ("Torque", "Force"), ("Torques", "Forces")]
@@ -186,7 +186,7 @@ impl Driven {
 mod tests {
     use super::*;
 
-    fn said(motion: Motion, unit: Option<&str>, text: &str) -> String {
+    fn converted(motion: Motion, unit: Option<&str>, text: &str) -> String {
         let driven = Driven { motion, unit: unit.map(str::to_owned) };
         match driven.blocks(vec![Block::Paragraph(text.to_owned())]).remove(0) {
             Block::Paragraph(text) => text,
@@ -209,25 +209,25 @@ mod tests {
     #[test]
     fn a_linear_axis_is_driven_by_a_force_and_names_of_parameters_stay() {
         assert_eq!(
-            said(
+            converted(
                 Motion::Linear,
                 None,
                 "Torque: 3 N of torque; load_motor.torque, the torques. See torque.csv, `torque`."
             ),
             "Force: 3 N of force; load_motor.torque, the forces. See torque.csv, `torque`."
         );
-        assert_eq!(said(Motion::Rotary, None, "the torque in N.m"), "the torque in N.m");
+        assert_eq!(converted(Motion::Rotary, None, "the torque in N.m"), "the torque in N.m");
     }
 
     #[test]
     fn a_current_without_a_torque_constant_keeps_its_unit() {
-        let amperes = |text| said(Motion::Rotary, Some("A"), text);
+        let amperes = |text| converted(Motion::Rotary, Some("A"), text);
         assert_eq!(
             amperes("0.3 N.m, I1 [kg.m2], B [N·m·s/rad]; 2 N.m/rad."),
             "0.3 A, I1 [A.s2/rad], B [A·s/rad]; 2 A/rad."
         );
         assert_eq!(amperes("I2 [kg·m²] and K in N.m/rad3"), "I2 [A·s²/rad] and K in A/rad3");
-        assert_eq!(said(Motion::Linear, Some("V"), "95 kg, 2 N.s/m, 3 N"), "95 V.s2/m, 2 V.s/m, 3 V");
+        assert_eq!(converted(Motion::Linear, Some("V"), "95 kg, 2 N.s/m, 3 N"), "95 V.s2/m, 2 V.s/m, 3 V");
     }
 
     #[test]

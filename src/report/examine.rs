@@ -2,7 +2,7 @@
 
 use super::chart::{Axis, Chart, Colour, Mark, Series};
 use super::format::{self, Medium};
-use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
+use super::{Block, Cell, Figure, Report, Section, Summary, Table, Tone};
 use crate::examine::{Examination, Finding, Severity};
 use crate::identify::result::Series as Curve;
 use crate::trace::{Motion, Signal, Trace};
@@ -21,13 +21,13 @@ pub struct Inspected<'a> {
     pub file: &'a str,
     /// Rotary or linear.
     pub motion: Motion,
-    /// What reading the file had to say.
+    /// The warnings of reading the file.
     pub warnings: &'a [String],
 }
 
-/// The answer in one sentence.
+/// The result in one sentence.
 #[must_use]
-pub fn verdict(examination: &Examination) -> Verdict {
+pub fn verdict(examination: &Examination) -> Summary {
     let count = |s: Severity| examination.findings.iter().filter(|f| f.severity == s).count();
     let (refused, warned) = (count(Severity::Refuse), count(Severity::Warn));
     let (tone, sentence) = match (refused, warned) {
@@ -44,7 +44,7 @@ pub fn verdict(examination: &Examination) -> Verdict {
         }
         format!("The motion follows the torque from {low} to {high} Hz.")
     });
-    Verdict { tone, sentence, detail, figures: Vec::new() }
+    Summary { tone, sentence, detail, figures: Vec::new() }
 }
 
 /// The findings as blocks, the gravest first.
@@ -106,7 +106,7 @@ fn pieces(seen: &Inspected<'_>) -> Option<Block> {
 /// The short form for the terminal.
 #[must_use]
 pub fn short(seen: &Inspected<'_>) -> Vec<Block> {
-    let mut blocks = vec![Block::Verdict(verdict(seen.examination))];
+    let mut blocks = vec![Block::Summary(verdict(seen.examination))];
     blocks.extend(seen.warnings.iter().cloned().map(Block::Warning));
     blocks.extend(findings(seen.examination));
     blocks.extend(pieces(seen));
@@ -123,7 +123,7 @@ pub fn report(seen: &Inspected<'_>) -> Report {
         let curve = Curve::over_time(signal.name(), unit, seen.trace.start, seen.trace.dt, values);
         let mut chart = Chart::new(signal.name(), Axis::linear("time", "s"), Axis::linear(signal.name(), unit))
             .with(Series::line("", curve.x, curve.y).in_colour(Colour::Ink));
-        let mut said = Vec::new();
+        let mut captions = Vec::new();
         for f in &seen.examination.findings {
             let about = f.signal.split(", ").any(|s| s == signal.name())
                 || f.signal == "time"
@@ -136,11 +136,11 @@ pub fn report(seen: &Inspected<'_>) -> Report {
                 let label = if k == 0 { f.id.to_owned() } else { String::new() };
                 chart.marks.push(if from == to { Mark::X(*from, label) } else { Mark::Span(*from, *to, label) });
             }
-            said.push(f.seen.clone());
+            captions.push(f.seen.clone());
         }
-        figures.push(Figure::new(chart, said.join(" ")));
+        figures.push(Figure::new(chart, captions.join(" ")));
     }
-    let mut top = vec![Block::Verdict(verdict(seen.examination))];
+    let mut top = vec![Block::Summary(verdict(seen.examination))];
     top.extend(seen.warnings.iter().cloned().map(Block::Warning));
     top.extend(findings(seen.examination));
     top.extend(pieces(seen));

@@ -49,7 +49,7 @@ pub fn estimate(value: f64, std: f64, medium: Medium) -> String {
     };
     let common = if value == 0.0 { exponent_of(std) } else { exponent_of(value.abs().max(std)) };
     let last = exponent_of(std) - 1;
-    // A standard error beyond the digits that are printed without one is that of rounding: it says nothing of the machine.
+    // A standard error beyond the digits that are printed without one is that of rounding, not of the machine.
     if common - last > 7 {
         return number(value, 7, medium);
     }
@@ -319,12 +319,12 @@ mod tests {
 
     #[test]
     fn units_in_sentences_are_typeset_on_the_page_and_nothing_else_is() {
-        let said =
+        let sentence =
             "The model lacks 0.004 N.m rms, 2.5 kg.m2 and (0.1 A.s2/rad). See load.m, end_stop.k, README.md, m.2.";
         let typeset =
             "The model lacks 0.004 N·m rms, 2.5 kg·m² and (0.1 A·s²/rad). See load.m, end_stop.k, README.md, m.2.";
-        assert_eq!(prose(said, Page), typeset);
-        assert_eq!(prose(said, Terminal), said);
+        assert_eq!(prose(sentence, Page), typeset);
+        assert_eq!(prose(sentence, Terminal), sentence);
         assert_eq!(prose("in N.m.", Page), "in N·m.");
         for kept in ["unit = \"N.m\"", "`T = 1 N.m`", "N/m", "0.5 s", ""] {
             assert_eq!(prose(kept, Page), kept);

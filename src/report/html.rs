@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use super::chart::{Colour, Dash, Mark, Shape, When};
 use super::format::{self, Medium};
 use super::plot::{self, Size};
-use super::{Block, Cell, Drawing, Figure, Report, Section, Table, Tone, Verdict, chain, polar};
+use super::{Block, Cell, Drawing, Figure, Report, Section, Summary, Table, Tone, chain, polar};
 
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("script.js");
@@ -101,7 +101,7 @@ fn section(index: usize, section: &Section) -> Markup {
 
 fn block(block: &Block) -> Markup {
     match block {
-        Block::Verdict(v) => verdict(v),
+        Block::Summary(v) => verdict(v),
         Block::Paragraph(text) => html! { p { (prose(text)) } },
         Block::Warning(text) => {
             html! { p class="warning" role="note" { span class="sign" aria-hidden="true" { "!" } span { (prose(text)) @if text.ends_with(char::is_alphanumeric) { "." } } } }
@@ -121,7 +121,7 @@ fn block(block: &Block) -> Markup {
     }
 }
 
-fn verdict(v: &Verdict) -> Markup {
+fn verdict(v: &Summary) -> Markup {
     let (class, sign, name) = match v.tone {
         Tone::Good => ("good", "✓", "Good"),
         Tone::Finding => ("finding", "!", "Finding"),
@@ -221,7 +221,7 @@ fn cell_markup(cell: &Cell) -> Markup {
     }
 }
 
-/// Whether a path leads to a file beside the page, whatever it was made of: no scheme, no way up.
+/// Whether a path leads to a file in the folder of the page or below it: no scheme, no `..`.
 fn is_plain(path: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./".contains(c);
     path.chars().all(plain) && !path.starts_with('/') && !path.split('/').any(|part| part == "..")

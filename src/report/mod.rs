@@ -59,8 +59,8 @@ impl Section {
 /// One piece of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Block {
-    /// The answer in one sentence.
-    Verdict(Verdict),
+    /// The result in one sentence.
+    Summary(Summary),
     /// Running text.
     Paragraph(String),
     /// Something the reader must know before trusting the figures.
@@ -87,14 +87,14 @@ impl Block {
     }
 }
 
-/// How an answer is to be taken. Never carried by the colour alone: each has its own sign.
+/// The tone of a result. Never shown by the colour alone: each has its own sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
     /// Nothing to do.
     Good,
     /// A finding.
     Finding,
-    /// The answer is not known, or not sure.
+    /// The result is not known, or not sure.
     Unsure,
     /// Neither good nor bad.
     Neutral,
@@ -102,14 +102,14 @@ pub enum Tone {
 
 /// The answer in one sentence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct Summary {
     /// How to take it.
     pub tone: Tone,
     /// The sentence.
     pub sentence: String,
     /// What stands behind it, in a sentence or two; may be empty.
     pub detail: String,
-    /// A few figures that carry it: name and value.
+    /// A few figures that support it: name and value.
     pub figures: Vec<(String, Cell)>,
 }
 

@@ -22,7 +22,7 @@ pub struct PolarPlot {
     pub traces: Vec<PolarTrace>,
     /// Deviation at the outer circle; none takes the largest one and a margin.
     pub full_scale: Option<f64>,
-    /// Radius of the commanded circle, in the unit of the deviations: where it is known, the magnification is told.
+    /// Radius of the commanded circle, in the unit of the deviations: where it is known, the magnification is shown.
     pub radius: Option<f64>,
     /// The ring that holds the path.
     pub ring: Option<Ring>,

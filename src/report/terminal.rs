@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 
 use super::format::{self, Medium, printable};
-use super::{Block, Cell, Report, Table, Tone, Verdict};
+use super::{Block, Cell, Report, Summary, Table, Tone};
 
 /// How the text is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub fn blocks(blocks: &[Block], layout: Layout) -> String {
     let mut parts = Vec::new();
     for b in blocks {
         let text = match b {
-            Block::Verdict(v) => verdict(v, layout),
+            Block::Summary(v) => verdict(v, layout),
             Block::Paragraph(text) => wrapped(text, layout.width, ""),
             Block::Warning(text) => {
                 let lines = wrapped(&format!("warning: {text}"), layout.width.saturating_sub(2), "  ");
@@ -115,7 +115,7 @@ pub fn table(t: &Table, layout: Layout) -> String {
     text
 }
 
-fn verdict(v: &Verdict, layout: Layout) -> String {
+fn verdict(v: &Summary, layout: Layout) -> String {
     let sign = match v.tone {
         Tone::Good => "✓",
         Tone::Finding => "!",

@@ -1,12 +1,12 @@
-//! The page of a validation: what it comes to, the findings by section of the standard, what was not tested, and the run
-//! beside reference results.
+//! The page of a validation: its result, the findings by section of the standard, what was not tested, and the run
+//! compared with reference results.
 
 use std::sync::Arc;
 
 use super::chart::{Axis, Chart, Colour, Dash, Series};
-use super::{Block, Cell, Figure, Report, Section, Table, Tone, Verdict};
+use super::{Block, Cell, Figure, Report, Section, Summary, Table, Tone};
 use crate::fmu::reference::Comparison;
-use crate::fmu::rules::{Outcome, Report as Validation, Rule, Severity, Verdict as Result};
+use crate::fmu::rules::{Outcome, Report as Validation, Rule, RuleStatus, Severity};
 
 /// Findings of one rule that are listed; the rest are counted.
 const MOST: usize = 200;
@@ -30,7 +30,7 @@ pub fn report(v: &Validation, comparison: Option<&Comparison>, strict: bool) -> 
     }
 }
 
-fn count(v: &Validation, wanted: fn(&Result) -> bool) -> u64 {
+fn count(v: &Validation, wanted: fn(&RuleStatus) -> bool) -> u64 {
     v.rules.iter().filter(|(_, verdict)| wanted(verdict)).count() as u64
 }
 
@@ -49,7 +49,7 @@ fn verdict(v: &Validation, comparison: Option<&Comparison>, strict: bool) -> Blo
         (false, false) => "",
     };
     let number = |severity| Cell::Count(v.count(severity) as u64);
-    Block::Verdict(Verdict {
+    Block::Summary(Summary {
         tone,
         sentence: sentence.to_owned(),
         detail: detail.to_owned(),
@@ -57,8 +57,8 @@ fn verdict(v: &Validation, comparison: Option<&Comparison>, strict: bool) -> Blo
             ("errors".to_owned(), number(Severity::Error)),
             ("warnings".to_owned(), number(Severity::Warning)),
             ("notes".to_owned(), number(Severity::Note)),
-            ("rules passed".to_owned(), Cell::Count(count(v, |r| *r == Result::Passed))),
-            ("not tested".to_owned(), Cell::Count(count(v, |r| matches!(r, Result::NotTested(_))))),
+            ("rules passed".to_owned(), Cell::Count(count(v, |r| *r == RuleStatus::Passed))),
+            ("not tested".to_owned(), Cell::Count(count(v, |r| matches!(r, RuleStatus::NotTested(_))))),
         ],
     })
 }
@@ -104,14 +104,14 @@ fn of(v: &Validation, rule: &Rule) -> &'static str {
     rule.section(v.fmi).unwrap_or("-")
 }
 
-/// A verdict in words, with its reason.
-fn words(rule: &Rule, verdict: &Result) -> (String, String) {
-    match verdict {
-        Result::Passed => ("passed".into(), String::new()),
-        Result::Failed => (rule.severity.to_string(), String::new()),
-        Result::NotTested(why) => ("not tested".into(), why.clone()),
-        Result::NotApplicable(why) => ("not applicable".into(), why.clone()),
-        Result::Skipped => ("left out".into(), String::new()),
+/// The status of a rule as the report names it, with its reason.
+fn status_texts(rule: &Rule, status: &RuleStatus) -> (String, String) {
+    match status {
+        RuleStatus::Passed => ("passed".into(), String::new()),
+        RuleStatus::Failed => (rule.severity.to_string(), String::new()),
+        RuleStatus::NotTested(why) => ("not tested".into(), why.clone()),
+        RuleStatus::NotApplicable(why) => ("not applicable".into(), why.clone()),
+        RuleStatus::Skipped => ("left out".into(), String::new()),
     }
 }
 
@@ -122,14 +122,14 @@ fn by_section(v: &Validation) -> Section {
     names.dedup();
     let blocks = names.into_iter().map(|section| {
         let rules: Vec<_> = v.rules.iter().filter(|(rule, _)| of(v, rule) == section).collect();
-        let found = rules.iter().filter(|(_, verdict)| *verdict == Result::Failed).count();
-        let told: Vec<_> = rules.iter().map(|(rule, verdict)| (rule, words(rule, verdict))).collect();
-        let explained = told.iter().any(|(_, (_, why))| !why.is_empty());
+        let found = rules.iter().filter(|(_, status)| *status == RuleStatus::Failed).count();
+        let shown: Vec<_> = rules.iter().map(|(rule, status)| (rule, status_texts(rule, status))).collect();
+        let explained = shown.iter().any(|(_, (_, why))| !why.is_empty());
         let mut columns = vec!["rule", "what holds when it passes", "verdict"];
         columns.extend(explained.then_some("why"));
         let mut table = Table::new("", columns);
-        for (rule, (word, why)) in told {
-            let mut cells = vec![Cell::text(rule.id), Cell::text(rule.title(v.fmi)), Cell::text(word)];
+        for (rule, (name, why)) in shown {
+            let mut cells = vec![Cell::text(rule.id), Cell::text(rule.title(v.fmi)), Cell::text(name)];
             cells.extend(explained.then(|| Cell::text(why)));
             table.row(cells);
         }
@@ -143,8 +143,8 @@ fn by_section(v: &Validation) -> Section {
 
 fn untested(v: &Validation) -> Option<Section> {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (rule, verdict) in &v.rules {
-        if let Result::NotTested(why) = verdict {
+    for (rule, status) in &v.rules {
+        if let RuleStatus::NotTested(why) = status {
             match reasons.iter_mut().find(|(reason, _)| reason == why) {
                 Some((_, rules)) => rules.push(rule.id),
                 None => reasons.push((why, vec![rule.id])),

@@ -39,7 +39,7 @@ impl Guard {
     }
 }
 
-/// Equal, in a time that does not tell where they differ.
+/// Whether they are equal, in a time that does not depend on where they differ.
 fn alike(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && a.iter().zip(b).fold(0, |all, (x, y)| all | (x ^ y)) == 0
 }

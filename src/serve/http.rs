@@ -28,7 +28,7 @@ pub struct Request {
     stream: TcpStream,
 }
 
-/// Why a request is not answered as asked: status and a sentence.
+/// Why a request is refused: status and a sentence.
 #[derive(Debug)]
 pub struct Refusal(pub u16, pub String);
 
@@ -45,7 +45,7 @@ impl From<io::Error> for Refusal {
     }
 }
 
-/// An answer.
+/// A response.
 pub struct Response {
     status: u16,
     kind: &'static str,
@@ -110,7 +110,7 @@ const fn reason(status: u16) -> &'static str {
 /// Reads the head of a request.
 ///
 /// # Errors
-/// [`Refusal`] with the answer to give, `None` where there is nobody to answer.
+/// [`Refusal`] with the response to send, `None` where the connection is closed.
 pub fn read(mut stream: TcpStream) -> Result<Request, Option<(TcpStream, Refusal)>> {
     if stream.set_read_timeout(Some(PATIENCE)).and_then(|()| stream.set_write_timeout(Some(PATIENCE))).is_err() {
         return Err(None);
@@ -206,7 +206,7 @@ impl Request {
     }
 
     /// Answers.
-    pub fn answer(self, response: Response) {
+    pub fn respond(self, response: Response) {
         send(self.stream, response);
     }
 }
@@ -235,11 +235,11 @@ fn decoded(text: &str) -> String {
     String::from_utf8_lossy(&out).into_owned()
 }
 
-/// Sends an answer; a browser that has gone is no error.
+/// Sends a response; a closed connection is no error.
 pub fn send(mut stream: TcpStream, response: Response) {
     let _ = write(&mut stream, response);
     let _ = stream.shutdown(std::net::Shutdown::Write);
-    // What is still on its way is taken off, a little of it, so that the answer is not lost in a reset of the connection.
+    // A part of what is still being sent is read, so that the response is not lost in a reset of the connection.
     let _ = stream.set_read_timeout(Some(Duration::from_millis(500)));
     let _ = io::copy(&mut stream.take(1 << 20), &mut io::sink());
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// What stands before a line of progress.
 pub const PROGRESS: &str = "progress: ";
-/// Between two looks at a process.
+/// Interval at which a process is polled.
 const LOOK: Duration = Duration::from_millis(40);
 /// From asking a process to end to ending it.
 const GRACE: Duration = Duration::from_secs(2);
@@ -20,9 +20,9 @@ const GRACE: Duration = Duration::from_secs(2);
 pub enum State {
     /// It works.
     Running,
-    /// It has an answer.
+    /// It has ended with a diagnosis.
     Done,
-    /// The record cannot carry one.
+    /// The record does not allow a diagnosis.
     Refused,
     /// It could not run.
     Failed,
@@ -32,7 +32,7 @@ pub enum State {
 
 impl State {
     /// Its name.
-    pub const fn word(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
             Self::Done => "done",
@@ -43,16 +43,16 @@ impl State {
     }
 }
 
-/// What is known of it.
+/// The status of a job.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct JobStatus {
     /// How far it is.
     pub state: State,
-    /// The steps behind it, the present one last: what the diagnosis itself says it does.
+    /// The steps behind it, the present one last: the progress lines of the diagnosis itself.
     pub steps: Vec<String>,
     /// What it printed, or why it could not run.
-    pub said: String,
-    /// What went wrong beside the diagnosis, as a circle that could not be drawn.
+    pub output: String,
+    /// What failed apart from the diagnosis, such as a circle that could not be drawn.
     pub aside: Option<String>,
     /// How long it took, s.
     pub seconds: f64,
@@ -61,7 +61,7 @@ pub struct Told {
 /// A diagnosis.
 #[derive(Debug)]
 pub struct Job {
-    told: Mutex<Told>,
+    status: Mutex<JobStatus>,
     stop: AtomicBool,
     began: Instant,
 }
@@ -70,35 +70,35 @@ impl Job {
     /// Starts one in a folder that holds `axis.toml` and the log. What it prints has lines of so many characters, as many as the
     /// page has room for, where that is known.
     pub fn start(folder: PathBuf, log: String, trust: bool, width: Option<u64>) -> Arc<Self> {
-        let told = Told {
+        let status = JobStatus {
             state: State::Running,
             steps: vec!["reading the log".to_owned()],
-            said: String::new(),
+            output: String::new(),
             aside: None,
             seconds: 0.0,
         };
-        let job = Arc::new(Self { told: Mutex::new(told), stop: AtomicBool::new(false), began: Instant::now() });
+        let job = Arc::new(Self { status: Mutex::new(status), stop: AtomicBool::new(false), began: Instant::now() });
         let own = Arc::clone(&job);
         std::thread::spawn(move || {
             let state = own.work(&folder, &log, trust, width);
-            let mut told = own.lock();
-            told.seconds = own.began.elapsed().as_secs_f64();
-            told.state = state;
+            let mut status = own.lock();
+            status.seconds = own.began.elapsed().as_secs_f64();
+            status.state = state;
         });
         job
     }
 
-    fn lock(&self) -> MutexGuard<'_, Told> {
-        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, JobStatus> {
+        self.status.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What is known of it now.
-    pub fn told(&self) -> Told {
-        let mut told = self.lock().clone();
-        if told.state == State::Running {
-            told.seconds = self.began.elapsed().as_secs_f64();
+    /// Its status now.
+    pub fn status(&self) -> JobStatus {
+        let mut status = self.lock().clone();
+        if status.state == State::Running {
+            status.seconds = self.began.elapsed().as_secs_f64();
         }
-        told
+        status
     }
 
     /// Ends it.
@@ -128,17 +128,17 @@ impl Job {
             return State::Stopped;
         }
         match ended {
-            Ok((Some(0), said, _)) => self.lock().said = said,
-            Ok((Some(1), said, _)) => {
-                self.lock().said = said;
+            Ok((Some(0), output, _)) => self.lock().output = output,
+            Ok((Some(1), output, _)) => {
+                self.lock().output = output;
                 return State::Refused;
             }
             Ok((_, _, errors)) => {
-                self.lock().said = errors;
+                self.lock().output = errors;
                 return State::Failed;
             }
             Err(error) => {
-                self.lock().said = error.to_string();
+                self.lock().output = error.to_string();
                 return State::Failed;
             }
         }
@@ -163,12 +163,12 @@ impl Job {
         // A count that goes on is one step.
         let counted =
             |s: &str| s.split_once(' ').filter(|(n, _)| n.parse::<u64>().is_ok()).map(|(_, what)| what.to_owned());
-        let mut told = self.lock();
-        if told.steps.last().is_some_and(|last| counted(last).is_some() && counted(last) == counted(step)) {
-            told.steps.pop();
+        let mut status = self.lock();
+        if status.steps.last().is_some_and(|last| counted(last).is_some() && counted(last) == counted(step)) {
+            status.steps.pop();
         }
-        if told.steps.last().is_none_or(|last| last != step) {
-            told.steps.push(step.to_owned());
+        if status.steps.last().is_none_or(|last| last != step) {
+            status.steps.push(step.to_owned());
         }
     }
 }

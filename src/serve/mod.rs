@@ -1,7 +1,7 @@
 //! `eixo serve`: a page on this computer alone, from a log to its diagnosis.
 //!
 //! What the page shows is made by the commands of this program, run as processes of their own in a folder for each log; the page itself
-//! is three files without any library. It is bound to 127.0.0.1, and answers only who knows the token in its address (see [`guard`]).
+//! is three files without any library. It is bound to 127.0.0.1, and replies only to requests with the token in its address (see [`guard`]).
 
 mod columns;
 mod guard;
@@ -79,7 +79,7 @@ pub fn serve(settings: Settings, ready: impl FnOnce(&str) -> anyhow::Result<()>)
         let (room, guard, at_once) = (Arc::clone(&room), guard.clone(), Arc::clone(&at_once));
         std::thread::spawn(move || {
             let _leaving = Leaving(at_once);
-            answer(stream, &guard, &room);
+            respond(stream, &guard, &room);
         });
     }
     Ok(())
@@ -94,14 +94,14 @@ impl Drop for Leaving {
     }
 }
 
-fn answer(stream: TcpStream, guard: &Guard, room: &Room) {
+fn respond(stream: TcpStream, guard: &Guard, room: &Room) {
     let mut request = match read(stream) {
         Ok(request) => request,
         Err(Some((stream, refusal))) => return send(stream, refusal.into()),
         Err(None) => return,
     };
     let response = found(&mut request, guard, room).unwrap_or_else(Response::from);
-    request.answer(response);
+    request.respond(response);
 }
 
 fn found(request: &mut Request, guard: &Guard, room: &Room) -> Result<Response, Refusal> {
@@ -110,6 +110,6 @@ fn found(request: &mut Request, guard: &Guard, room: &Room) -> Result<Response, 
         ("GET", "") => Ok(Response::own("text/html; charset=utf-8", PAGE)),
         ("GET", "page.css") => Ok(Response::own("text/css; charset=utf-8", STYLE)),
         ("GET", "page.js") => Ok(Response::own("text/javascript; charset=utf-8", SCRIPT)),
-        _ => room.answer(&path, request),
+        _ => room.respond(&path, request),
     }
 }

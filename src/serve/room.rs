@@ -77,11 +77,11 @@ impl Room {
         Self { folder, most, logs: Mutex::new(BTreeMap::new()) }
     }
 
-    /// Answers what is asked of the logs.
+    /// The response to a request about the logs.
     ///
     /// # Errors
     /// [`Refusal`].
-    pub fn answer(&self, path: &str, request: &mut Request) -> Result<Response, Refusal> {
+    pub fn respond(&self, path: &str, request: &mut Request) -> Result<Response, Refusal> {
         let parts: Vec<&str> = path.split('/').collect();
         match (request.method.as_str(), parts.as_slice()) {
             ("GET", ["settings"]) => {
@@ -107,7 +107,7 @@ impl Room {
         lock(&self.logs).get(id).cloned().ok_or_else(|| Refusal::new(404, "there is no such log; bring it again"))
     }
 
-    /// Keeps a log and tells what it holds.
+    /// Stores a log and describes its columns.
     fn take(&self, request: &mut Request) -> Result<Response, Refusal> {
         if lock(&self.logs).len() >= MOST_LOGS {
             return Err(Refusal::new(409, format!("{MOST_LOGS} logs were brought; start `eixo serve` again")));
@@ -119,26 +119,26 @@ impl Room {
         fs::create_dir(&folder).and_then(|()| fs::create_dir(folder.join("log")))?;
         let file = format!("log/{file}");
         let path = folder.join(&file);
-        let told = OpenOptions::new()
+        let taken = OpenOptions::new()
             .write(true)
             .create_new(true)
             .open(&path)
             .map_err(Refusal::from)
             .and_then(|mut out| request.body_to(&mut out, self.most))
             .and_then(|()| described(&path));
-        let mut told = match told {
-            Ok(told) => told,
+        let mut reply = match taken {
+            Ok(reply) => reply,
             Err(refusal) => {
                 // What cannot be read is not kept.
                 let _ = fs::remove_dir_all(&folder);
                 return Err(refusal);
             }
         };
-        told["id"] = json!(id);
-        told["name"] = json!(name);
-        told["folder"] = json!(folder.display().to_string());
+        reply["id"] = json!(id);
+        reply["name"] = json!(name);
+        reply["folder"] = json!(folder.display().to_string());
         lock(&self.logs).insert(id, Arc::new(Log { folder, file, job: Mutex::new(None), examined: Mutex::new(()) }));
-        Ok(Response::json(201, &told))
+        Ok(Response::json(201, &reply))
     }
 
     fn run(&self, id: &str, asked: &Value) -> Result<Response, Refusal> {
@@ -148,7 +148,7 @@ impl Room {
         }
         // Held until the new one is there, so that no two requests both find room.
         let logs = lock(&self.logs);
-        let runs = |l: &Log| lock(&l.job).as_ref().is_some_and(|j| j.told().state == State::Running);
+        let runs = |l: &Log| lock(&l.job).as_ref().is_some_and(|j| j.status().state == State::Running);
         if runs(&log) {
             return Err(Refusal::new(409, "a diagnosis of this log runs already"));
         }
@@ -173,7 +173,7 @@ impl Room {
 impl Log {
     /// Writes the axis file from what was confirmed, and examines the record with it.
     fn columns(&self, asked: &Value) -> Result<Response, Refusal> {
-        if lock(&self.job).as_ref().is_some_and(|j| j.told().state == State::Running) {
+        if lock(&self.job).as_ref().is_some_and(|j| j.status().state == State::Running) {
             return Err(Refusal::new(409, "a diagnosis runs on these columns; stop it first"));
         }
         // One after the other: both write the same files.
@@ -190,20 +190,20 @@ impl Log {
                 init.push(format!("{option}={value}"));
             }
         }
-        let told = self.eixo(&init)?;
+        let printed = self.eixo(&init)?;
         let inspect = ["inspect", &self.file, "--axis", "axis.toml", "--json", "inspection.json"].map(str::to_owned);
         self.eixo(&inspect)?;
         let text = fs::read(self.folder.join("inspection.json"))?;
         let found: Value = serde_json::from_slice(&text).map_err(|e| Refusal::new(500, e.to_string()))?;
         let axis = fs::read_to_string(self.folder.join("axis.toml"))?;
-        Ok(Response::json(200, &json!({ "found": found, "axis": axis, "said": told })))
+        Ok(Response::json(200, &json!({ "found": found, "axis": axis, "said": printed })))
     }
 
     /// Runs this program in the log's folder and gives what it printed.
     fn eixo(&self, arguments: &[String]) -> Result<String, Refusal> {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         match run(&self.folder, &arguments, None, &CLOSING, &|_| ())? {
-            (Some(0 | 1), said, _) => Ok(said),
+            (Some(0 | 1), output, _) => Ok(output),
             (_, _, errors) => {
                 let line = errors.lines().rev().find_map(|l| l.strip_prefix("error: "));
                 Err(Refusal::new(422, line.unwrap_or("the log could not be examined").to_owned()))
@@ -213,12 +213,12 @@ impl Log {
 
     fn state(&self) -> Value {
         let files: Vec<&str> = FILES.iter().map(|(n, _)| *n).filter(|n| self.folder.join(n).is_file()).collect();
-        let told = lock(&self.job).as_ref().map(|j| j.told());
-        told.map_or_else(
+        let status = lock(&self.job).as_ref().map(|j| j.status());
+        status.map_or_else(
             || json!({ "state": "idle", "files": files }),
             |t| {
-                let (state, seconds) = (t.state.word(), (10.0 * t.seconds).round() / 10.0);
-                json!({ "state": state, "steps": t.steps, "said": t.said, "aside": t.aside, "seconds": seconds, "files": files })
+                let (state, seconds) = (t.state.name(), (10.0 * t.seconds).round() / 10.0);
+                json!({ "state": state, "steps": t.steps, "said": t.output, "aside": t.aside, "seconds": seconds, "files": files })
             },
         )
     }

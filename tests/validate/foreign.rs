@@ -5,7 +5,7 @@ use std::process::Command;
 
 use super::corpus;
 use super::skip::{self, Lack, skipped};
-use eixo::fmu::rules::{Severity, Verdict};
+use eixo::fmu::rules::{RuleStatus, Severity};
 
 const SCRIPT: &str = r#"
 from pythonfmu import Fmi2Slave, Fmi2Causality, Fmi2Variability, Real, Integer, Boolean, String
@@ -72,6 +72,6 @@ fn our_own_fmu_is_clean_under_strict() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report = corpus::validate_file(&fmu, false);
     assert!(report.passes(true), "{:#?}", report.findings);
-    let untested: Vec<_> = report.rules.iter().filter(|(_, v)| matches!(v, Verdict::NotTested(_))).collect();
+    let untested: Vec<_> = report.rules.iter().filter(|(_, v)| matches!(v, RuleStatus::NotTested(_))).collect();
     assert!(untested.is_empty(), "{untested:#?}");
 }

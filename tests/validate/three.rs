@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 use eixo::fmu::description::Fmi;
-use eixo::fmu::rules::{self, Severity, Verdict};
+use eixo::fmu::rules::{self, RuleStatus, Severity};
 
 use super::corpus::{self, Files, Mutant, pack, parallel};
 use super::defects::DEFECTS;
@@ -379,7 +379,7 @@ fn the_sound_fmu_of_fmi_3_has_no_finding() {
     for variant in ["NONE", "STRING_LONG"] {
         let report = corpus::validate(&running(DESCRIPTION, variant, ""), false);
         assert!(report.findings.is_empty(), "{variant}: {:#?}", report.findings);
-        let untested: Vec<_> = report.rules.iter().filter(|(_, v)| matches!(v, Verdict::NotTested(_))).collect();
+        let untested: Vec<_> = report.rules.iter().filter(|(_, v)| matches!(v, RuleStatus::NotTested(_))).collect();
         assert!(untested.is_empty(), "{variant}: {untested:#?}");
     }
 }
@@ -397,7 +397,7 @@ fn the_reference_fmus_have_no_error_and_no_warning_but_for_two_of_state_space_th
             report.findings.iter().filter(|f| rules::rule(&f.rule).unwrap().severity > Severity::Note).collect();
         let ids: Vec<&str> = bad.iter().map(|f| f.rule.as_str()).collect();
         let expected: &[&str] = if *name == "StateSpace" { &["configuration-mode", "reset"] } else { &[] };
-        let ran = report.rules.iter().any(|(r, v)| r.id == "simulate" && *v == Verdict::Passed);
+        let ran = report.rules.iter().any(|(r, v)| r.id == "simulate" && *v == RuleStatus::Passed);
         // Clocks is for scheduled execution, which is said.
         let as_it_should = ids == expected && ran == (*name != "Clocks");
         (!as_it_should).then(|| format!("{name}: {bad:#?}"))

@@ -1,6 +1,6 @@
 //! Reading an FMU's ZIP archive, which is untrusted: every size is bounded, no path leaves the target folder.
 //!
-//! Sizes are checked against what is really inflated, not against what the headers promise.
+//! Sizes are checked against the bytes that are really inflated, not against the headers.
 
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Seek, Write};
@@ -114,7 +114,7 @@ impl std::fmt::Display for Hazard {
 pub struct Entry {
     /// The name as stored, lossily decoded.
     pub name: String,
-    /// Inflated size that the header promises, in bytes.
+    /// Inflated size according to the header, in bytes.
     pub size: u64,
     /// Stored size, in bytes.
     pub stored: u64,
@@ -244,7 +244,7 @@ impl Archive {
         Ok(bytes)
     }
 
-    /// Inflates every entry to nowhere, so that damage shows: wrong checksums, cut data, sizes that lie.
+    /// Inflates every entry and discards the bytes, so that damage is found: wrong checksums, truncated data, wrong sizes.
     ///
     /// # Errors
     /// The first entry that is damaged or too large.

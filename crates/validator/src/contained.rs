@@ -6,10 +6,8 @@ use std::time::Duration;
 use super::archive::Archive;
 use super::description::Description;
 use super::host::{self, HostError};
-use super::isolation::{
-    self, Answer, Bounds, Ended, Fence, Job, Outcome, Place, RunTask, Strength, sandbox, temporary,
-};
-use super::simulate::{self, Inputs, Options, Record, SimulateError};
+use super::isolation::{self, Bounds, Ended, Fence, Job, Outcome, Place, Reply, RunTask, Strength, sandbox, temporary};
+use super::simulate::{self, Inputs, Options, SimulateError, SimulationResult};
 
 /// How the child is kept.
 #[derive(Debug, Clone)]
@@ -46,7 +44,12 @@ pub fn describe(path: &Path) -> Result<Description, HostError> {
 ///
 /// # Errors
 /// See [`SimulateError`]; an FMU that crashes, ends its process or hangs is [`SimulateError::Child`].
-pub fn simulate(path: &Path, inputs: &Inputs, options: &Options, keep: &Host) -> Result<Record, SimulateError> {
+pub fn simulate(
+    path: &Path,
+    inputs: &Inputs,
+    options: &Options,
+    keep: &Host,
+) -> Result<SimulationResult, SimulateError> {
     let mut archive = Archive::open(path).map_err(HostError::from)?;
     let xml = archive.read("modelDescription.xml").map_err(HostError::from)?;
     let description = Description::parse(&xml).map_err(HostError::from)?;
@@ -65,40 +68,40 @@ pub fn simulate(path: &Path, inputs: &Inputs, options: &Options, keep: &Host) ->
     let place = Place { program: &keep.program, scratch: scratch.path().to_owned(), fence, bounds, exact_heap: false };
     let task = RunTask { folder: folder.path().to_owned(), options: options.clone(), inputs: inputs.clone() };
     let outcome = isolation::run(&place, Job::Simulate(task)).map_err(child)?;
-    let said = folder.path().display().to_string();
+    let shown = folder.path().display().to_string();
     record(outcome, keep).map_err(|error| match error {
-        // The temporary folder's name says nothing.
-        SimulateError::Child(text) => SimulateError::Child(text.replace(&format!("{said}/"), "")),
+        // The temporary folder's name is of no use.
+        SimulateError::Child(text) => SimulateError::Child(text.replace(&format!("{shown}/"), "")),
         other => other,
     })
 }
 
-fn record(outcome: Outcome, keep: &Host) -> Result<Record, SimulateError> {
+fn record(outcome: Outcome, keep: &Host) -> Result<SimulationResult, SimulateError> {
     let fail = |text: String| Err(SimulateError::Child(text));
     let within = match (outcome.call, outcome.last) {
         (call, _) if call != host::abi::CALLS[0] => format!(" in {call}"),
         (_, last) if last != host::abi::CALLS[0] => format!(" after {last}"),
         _ => String::new(),
     };
-    let said = outcome.stderr.lines().rfind(|line| !line.trim().is_empty());
-    let said = said.map_or(String::new(), |line| format!("; it printed: {line}"));
+    let printed = outcome.stderr.lines().rfind(|line| !line.trim().is_empty());
+    let printed = printed.map_or(String::new(), |line| format!("; it printed: {line}"));
     let refused = outcome.refused.map_or(String::new(), |what| {
         format!("; it asked for {what}, which the sandbox refuses: run it without --sandbox if you trust its maker")
     });
-    let answer = outcome.answer.as_deref().and_then(Answer::decode);
-    if let Some(internal) = answer.as_ref().and_then(|(answer, _)| answer.internal_error()) {
+    let reply = outcome.reply.as_deref().and_then(Reply::decode);
+    if let Some(internal) = reply.as_ref().and_then(|(reply, _)| reply.internal_error()) {
         return fail(format!("{internal}{within}"));
     }
     // Before the library is loaded, nothing of the FMU has run.
-    if outcome.last == host::abi::CALLS[0] && outcome.answer.is_none() {
+    if outcome.last == host::abi::CALLS[0] && outcome.reply.is_none() {
         return fail(format!("no process could be had to run the FMU in: {}", outcome.stderr.trim()));
     }
     match &outcome.ended {
         Ended::Signal(signal) => {
-            return fail(format!("the FMU crashed{within}: {}{said}{refused}", isolation::signal_name(*signal)));
+            return fail(format!("the FMU crashed{within}: {}{printed}{refused}", isolation::signal_name(*signal)));
         }
         Ended::Exited(code) => {
-            return fail(format!("the FMU ended its host's process{within} with exit code {code}{said}{refused}"));
+            return fail(format!("the FMU ended its host's process{within} with exit code {code}{printed}{refused}"));
         }
         Ended::Hangs(limit) => return fail(format!("the FMU hangs{within}: no end after {} s", limit.as_secs_f64())),
         Ended::Slow(limit) => return fail(format!("the FMU was not done after {} s", limit.as_secs_f64())),
@@ -106,7 +109,7 @@ fn record(outcome: Outcome, keep: &Host) -> Result<Record, SimulateError> {
         Ended::Forges => return fail(format!("the FMU wrote to its host's own descriptor{within}")),
         Ended::Well => {}
     }
-    let Some((Answer { error, record, .. }, numbers)) = answer else {
+    let Some((Reply { error, record, .. }, numbers)) = reply else {
         return fail(format!("the FMU ended its host's process{within} with exit code 0"));
     };
     if let Some(error) = error {

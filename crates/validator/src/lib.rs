@@ -17,7 +17,7 @@ pub mod validation;
 use eixo_records as trace;
 pub use eixo_records::xml;
 
-// What a machine lacks is said in one way by all tests.
+// One macro for all tests that need something a machine may lack.
 #[cfg(test)]
 #[path = "../../../tests/program/skip.rs"]
 mod skip;

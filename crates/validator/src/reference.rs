@@ -1,4 +1,4 @@
-//! A run beside reference results: per variable, whether the run stays within a tube around the reference.
+//! A run compared with reference results: per variable, whether the run stays within a tube around the reference.
 //!
 //! The tube follows the practice of the FMI cross-check, where results of two tools are the same when one stays within a
 //! band around the other: its half height is a share of the reference's range, and it is as wide as the larger of the two
@@ -24,7 +24,7 @@ pub struct Wanted<'a> {
     pub tolerance: f64,
 }
 
-/// One variable of the run beside the reference.
+/// One variable of the run, compared with the reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared {
     /// Name of the variable.
@@ -165,7 +165,7 @@ fn tube(time: &[f64], reference: &[f64], run_time: &[f64], run: &[f64], width: f
         for &v in &reference[inside] {
             band = (band.0.min(v), band.1.max(v));
         }
-        // What is no number is nowhere near.
+        // A NaN is at no finite distance.
         let outside = (band.0 - value).max(value - band.1).max(0.0);
         let distance = if value.is_finite() { outside / range } else { f64::INFINITY };
         if distance > worst.0 {

@@ -58,9 +58,9 @@ pub(super) struct Picked {
     pub points: Points,
     /// A number for each point, from a column: another number is another turn.
     pub direction: Option<Vec<f64>>,
-    /// Whether its sign is the direction: negative clockwise. The numbers of runs say nothing of it.
+    /// Whether its sign is the direction: negative clockwise. The numbers of runs do not have it.
     pub signed: bool,
-    /// As the column's name says it.
+    /// As the column's name has it.
     pub clockwise: Option<bool>,
     pub notes: Vec<String>,
 }
@@ -78,11 +78,11 @@ enum Role {
 }
 
 /// Words of a name in small letters.
-fn words(name: &str) -> Vec<String> {
+fn tokens(name: &str) -> Vec<String> {
     name.to_lowercase().split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).map(str::to_owned).collect()
 }
 
-/// Which way a word says that it turns.
+/// The direction that a word names: true for clockwise.
 pub(super) fn way(word: &str) -> Option<bool> {
     match word.to_lowercase().as_str() {
         "cw" | "clockwise" | "g2" | "g02" => Some(true),
@@ -91,14 +91,14 @@ pub(super) fn way(word: &str) -> Option<bool> {
     }
 }
 
-/// Which way a text says that it turns: `Run 1 CCW`, `counter-clockwise`.
+/// The direction that a text names, true for clockwise: `Run 1 CCW`, `counter-clockwise`.
 pub(super) fn way_of(text: &str) -> Option<bool> {
-    let words = words(text);
-    let counter = words.windows(2).any(|w| matches!(w[0].as_str(), "counter" | "anti") && w[1] == "clockwise");
-    if counter { Some(false) } else { words.iter().find_map(|w| way(w)) }
+    let tokens = tokens(text);
+    let counter = tokens.windows(2).any(|w| matches!(w[0].as_str(), "counter" | "anti") && w[1] == "clockwise");
+    if counter { Some(false) } else { tokens.iter().find_map(|w| way(w)) }
 }
 
-/// Units of ballbar software beside those of a trace.
+/// Units of ballbar software in addition to those of a trace.
 pub(super) fn unit(text: &str) -> Option<&'static Unit> {
     let plain = text.trim().trim_matches(|c| "()[]".contains(c)).trim();
     Unit::parse(plain).or_else(|| {
@@ -113,8 +113,8 @@ pub(super) fn unit(text: &str) -> Option<&'static Unit> {
 }
 
 fn role(name: &str, unit: Option<Quantity>) -> Option<Role> {
-    let words = words(name);
-    let has = |list: &[&str]| words.iter().any(|w| list.contains(&w.as_str()));
+    let tokens = tokens(name);
+    let has = |list: &[&str]| tokens.iter().any(|w| list.contains(&w.as_str()));
     if has(&["cmd", "command", "commanded", "set", "setpoint", "nominal", "soll", "target", "ref", "reference"]) {
         return None;
     }
@@ -275,8 +275,8 @@ pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, Me
         by(Role::Deviation).or(by(Role::Radius)).into_iter().collect()
     };
     for c in chosen {
-        let says_deviation = columns[c].0 == Some(Role::Deviation);
-        let values = length(c, says_deviation)?;
+        let names_deviation = columns[c].0 == Some(Role::Deviation);
+        let values = length(c, names_deviation)?;
         let mut sorted: Vec<f64> = values.iter().map(|v| v.abs()).collect();
         sorted.sort_by(f64::total_cmp);
         let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
@@ -285,7 +285,7 @@ pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, Me
         let points = if small {
             Points::Deviation { angle: angle.clone(), deviation: values }
         } else {
-            if says_deviation {
+            if names_deviation {
                 notes.push(format!(
                     "The column {} is taken as the radius: its values are too large for a deviation.",
                     table.headers[c].name

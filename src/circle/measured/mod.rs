@@ -16,7 +16,7 @@ use super::trace::{Turn, turns};
 use crate::trace::{Table, TraceError};
 use columns::{Points, pick};
 pub use part::Part;
-use text::Said;
+use text::Declared;
 
 /// A measured test that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -35,10 +35,10 @@ pub enum MeasuredError {
     },
     /// The files do not fit together.
     #[error("{0}")]
-    Together(String),
+    Mismatch(String),
 }
 
-/// What is known beside the files.
+/// What is given in addition to the files.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Given {
     /// Nominal radius, m.
@@ -80,16 +80,16 @@ const FEWEST: usize = 180;
 /// When a file cannot be read or is no circular test, or two do not fit together.
 pub fn read(files: &[PathBuf], given: &Given) -> Result<Measured, MeasuredError> {
     let mut runs = Vec::new();
-    let mut said = Said::default();
+    let mut declared = Declared::default();
     for file in files {
         let (found, own) = runs_of(file, given)?;
-        said = said.or(own);
+        declared = declared.or(own);
         runs.extend(found);
     }
     let mut notes = Vec::new();
     if !given.clockwise.is_empty() {
         if given.clockwise.len() != runs.len() {
-            return Err(MeasuredError::Together(format!(
+            return Err(MeasuredError::Mismatch(format!(
                 "--directions names {} and the files have {} turns; name one for each turn, in the order of the files",
                 given.clockwise.len(),
                 runs.len()
@@ -106,7 +106,7 @@ pub fn read(files: &[PathBuf], given: &Given) -> Result<Measured, MeasuredError>
     }
     if files.len() == 2 && chosen.len() == 1 {
         let way = if chosen[0].clockwise { "clockwise" } else { "counter-clockwise" };
-        return Err(MeasuredError::Together(format!(
+        return Err(MeasuredError::Mismatch(format!(
             "{} and {}: both turn {way}, as far as their columns, header lines, names and the order of their points tell; say it \
              with --directions ccw,cw, one for each of the {before} turns",
             files[0].display(),
@@ -117,9 +117,9 @@ pub fn read(files: &[PathBuf], given: &Given) -> Result<Measured, MeasuredError>
         notes.push(format!("{before} turns were found; the first of each direction is used."));
     }
     chosen.sort_by_key(|r| r.clockwise);
-    let radius = radius(&chosen, given.radius.or(said.radius), &mut notes)?;
+    let radius = radius(&chosen, given.radius.or(declared.radius), &mut notes)?;
     let paths: Vec<(bool, Path)> = chosen.iter().map(|r| (r.clockwise, r.path(radius))).collect();
-    let no_circle = || MeasuredError::Together("the points are no circle".to_owned());
+    let no_circle = || MeasuredError::Mismatch("the points are no circle".to_owned());
     let (turns, centre) = turns(&paths, radius).ok_or_else(no_circle)?;
     for (turn, run) in turns.iter().zip(&chosen) {
         let worst = turn.deviation.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
@@ -136,7 +136,7 @@ pub fn read(files: &[PathBuf], given: &Given) -> Result<Measured, MeasuredError>
         }
     }
     let measured = chosen.iter().filter_map(|r| r.feed(radius)).reduce(|a, b| 0.5 * (a + b));
-    let feed = given.feed.or(said.feed).or(measured);
+    let feed = given.feed.or(declared.feed).or(measured);
     for r in &chosen {
         notes.extend(r.notes.iter().cloned());
     }
@@ -189,7 +189,7 @@ fn radius(runs: &[Run], given: Option<f64>, notes: &mut Vec<String>) -> Result<f
         if given.is_finite() && given > 0.0 {
             return Ok(given);
         }
-        return Err(MeasuredError::Together(format!("the radius is {given} m: it must be greater than zero")));
+        return Err(MeasuredError::Mismatch(format!("the radius is {given} m: it must be greater than zero")));
     }
     let mut means = Vec::new();
     for run in runs {
@@ -217,7 +217,7 @@ fn radius(runs: &[Run], given: Option<f64>, notes: &mut Vec<String>) -> Result<f
         .find(|r| *r > 0.0 && (mean - r).abs() <= 5e-4 * mean);
     let radius = round.unwrap_or(mean);
     if !(radius.is_finite() && radius > 0.0) {
-        return Err(MeasuredError::Together("the points are no circle: their mean radius is zero".to_owned()));
+        return Err(MeasuredError::Mismatch("the points are no circle: their mean radius is zero".to_owned()));
     }
     notes.push(format!(
         "The nominal radius is taken as {} mm, the round number next to the mean of {} mm; --radius sets it.",
@@ -227,14 +227,14 @@ fn radius(runs: &[Run], given: Option<f64>, notes: &mut Vec<String>) -> Result<f
     Ok(radius)
 }
 
-/// The turns of one file, and what its header lines say.
-fn runs_of(file: &File, given: &Given) -> Result<(Vec<Run>, Said), MeasuredError> {
+/// The turns of one file, and what its header lines declare.
+fn runs_of(file: &File, given: &Given) -> Result<(Vec<Run>, Declared), MeasuredError> {
     let name = file.display().to_string();
     let failed = |what: String| MeasuredError::File { file: name.clone(), what };
     let read = |reason| TraceError::Read { path: file.to_owned(), reason };
     if !file.is_file() {
         let table = Table::read(file)?;
-        return split(&table, &Said::default(), &name, given).map(|runs| (runs, Said::default()));
+        return split(&table, &Declared::default(), &name, given).map(|runs| (runs, Declared::default()));
     }
     let size = std::fs::metadata(file).map_err(read)?.len();
     if size > MOST {
@@ -243,18 +243,18 @@ fn runs_of(file: &File, given: &Given) -> Result<(Vec<Run>, Said), MeasuredError
     let bytes = std::fs::read(file).map_err(read)?;
     let Some(plain) = text::of(&bytes) else {
         let table = Table::read(file)?;
-        return split(&table, &Said::default(), &name, given).map(|runs| (runs, Said::default()));
+        return split(&table, &Declared::default(), &name, given).map(|runs| (runs, Declared::default()));
     };
     let table = Table::parse(plain.table.as_bytes(), &name)?;
-    let said = plain.said.or(text::of_name(file));
-    split(&table, &said, &name, given).map(|runs| (runs, said))
+    let declared = plain.declared.or(text::of_name(file));
+    split(&table, &declared, &name, given).map(|runs| (runs, declared))
 }
 
 /// Takes a table apart into turns.
-fn split(table: &Table, said: &Said, file: &str, given: &Given) -> Result<Vec<Run>, MeasuredError> {
+fn split(table: &Table, declared: &Declared, file: &str, given: &Given) -> Result<Vec<Run>, MeasuredError> {
     let mut runs = Vec::new();
     let part = given.part.rows(table)?;
-    for picked in pick(table, given.radius.or(said.radius))? {
+    for picked in pick(table, given.radius.or(declared.radius))? {
         let picked = match &part {
             Some(rows) => picked.of_rows(rows),
             None => picked,
@@ -283,9 +283,9 @@ fn split(table: &Table, said: &Said, file: &str, given: &Given) -> Result<Vec<Ru
                 points = points.part(first, last + 1);
                 notes.push(format!("{:.0} degrees were measured; the middle turn is used.", covered.to_degrees()));
             }
-            let said_here = picked.direction.as_ref().filter(|_| picked.signed).map(|d| d[from] < 0.0);
+            let signed = picked.direction.as_ref().filter(|_| picked.signed).map(|d| d[from] < 0.0);
             let ordered = by_order.then_some(!forward);
-            let clockwise = said_here.or(picked.clockwise).or(ordered).or(said.clockwise).unwrap_or(!forward);
+            let clockwise = signed.or(picked.clockwise).or(ordered).or(declared.clockwise).unwrap_or(!forward);
             runs.push(Run { file: file.to_owned(), clockwise, points, notes });
         }
     }

@@ -1,14 +1,14 @@
 //! The text of an export, made into what the reader of traces takes: columns set by spaces get separators, words of
-//! direction get signs, and header lines tell radius, feed and direction.
+//! direction get signs, and header lines give radius, feed and direction.
 
 use std::path::Path;
 
 use super::columns::{unit, way, way_of};
 use crate::trace::Quantity;
 
-/// What header lines say.
+/// What header lines declare.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Said {
+pub(super) struct Declared {
     /// Nominal radius, m.
     pub radius: Option<f64>,
     /// Feed, m/s.
@@ -17,7 +17,7 @@ pub(super) struct Said {
     pub clockwise: Option<bool>,
 }
 
-impl Said {
+impl Declared {
     /// This, and where it is silent the other.
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -28,23 +28,23 @@ impl Said {
     }
 }
 
-/// What a file's name says.
-pub(super) fn of_name(file: &Path) -> Said {
+/// What a file's name declares.
+pub(super) fn of_name(file: &Path) -> Declared {
     let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    Said { clockwise: way_of(&stem), ..Said::default() }
+    Declared { clockwise: way_of(&stem), ..Declared::default() }
 }
 
-/// A text and what it says.
-pub(super) struct Plain {
+/// A text as columns, and what its header declares.
+pub(super) struct Export {
     pub table: String,
-    pub said: Said,
+    pub declared: Declared,
 }
 
 /// Most lines of a header.
 const HEADER: usize = 400;
 
 /// The text of a file; none where it is no text.
-pub(super) fn of(bytes: &[u8]) -> Option<Plain> {
+pub(super) fn of(bytes: &[u8]) -> Option<Export> {
     if bytes.contains(&0) {
         return None;
     }
@@ -60,7 +60,7 @@ pub(super) fn of(bytes: &[u8]) -> Option<Plain> {
     }
     let lines: Vec<&str> = text.lines().collect();
     let data = lines.iter().take(HEADER).position(|l| is_data(l)).unwrap_or(0);
-    let said = header(&lines[..data]);
+    let declared = header(&lines[..data]);
     let spaced = lines.get(data).is_some_and(|l| by_spaces(l).is_some());
     let mut table = String::with_capacity(text.len());
     for (k, line) in lines.iter().enumerate() {
@@ -75,7 +75,7 @@ pub(super) fn of(bytes: &[u8]) -> Option<Plain> {
         }
         table.push('\n');
     }
-    Some(Plain { table, said })
+    Some(Export { table, declared })
 }
 
 /// A number with a decimal point or a decimal comma.
@@ -88,7 +88,7 @@ fn number(field: &str) -> Option<f64> {
     plain.replacen(',', ".", 1).parse().ok()
 }
 
-/// Whether a line is a row of numbers, beside which a word may stand.
+/// Whether a line is a row of numbers, in which a word may be.
 fn is_data(line: &str) -> bool {
     let line = line.trim();
     if line.is_empty() || line.starts_with('#') {
@@ -158,8 +158,8 @@ fn names(line: &str, data: &str) -> String {
 }
 
 /// Radius, feed and direction from lines such as `Radius: 100 mm`, `Feedrate;1000;mm/min`, `Run 1 CCW`.
-fn header(lines: &[&str]) -> Said {
-    let mut said = Said::default();
+fn header(lines: &[&str]) -> Declared {
+    let mut declared = Declared::default();
     // The last line names the columns, where CW and CCW are not the direction of the whole.
     for line in lines.iter().take(lines.len().saturating_sub(1)) {
         let lower = line.to_lowercase();
@@ -175,16 +175,16 @@ fn header(lines: &[&str]) -> Said {
             let factor = factor.filter(|u| u.quantity == wanted).map_or(default, |u| u.factor);
             Some(value * factor).filter(|v| v.is_finite() && *v > 0.0)
         };
-        if lower.contains("radius") && said.radius.is_none() {
-            said.radius = quantity(Quantity::Length, 1e-3);
-        } else if lower.contains("feed") && said.feed.is_none() {
-            said.feed = quantity(Quantity::Velocity, 1e-3 / 60.0);
+        if lower.contains("radius") && declared.radius.is_none() {
+            declared.radius = quantity(Quantity::Length, 1e-3);
+        } else if lower.contains("feed") && declared.feed.is_none() {
+            declared.feed = quantity(Quantity::Velocity, 1e-3 / 60.0);
         }
-        if said.clockwise.is_none() && (lower.contains("dir") || lower.contains("run") || lower.contains("sense")) {
-            said.clockwise = way_of(line);
+        if declared.clockwise.is_none() && (lower.contains("dir") || lower.contains("run") || lower.contains("sense")) {
+            declared.clockwise = way_of(line);
         }
     }
-    said
+    declared
 }
 
 #[cfg(test)]
@@ -195,7 +195,7 @@ mod tests {
     fn columns_set_by_spaces_and_words_of_direction_become_a_table() {
         let text = "Ballbar export\nRadius: 150.0 mm\nFeedrate: 1000 mm/min\nRun 1 CCW\n\nAngle (deg)   Deviation (um)\n  0.0   1.5\n  0.1   1.6\n";
         let plain = of(text.as_bytes()).expect("text");
-        assert_eq!(plain.said, Said { radius: Some(0.15), feed: Some(1.0 / 60.0), clockwise: Some(false) });
+        assert_eq!(plain.declared, Declared { radius: Some(0.15), feed: Some(1.0 / 60.0), clockwise: Some(false) });
         assert!(plain.table.ends_with("Angle (deg);Deviation (um)\n0.0;1.5\n0.1;1.6\n"), "{}", plain.table);
         let plain = of(b"angle [deg],deviation [um],direction\n0,1,CCW\n1,2,\"cw\"\n").expect("text");
         assert!(plain.table.ends_with("0,1,1\n1,2,-1\n"), "{}", plain.table);

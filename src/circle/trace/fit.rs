@@ -22,7 +22,7 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Fits the points that `keep` says; none where they do not determine the shapes.
+    /// Fits the points that `keep` marks; none where they do not determine the shapes.
     pub fn of(points: &[Point], keep: &[bool], shapes: Vec<Shape>) -> Option<Self> {
         let n = shapes.len();
         let turns = points.iter().map(|p| p.turn + 1).max().unwrap_or(0);
@@ -54,7 +54,7 @@ impl Fit {
         coefficients.iter().chain(&errors).all(|v| v.is_finite()).then_some(Self { shapes, coefficients, errors })
     }
 
-    /// What the shapes that `wanted` says make at a point.
+    /// The deviation at a point by the shapes that `wanted` selects, m.
     pub fn at(&self, p: &Point, wanted: impl Fn(Shape) -> bool) -> f64 {
         let all = self.shapes.iter().zip(&self.coefficients);
         all.filter(|(s, _)| wanted(**s)).map(|(s, c)| c * s.at(p)).sum()

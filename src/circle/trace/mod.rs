@@ -1,4 +1,4 @@
-//! What the trace of a circular test shows, as ballbar software tells it: every known deviation in its size, and what it
+//! What the trace of a circular test shows, as ballbar software reports it: every known deviation in its size, and what it
 //! takes of the circularity.
 //!
 //! All deviations are fitted at once, over both directions, and each one's share is what the circularity loses when that
@@ -7,6 +7,7 @@
 //! Assumptions: one turn a direction at a constant feed; X and Y are the two axes of the circle; deviations are small
 //! against the radius, so that they add up in the radial direction.
 
+mod deviation;
 mod fit;
 mod ranking;
 mod remainder;
@@ -15,7 +16,8 @@ mod reversals;
 mod shapes;
 mod tones;
 
-pub use ranking::{Analysis, Effect, Kind, Measure, analyse};
+pub use deviation::{Effect, Kind, Measure};
+pub use ranking::{Analysis, analyse};
 pub use remedy::{Remedy, remedy};
 pub use shapes::Axis;
 

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
+use super::deviation::{Effect, Kind};
 use super::fit::Fit;
 use super::reversals::{self, Reversal};
 use super::shapes::{Axis, Shape, known};
@@ -16,194 +17,8 @@ use crate::circle::roundness::{Roundness, bidirectional};
 const MOST: usize = 7200;
 /// Most cyclic errors along one axis, and most vibrations.
 const TONES: usize = 2;
-/// A tone below this share of the circularity is not told.
+/// A tone below this share of the circularity is left to the remainder.
 const MATERIAL: f64 = 0.01;
-/// What deviates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Lost motion of an axis.
-    Backlash(Axis),
-    /// Short peaks behind the reversals of an axis.
-    Spikes(Axis),
-    /// X and Y are not at right angles.
-    Squareness,
-    /// An ellipse at 45 degrees of which one direction alone is known.
-    Diagonal,
-    /// X and Y have unlike scales.
-    Scaling,
-    /// X and Y are unlike in time.
-    Servo,
-    /// A sine of the position.
-    Cyclic(Axis),
-    /// Play across a guide.
-    Lateral(Axis),
-    /// A bent guide.
-    Straightness(Axis),
-    /// Jerks while an axis creeps.
-    StickSlip(Axis),
-    /// A sine of the time.
-    Vibration,
-    /// What none of these explains.
-    Remainder,
-}
-
-impl Kind {
-    /// Its name in files.
-    #[must_use]
-    pub const fn id(self) -> &'static str {
-        match self {
-            Self::Backlash(Axis::X) => "backlash_x",
-            Self::Backlash(Axis::Y) => "backlash_y",
-            Self::Spikes(Axis::X) => "reversal_spikes_x",
-            Self::Spikes(Axis::Y) => "reversal_spikes_y",
-            Self::Squareness => "squareness",
-            Self::Diagonal => "diagonal_ellipse",
-            Self::Scaling => "scaling_mismatch",
-            Self::Servo => "servo_mismatch",
-            Self::Cyclic(Axis::X) => "cyclic_error_x",
-            Self::Cyclic(Axis::Y) => "cyclic_error_y",
-            Self::Lateral(Axis::X) => "lateral_play_x",
-            Self::Lateral(Axis::Y) => "lateral_play_y",
-            Self::Straightness(Axis::X) => "straightness_x",
-            Self::Straightness(Axis::Y) => "straightness_y",
-            Self::StickSlip(Axis::X) => "stick_slip_x",
-            Self::StickSlip(Axis::Y) => "stick_slip_y",
-            Self::Vibration => "vibration",
-            Self::Remainder => "remainder",
-        }
-    }
-
-    /// Its name for X and Y together; none where it is of no one axis.
-    #[must_use]
-    pub const fn of_both(self) -> Option<&'static str> {
-        match self {
-            Self::Backlash(_) => Some("backlash of X and Y"),
-            Self::Spikes(_) => Some("reversal spikes of X and Y"),
-            Self::Cyclic(_) => Some("cyclic errors of X and Y"),
-            Self::Lateral(_) => Some("lateral play of X and Y"),
-            Self::Straightness(_) => Some("straightness of X and Y"),
-            _ => None,
-        }
-    }
-
-    /// Its name in words.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Backlash(Axis::X) => "backlash X",
-            Self::Backlash(Axis::Y) => "backlash Y",
-            Self::Spikes(Axis::X) => "reversal spikes X",
-            Self::Spikes(Axis::Y) => "reversal spikes Y",
-            Self::Squareness => "squareness",
-            Self::Diagonal => "squareness or servo mismatch",
-            Self::Scaling => "scaling mismatch",
-            Self::Servo => "servo mismatch",
-            Self::Cyclic(Axis::X) => "cyclic error X",
-            Self::Cyclic(Axis::Y) => "cyclic error Y",
-            Self::Lateral(Axis::X) => "lateral play X",
-            Self::Lateral(Axis::Y) => "lateral play Y",
-            Self::Straightness(Axis::X) => "straightness X",
-            Self::Straightness(Axis::Y) => "straightness Y",
-            Self::StickSlip(Axis::X) => "stick-slip X",
-            Self::StickSlip(Axis::Y) => "stick-slip Y",
-            Self::Vibration => "vibration",
-            Self::Remainder => "not explained",
-        }
-    }
-
-    /// What its size is.
-    #[must_use]
-    pub const fn measure(self) -> Measure {
-        match self {
-            Self::Backlash(_) | Self::Lateral(_) => Measure::Play,
-            Self::Spikes(_) => Measure::Height,
-            Self::Squareness | Self::Scaling => Measure::Ratio,
-            Self::Diagonal | Self::Servo | Self::Cyclic(_) | Self::Vibration => Measure::Amplitude,
-            Self::Straightness(_) => Measure::Bow,
-            Self::StickSlip(_) | Self::Remainder => Measure::Rms,
-        }
-    }
-}
-
-/// What a size is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measure {
-    /// A whole play, m.
-    Play,
-    /// A height above the levels before and behind, m, outward positive.
-    Height,
-    /// An angle or a difference of lengths, m/m.
-    Ratio,
-    /// An amplitude, m.
-    Amplitude,
-    /// The height of a bow over the diameter, m.
-    Bow,
-    /// A root of the mean square, m.
-    Rms,
-}
-
-impl Measure {
-    /// In words.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Play => "play",
-            Self::Height => "largest height",
-            Self::Ratio => "per metre",
-            Self::Amplitude => "amplitude",
-            Self::Bow => "bow",
-            Self::Rms => "rms",
-        }
-    }
-
-    /// The unit that it is told in, of which a metre (or metre per metre) has a million.
-    #[must_use]
-    pub const fn unit(self) -> &'static str {
-        match self {
-            Self::Ratio => "um/m",
-            _ => "um",
-        }
-    }
-}
-
-impl Effect {
-    /// What the ranking goes by: what it takes alone, or its half of what it takes with the same on the other axis, m.
-    #[must_use]
-    pub fn weight(&self) -> f64 {
-        self.pair.map_or(self.contribution, |both| self.contribution.max(0.5 * both))
-    }
-}
-
-/// One deviation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Effect {
-    /// What it is.
-    pub kind: Kind,
-    /// Its size in the SI unit of its measure. A play is positive where the table stays behind; an angle is positive where
-    /// +X and +Y enclose more than 90 degrees; a scaling or servo mismatch where X is longer or later.
-    pub size: f64,
-    /// Standard error of the size, where it comes from the fit.
-    pub error: Option<f64>,
-    /// The circularity without it, m.
-    pub without: f64,
-    /// What it takes of the circularity, m: negative where it hides another.
-    pub contribution: f64,
-    /// What it takes together with the same on the other axis, m: where X and Y are alike, one alone takes next to nothing,
-    /// as the other still holds the ring open.
-    pub pair: Option<f64>,
-    /// The play at the positive and at the negative end, m.
-    pub ends: Option<[f64; 2]>,
-    /// Heights at +X, +Y, -X, -Y of each turn, m.
-    pub heights: Vec<[f64; 4]>,
-    /// Length of a cycle along the axis, m.
-    pub pitch: Option<f64>,
-    /// Cycles to the turn.
-    pub per_turn: Option<f64>,
-    /// Frequency, Hz, where the feed is known.
-    pub frequency: Option<f64>,
-    /// How much later X is than Y, s, where the feed is known.
-    pub late: Option<f64>,
-}
 
 /// What a trace shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -272,7 +87,7 @@ pub fn analyse(turns: &[Turn], radius: f64, feed: Option<f64>) -> Option<Analysi
 /// Rounds in which the frequencies are refined with the known shapes in the fit, which had taken a part of each tone.
 const ROUNDS: usize = 3;
 
-/// Moves each tone to where it fits best beside all else.
+/// Moves each tone to where it fits best together with all other shapes.
 fn refine_tones(all: &[Point], keep: &[bool], fit: &mut Fit, tones: &mut [Tone], start: &[Shape], turns: usize) {
     for _ in 0..ROUNDS {
         for k in 0..tones.len() {
@@ -343,7 +158,7 @@ struct Trace {
 }
 
 impl Trace {
-    /// What some shapes make of each point.
+    /// The deviation that some shapes cause at each point, m.
     fn made(&self, wanted: impl Fn(Shape) -> bool + Copy) -> Vec<f64> {
         self.all.iter().map(|p| self.fit.at(p, wanted)).collect()
     }
@@ -373,7 +188,7 @@ impl Trace {
         let scaled = |(c, e): (f64, f64), by: f64| (c * by, e * by.abs());
         let both = self.fit.shapes.contains(&Shape::Servo);
         let mut effects = Vec::new();
-        // Everything that is told of a point, added up.
+        // The sum of all deviations at each point.
         let mut model = vec![0.0; n];
         let mut pairs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
         let mut add = |effects: &mut Vec<Effect>, effect: Effect, made: &[f64]| {

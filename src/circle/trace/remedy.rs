@@ -2,9 +2,9 @@
 //!
 //! Names of parameters: Siemens SINUMERIK 840D sl (machine data), Heidenhain iTNC 530 and TNC 426/430 (MP numbers; newer
 //! controls name them in words), Fanuc Series 16i/18i/21i, 0i, 30i (parameter numbers). Where a control has no one
-//! parameter for it, words say what to look for.
+//! parameter for it, the text is what to look for.
 
-use super::ranking::Kind;
+use super::deviation::Kind;
 
 /// What to do about a deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -1,9 +1,9 @@
-//! What the drive's loop says of a diagnosis: the command that each model asks for, beside the measured one.
+//! A diagnosis in the closed loop of the drive: the command that each model needs, compared with the measured one.
 
 use std::sync::Arc;
 
 use super::naming::{improved, title};
-use super::words;
+use super::sentences;
 use crate::diagnose::{Diagnosis, LoopErrors, Verdict};
 use crate::report::chart::{Axis, Chart, Colour, Dash, Series};
 use crate::report::{Block, Cell, Figure, Table};
@@ -32,7 +32,7 @@ pub(super) fn short(d: &Diagnosis) -> Vec<Block> {
         Verdict::Parameters | Verdict::NoGap => None,
     };
     let models = [("as given", l.before, false), ("parameters re-identified", l.reidentified, false)];
-    vec![Block::Table(errors(models.into_iter().chain(after))), Block::Paragraph(words::in_the_loop(l))]
+    vec![Block::Table(errors(models.into_iter().chain(after))), Block::Paragraph(sentences::in_the_loop(l))]
 }
 
 /// The same with the commands over time, and every hypothesis.

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::naming::{RESIDUAL, held_out, variable};
-use super::words;
+use super::sentences;
 use crate::diagnose::location::{FrequencyPart, PartOf, Side, StateCurve, TimeSlot};
 use crate::diagnose::{
     AxisParameter, Cause, ClosedLoop, ClosureOf, Diagnosis, Estimate, Figures, GapReport, Levels, LoopErrors, Ranked,
@@ -13,24 +13,24 @@ use crate::diagnose::{
 /// Name and version of the format.
 pub const SCHEMA: &str = "eixo.diagnosis/1";
 
-/// The diagnosis as it stands in the file, with what is to be known of the record beside it. A number that is not finite is `null`.
+/// The diagnosis as it is written to the file, with the warnings about the record. A number that is not finite is `null`.
 #[must_use]
 pub fn value(d: &Diagnosis, of_the_record: &[String]) -> Value {
-    let confusable = d.confusable.iter().map(|c| json!([c.named.info().id, c.other.info().id, words::alike(c)]));
+    let confusable = d.confusable.iter().map(|c| json!([c.named.info().id, c.other.info().id, sentences::alike(c)]));
     let mut all = json!({
         "schema": SCHEMA,
         "machine": d.machine,
         "verdict": verdict(d.verdict),
-        "sentence": words::sentence(d),
+        "sentence": sentences::sentence(d),
         "causes": list(&d.causes, cause),
         "ranking": list(&d.ranking, ranked),
         "confusable": confusable.collect::<Vec<_>>(),
-        "next_experiment": words::next_experiment(d),
+        "next_experiment": sentences::next_experiment(d),
         "where": location(&d.location),
         "remainder": remainder(&d.remainder),
         "gap": gap(&d.gap),
         "parameters": map(d.parameters.iter().map(|p| (p.parameter.name(), parameter(p)))),
-        "warnings": of_the_record.iter().cloned().chain(words::warnings(d, None)).collect::<Vec<_>>(),
+        "warnings": of_the_record.iter().cloned().chain(sentences::warnings(d, None)).collect::<Vec<_>>(),
     });
     if let Some(open) = &d.undecided {
         let ids: Vec<&str> = open.effects.iter().map(|e| e.info().id).collect();
@@ -106,7 +106,7 @@ fn location(w: &Where) -> Value {
         "by_time": list(&w.shown.by_time, slot),
         "by_frequency": list(&w.shown.by_frequency, part),
         "by_state": list(&w.shown.by_state, curve),
-        "summary": words::gap_shows(&w.shown, None),
+        "summary": sentences::gap_shows(&w.shown, None),
     })
 }
 
@@ -155,7 +155,7 @@ fn remainder(r: &Remainder) -> Value {
         "share": r.share,
         "noise_multiple": r.noise_multiple,
         "place": r.site.as_str(),
-        "summary": words::looks(&r.looks),
+        "summary": sentences::looks(&r.looks),
     })
 }
 

@@ -6,9 +6,9 @@ mod controlled;
 pub mod json;
 mod naming;
 mod residual;
+mod sentences;
 mod tables;
 mod verdict;
-mod words;
 
 use super::chain::{ChainDiagram, Symbol};
 use super::chart::{Axis, Chart, Mark, Series, Shape};
@@ -19,8 +19,8 @@ use crate::effects::Place;
 use crate::trace::Motion;
 pub use controlled::errors as errors_in_the_loop;
 use naming::improved;
+pub use sentences::warnings;
 use verdict::verdict;
-pub use words::warnings;
 
 /// A diagnosis with what is drawn of it.
 #[derive(Debug, Clone, Copy)]
@@ -41,10 +41,10 @@ pub struct Findings<'a> {
 #[must_use]
 pub fn report(f: &Findings) -> Report {
     let d = f.diagnosis;
-    let mut top = vec![Block::Verdict(verdict(d))];
-    top.push(Block::figure(Figure::new(chain(d), words::gap_shows(&d.location.shown, Some(f.motion)))));
-    // Behind the picture: a log has several of them, and the answer comes first.
-    top.extend(f.warnings.iter().cloned().chain(words::warnings(d, Some(f.motion))).map(Block::Warning));
+    let mut top = vec![Block::Summary(verdict(d))];
+    top.push(Block::figure(Figure::new(chain(d), sentences::gap_shows(&d.location.shown, Some(f.motion)))));
+    // Behind the picture: a log has several of them, and the verdict comes first.
+    top.extend(f.warnings.iter().cloned().chain(sentences::warnings(d, Some(f.motion))).map(Block::Warning));
     let mut sections = vec![Section::new("", top)];
     if !d.causes.is_empty() {
         let heading = if d.verdict == Verdict::Unexplained { "What comes nearest" } else { "What it is" };
@@ -57,7 +57,7 @@ pub fn report(f: &Findings) -> Report {
     }
     sections.push(Section::new("Where the gap shows", residual::blocks(&d.location, f.motion)));
     sections.push(Section::new("Every cause that was tried", which(d)));
-    sections.push(Section::new("What to do next", vec![Block::Steps(words::steps(d))]));
+    sections.push(Section::new("What to do next", vec![Block::Steps(sentences::steps(d))]));
     Report {
         title: format!("Diagnosis of {}", d.machine),
         subject: f.trace.to_owned(),
@@ -70,18 +70,18 @@ pub fn report(f: &Findings) -> Report {
 #[must_use]
 pub fn short(f: &Findings) -> Vec<Block> {
     let d = f.diagnosis;
-    let mut blocks = vec![Block::Verdict(verdict(d))];
-    blocks.extend(words::warnings(d, Some(f.motion)).into_iter().map(Block::Warning));
-    blocks.push(Block::Paragraph(words::gap_shows(&d.location.shown, Some(f.motion))));
+    let mut blocks = vec![Block::Summary(verdict(d))];
+    blocks.extend(sentences::warnings(d, Some(f.motion)).into_iter().map(Block::Warning));
+    blocks.push(Block::Paragraph(sentences::gap_shows(&d.location.shown, Some(f.motion))));
     if !d.causes.is_empty() {
         blocks.push(Block::Table(tables::causes(d)));
     }
     blocks.push(Block::Table(tables::levels(d)));
-    blocks.extend(words::why_this_way(d).map(Block::Paragraph));
-    blocks.extend(words::remainder(d, f.motion).map(Block::Paragraph));
+    blocks.extend(sentences::why_this_way(d).map(Block::Paragraph));
+    blocks.extend(sentences::remainder(d, f.motion).map(Block::Paragraph));
     blocks.extend(controlled::short(d));
     blocks.push(Block::Table(tables::ranking(d, 5)));
-    blocks.push(Block::Steps(words::steps(d)));
+    blocks.push(Block::Steps(sentences::steps(d)));
     blocks
 }
 
@@ -120,16 +120,16 @@ fn what(d: &Diagnosis) -> Vec<Block> {
             .map(|c| c.effect.info())
             .map(|i| Block::Paragraph(format!("{}. In the model: {}. {}", i.title, i.equation, i.family.meaning()))),
     );
-    blocks.extend(d.confusable.iter().map(|c| Block::Warning(words::not_told(c))));
+    blocks.extend(d.confusable.iter().map(|c| Block::Warning(sentences::not_distinguished(c))));
     blocks
 }
 
 fn how_far(f: &Findings) -> Vec<Block> {
     let d = f.diagnosis;
     let mut blocks = vec![Block::Table(tables::levels(d))];
-    blocks.extend(words::why_this_way(d).map(Block::Paragraph));
-    blocks.extend(words::remainder(d, f.motion).map(Block::Paragraph));
-    blocks.extend(words::beyond_parameters(d).map(Block::Paragraph));
+    blocks.extend(sentences::why_this_way(d).map(Block::Paragraph));
+    blocks.extend(sentences::remainder(d, f.motion).map(Block::Paragraph));
+    blocks.extend(sentences::beyond_parameters(d).map(Block::Paragraph));
     for o in f.overlays {
         blocks.extend(residual::overlay(o, d.gap.closure_of, improved(d), f.motion));
     }

@@ -52,7 +52,7 @@ pub const fn held_out(what: HeldOut) -> &'static str {
     }
 }
 
-/// A way of measuring the gap, as a column's head says it.
+/// A way of measuring the gap, as the head of a column.
 pub const fn way(of: ClosureOf) -> &'static str {
     match of {
         ClosureOf::FreeRun => "free run",

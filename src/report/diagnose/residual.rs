@@ -112,7 +112,7 @@ fn along_time(located: &Location, name: Side, unit: &str) -> Figure {
     Figure::new(chart, "Level: always there. Rising or falling: a drift. One peak: an event.")
 }
 
-/// The bands of a spectrum without lines; with lines the table of parts says more.
+/// The bands of a spectrum without lines; with lines the table of parts shows more.
 fn over_frequency(parts: &[FrequencyPart], name: Side, unit: &str) -> Option<Figure> {
     let bands: Vec<&FrequencyPart> = parts.iter().filter(|p| p.residual == name && p.of == PartOf::Band).collect();
     if bands.len() < 3 {
@@ -165,11 +165,11 @@ fn apart(bins: &[Bin]) -> Vec<Option<&Bin>> {
     let step = |i: usize| bins[i + 1].x - bins[i].x;
     let steps = bins.len().saturating_sub(1);
     // The larger step of the two on the far sides of steps `i` to `j`.
-    let beside = |i: usize, j: usize| {
+    let neighbouring = |i: usize, j: usize| {
         let before = i.checked_sub(1).map_or(0.0, step);
         before.max(if j + 1 < steps { step(j + 1) } else { 0.0 })
     };
-    let wide = |i: usize, j: usize| (i..=j).all(|k| step(k) > EMPTY * beside(i, j)) && beside(i, j) > 0.0;
+    let wide = |i: usize, j: usize| (i..=j).all(|k| step(k) > EMPTY * neighbouring(i, j)) && neighbouring(i, j) > 0.0;
     let mut out = Vec::with_capacity(bins.len() + 2);
     let mut i = 0;
     while i < bins.len() {

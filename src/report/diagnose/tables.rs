@@ -1,7 +1,7 @@
 //! The tables of a diagnosis.
 
 use super::naming::{improved, title, way};
-use super::words;
+use super::sentences;
 use crate::diagnose::{AxisParameter, Diagnosis, Estimate, Hypothesis, Levels, Verdict};
 use crate::report::{Cell, Table};
 
@@ -30,16 +30,16 @@ pub fn causes(d: &Diagnosis) -> Table {
         }
     }
     if let Some(open) = d.undecided.as_ref().filter(|_| d.verdict == Verdict::Effect) {
-        let name = Cell::text(format!("Not told: {}", words::names_of(open)));
+        let name = Cell::text(format!("Not told: {}", sentences::names_of(open)));
         table.row(vec![name, Cell::Empty, Cell::Bar(open.share_of_gap), Cell::Empty, Cell::Empty]);
     }
     table
 }
 
-/// A model in the table of errors: its name, its level, whether it is the answer.
+/// A model in the table of errors: its name, its level, whether it is the verdict's.
 type Line = (&'static str, fn(&Levels) -> f64, bool);
 
-/// The models that the table tells.
+/// The models that the table lists.
 fn lines(d: &Diagnosis) -> Vec<Line> {
     let mut lines: Vec<Line> =
         vec![("as given", |l| l.before, false), ("parameters re-identified", |l| l.reidentified, false)];

@@ -1,16 +1,16 @@
-//! The head of the page: the answer, what it rests on, its figures.
+//! The head of the page: the verdict, what it rests on, its figures.
 
 use super::naming::{held_out, lower, short_title, title};
 use super::percent;
-use super::words::{REMAINS, either, in_the_noise, undecided};
-use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, UNCAUSED, Verdict as Answer};
-use crate::report::{Cell, Tone, Verdict};
+use super::sentences::{REMAINS, either, in_the_noise, undecided};
+use crate::diagnose::{Cause, ClosureOf, Diagnosis, Hypothesis, UNCAUSED, Verdict};
+use crate::report::{Cell, Summary, Tone};
 
 /// Error over noise below which a model explains a trace.
 const TO_THE_NOISE: f64 = 1.2;
 
 /// The verdict as the page and the terminal open with it.
-pub fn verdict(d: &Diagnosis) -> Verdict {
+pub fn verdict(d: &Diagnosis) -> Summary {
     let held = &d.gap.holdout.combined;
     let [low, high] = d.gap.interval;
     let mut figures = vec![
@@ -18,7 +18,7 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
         ("95 % interval".to_owned(), Cell::Text(format!("{} to {}", percent(low), percent(high)))),
     ];
     let (tone, sentence, detail) = match d.verdict {
-        Answer::NoGap => {
+        Verdict::NoGap => {
             figures.clear();
             let (what, of) = measured(d);
             let levels = format!(
@@ -36,7 +36,7 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
             };
             (Tone::Good, sentence, levels)
         }
-        Answer::Parameters => {
+        Verdict::Parameters => {
             let sentence = if d.causes.is_empty() {
                 "The structure of the model is right, its parameters are not."
             } else {
@@ -44,14 +44,14 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
             };
             (Tone::Finding, sentence.to_owned(), fall(d))
         }
-        Answer::Effect => {
+        Verdict::Effect => {
             if let Some(c) = d.causes.first() {
                 figures.insert(0, ("probability".to_owned(), Cell::Percent(c.probability)));
             }
             let detail = undecided(d).into_iter().chain([fall(d)]).collect::<Vec<_>>().join(" ");
             (Tone::Finding, left_out(&d.causes), detail)
         }
-        Answer::Unexplained => {
+        Verdict::Unexplained => {
             let at = d.location.site.map_or("at no single place".to_owned(), |s| format!("at the {}", s.as_str()));
             let sentence = match either(d) {
                 Some(pair) => format!("There is a gap {at}, and this record does not tell {pair}."),
@@ -60,7 +60,7 @@ pub fn verdict(d: &Diagnosis) -> Verdict {
             (Tone::Unsure, sentence, format!("{}{}", nearest(d), fall(d)))
         }
     };
-    Verdict { tone, sentence, detail, figures }
+    Summary { tone, sentence, detail, figures }
 }
 
 /// How the error changes on held-out data.

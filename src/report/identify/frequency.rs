@@ -1,4 +1,4 @@
-//! The measured frequency response beside the model's.
+//! The measured frequency response compared with the model's.
 
 use std::sync::Arc;
 
@@ -74,7 +74,7 @@ fn unwrapped(measured: &[f64], model: &[f64]) -> (Vec<f64>, Vec<f64>) {
         .iter()
         .map(|p| {
             let p = p.to_degrees();
-            // A lag is told below zero.
+            // A lag is a negative phase.
             let next = last.map_or(if p > 90.0 { p - 360.0 } else { p }, |l| near(p, l));
             if next.is_finite() {
                 last = Some(next);

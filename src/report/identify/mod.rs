@@ -27,7 +27,7 @@ const DASHES: [Dash; 3] = [Dash::Solid, Dash::Dashed, Dash::Dotted];
 /// The whole report; with the record it opens with what was measured and what the estimates make of it.
 #[must_use]
 pub fn report(found: &Identification, record: Option<&Joined>) -> Report {
-    let mut top = vec![Block::Verdict(verdict(found))];
+    let mut top = vec![Block::Summary(verdict(found))];
     top.extend(found.warnings.iter().cloned().map(Block::Warning));
     top.extend(measured_and_simulated(found, record));
     if let Some(best) = recommended(found) {
@@ -58,7 +58,7 @@ pub fn report(found: &Identification, record: Option<&Joined>) -> Report {
 /// The short form for the terminal.
 #[must_use]
 pub fn short(found: &Identification) -> Vec<Block> {
-    let mut blocks = vec![Block::Verdict(verdict(found))];
+    let mut blocks = vec![Block::Summary(verdict(found))];
     blocks.extend(found.warnings.iter().cloned().map(Block::Warning));
     if let Some(best) = recommended(found) {
         blocks.push(Block::Table(estimates(best)));

@@ -5,11 +5,11 @@ use super::recommended;
 use crate::identify::identifiability::LEAST_FIT;
 use crate::identify::result::Identification;
 use crate::report::format::{self, Medium};
-use crate::report::{Tone, Verdict};
+use crate::report::{Summary, Tone};
 
-pub fn verdict(found: &Identification) -> Verdict {
+pub fn verdict(found: &Identification) -> Summary {
     let Some(best) = recommended(found).filter(|m| !m.parameters.is_empty()) else {
-        return Verdict {
+        return Summary {
             tone: Tone::Unsure,
             sentence: "No method could identify the axis from this trace.".to_owned(),
             detail: failures(found),
@@ -63,12 +63,12 @@ pub fn verdict(found: &Identification) -> Verdict {
     let detail = if identifiability.identified {
         found.recommended.as_ref().map_or_else(String::new, |r| sentence_of(&r.why))
     } else {
-        let mut words = identifiability.doubts.clone();
-        words.push(identifiability.advice.clone());
-        words.retain(|w| !w.is_empty());
-        words.join(" ")
+        let mut sentences = identifiability.doubts.clone();
+        sentences.push(identifiability.advice.clone());
+        sentences.retain(|w| !w.is_empty());
+        sentences.join(" ")
     };
-    Verdict { tone, sentence, detail, figures }
+    Summary { tone, sentence, detail, figures }
 }
 
 /// Why no method has an estimate, each reason once, behind the methods that it holds for.

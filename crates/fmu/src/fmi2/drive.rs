@@ -3,7 +3,7 @@
 //! A sample reads the inputs as they are at its time; what it computes is put out when the next one is due, as in a drive
 //! that computes during a sample. So no input reaches an output directly, and masters need no order.
 
-use super::kernel::{MOST_STEPS, StepError};
+use super::step_error::{MOST_STEPS, StepError};
 use crate::drive::{Drive, Gains};
 use crate::variables::{DRIVE, DriveSlot, Starts};
 
@@ -123,27 +123,24 @@ impl DriveKernel {
         Ok(())
     }
 
-    /// Hands every number to `word`, which may change it: the one way in and out of a stored state.
-    pub(super) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
-        self.values.iter_mut().chain(&mut self.rates).for_each(&mut *word);
+    /// Calls `visit` on every number, which it may change: a stored state is written and read by this function alone.
+    pub(super) fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
+        self.values.iter_mut().chain(&mut self.rates).for_each(&mut *visit);
         for number in [&mut self.start, &mut self.stop, &mut self.time, &mut self.next, &mut self.drive.integral] {
-            word(number);
+            visit(number);
         }
-        self.pending.iter_mut().for_each(&mut *word);
+        self.pending.iter_mut().for_each(&mut *visit);
         let mut started = f64::from(u8::from(self.drive.references.is_some()));
         let mut references = self.drive.references.unwrap_or_default();
-        word(&mut started);
-        references.iter_mut().for_each(word);
+        visit(&mut started);
+        references.iter_mut().for_each(visit);
         self.drive.references = (started != 0.0).then_some(references);
     }
 
-    /// Whether what [`DriveKernel::words`] has put in could have been stored.
-    pub(super) fn is_sound(&self) -> bool {
-        let within = |(value, v): (&f64, &crate::variables::Variable)| {
-            value.is_finite() && v.min.is_none_or(|m| m <= *value) && v.max.is_none_or(|m| *value <= m)
-        };
+    /// Whether the numbers that [`DriveKernel::visit_numbers`] has set are finite and within their bounds.
+    pub(super) fn is_valid(&self) -> bool {
         let numbers = [self.start, self.time, self.next, self.drive.integral];
-        self.values.iter().zip(DRIVE).all(within)
+        self.values.iter().zip(DRIVE).all(|(value, v)| v.allows(*value))
             && numbers
                 .iter()
                 .chain(&self.rates)

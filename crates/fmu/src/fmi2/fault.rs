@@ -1,9 +1,9 @@
-//! Why a call was refused: what a log line says. Numbers and names only, so that refusing needs no heap.
+//! Why a call was refused, as the text of a log line. Numbers and names only, so that refusing needs no heap.
 
 use std::fmt;
 
-use super::gate::Mode;
-use super::kernel::StepError;
+use super::sequence::Mode;
+use super::step_error::StepError;
 use crate::axis::ParameterError;
 use crate::variables::Named;
 
@@ -26,7 +26,7 @@ pub(crate) enum Fault {
     NoNumber { index: Named, value: f64 },
     /// Out of the bounds of the variable.
     Bounds { index: Named, value: f64 },
-    /// An argument that must be a finite number, greater than zero where said.
+    /// An argument that must be a finite number, and greater than zero where the standard asks for it.
     Number { name: &'static str, value: f64, must_be: &'static str },
     /// A communication point that is not where the last step ended.
     Time { given: f64, expected: f64 },

@@ -1,4 +1,4 @@
-//! The one way in from C: null check, re-entry check, call sequence, `catch_unwind`, log.
+//! Every call from C passes here: null check, re-entry check, call sequence, `catch_unwind`, log.
 //!
 //! A refused call (a wrong place in the sequence, a bad argument) returns `fmi2Error`, logs why, and changes nothing.
 //! A motion that is no longer finite leaves the instance in [`Mode::Error`], from where a stored state, a reset or
@@ -8,189 +8,19 @@
 
 use std::cell::UnsafeCell;
 use std::collections::BTreeSet;
-use std::ffi::{CStr, CString};
-use std::fmt::{self, Write};
+use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::abi::{Callbacks, Component, LOG_CATEGORIES, Status};
+use super::abi::{Component, Status};
 use super::fault::Fault;
+use super::log::Log;
+use super::sequence::{Function, Mode};
 use super::simulation::Simulation;
 use super::stored::Snapshot;
 use crate::variables::Starts;
 
-/// Where an instance is in the call sequence (FMI 2.0.4, section 4.2.4): one bit each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Mode {
-    /// After `fmi2Instantiate` or `fmi2Reset`.
-    Instantiated = 1,
-    /// Between `fmi2EnterInitializationMode` and `fmi2ExitInitializationMode`.
-    Initialization = 2,
-    /// Between steps (`stepComplete`).
-    Step = 4,
-    /// After `fmi2Terminate`.
-    Terminated = 8,
-    /// After a step whose result is not finite.
-    Error = 16,
-    /// After a panic.
-    Fatal = 32,
-}
-
-impl Mode {
-    /// The mode with that bit; none for [`Mode::Fatal`], which nothing leads back to.
-    pub(crate) fn from_bits(bits: u8) -> Option<Self> {
-        [Self::Instantiated, Self::Initialization, Self::Step, Self::Terminated, Self::Error]
-            .into_iter()
-            .find(|m| *m as u8 == bits)
-    }
-}
-
-impl fmt::Display for Mode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Instantiated => "before initialisation",
-            Self::Initialization => "during initialisation",
-            Self::Step => "after initialisation",
-            Self::Terminated => "after the termination",
-            Self::Error => "after an error: set a stored state, reset or free the instance",
-            Self::Fatal => "after a fatal error: free the instance",
-        })
-    }
-}
-
-const INSTANTIATED: u8 = Mode::Instantiated as u8;
-const INITIALIZATION: u8 = Mode::Initialization as u8;
-const STEP: u8 = Mode::Step as u8;
-const AFTER: u8 = Mode::Terminated as u8 | Mode::Error as u8;
-const NOWHERE: u8 = 0;
-const ANY: u8 = INSTANTIATED | INITIALIZATION | STEP | AFTER;
-
-macro_rules! functions {
-    ($($name:ident: $mask:expr;)*) => {
-        /// The functions that take an instance.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        #[allow(non_camel_case_types, clippy::enum_variant_names)]
-        pub(crate) enum Function { $($name),* }
-
-        impl Function {
-            /// Modes in which the call is legal (FMI 2.0.4, section 4.2.4, table of allowed calls; FMI 3.0, sections 2.3
-            /// and 4.2).
-            const fn mask(self) -> u8 {
-                match self { $(Self::$name => $mask),* }
-            }
-
-            const fn name(self) -> &'static str {
-                match self { $(Self::$name => stringify!($name)),* }
-            }
-        }
-    };
-}
-
-functions! {
-    fmi2SetDebugLogging: ANY;
-    fmi2SetupExperiment: INSTANTIATED;
-    fmi2EnterInitializationMode: INSTANTIATED;
-    fmi2ExitInitializationMode: INITIALIZATION;
-    fmi2Terminate: STEP;
-    fmi2Reset: ANY;
-    fmi2GetReal: INITIALIZATION | STEP | AFTER;
-    fmi2GetInteger: INITIALIZATION | STEP | AFTER;
-    fmi2GetBoolean: INITIALIZATION | STEP | AFTER;
-    fmi2GetString: INITIALIZATION | STEP | AFTER;
-    fmi2SetReal: INSTANTIATED | INITIALIZATION | STEP;
-    fmi2SetInteger: INSTANTIATED | INITIALIZATION | STEP;
-    fmi2SetBoolean: INSTANTIATED | INITIALIZATION | STEP;
-    fmi2SetString: INSTANTIATED | INITIALIZATION | STEP;
-    fmi2GetFMUstate: ANY;
-    fmi2SetFMUstate: ANY;
-    fmi2FreeFMUstate: ANY;
-    fmi2SerializedFMUstateSize: ANY;
-    fmi2SerializeFMUstate: ANY;
-    fmi2DeSerializeFMUstate: ANY;
-    fmi2GetDirectionalDerivative: INITIALIZATION | STEP | AFTER;
-    fmi2SetRealInputDerivatives: INSTANTIATED | INITIALIZATION | STEP;
-    fmi2GetRealOutputDerivatives: STEP | AFTER;
-    fmi2DoStep: STEP;
-    fmi2CancelStep: NOWHERE;
-    fmi2GetStatus: STEP | AFTER;
-    fmi2GetRealStatus: STEP | AFTER;
-    fmi2GetIntegerStatus: STEP | AFTER;
-    fmi2GetBooleanStatus: STEP | AFTER;
-    fmi2GetStringStatus: STEP | AFTER;
-    fmi3SetDebugLogging: ANY;
-    fmi3EnterInitializationMode: INSTANTIATED;
-    fmi3ExitInitializationMode: INITIALIZATION;
-    fmi3EnterEventMode: NOWHERE;
-    fmi3EnterStepMode: NOWHERE;
-    fmi3EnterConfigurationMode: NOWHERE;
-    fmi3ExitConfigurationMode: NOWHERE;
-    fmi3EvaluateDiscreteStates: NOWHERE;
-    fmi3UpdateDiscreteStates: NOWHERE;
-    fmi3Terminate: STEP;
-    fmi3Reset: ANY;
-    fmi3GetFloat32: ANY;
-    fmi3SetFloat32: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetFloat64: ANY;
-    fmi3SetFloat64: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetInt8: ANY;
-    fmi3SetInt8: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetUInt8: ANY;
-    fmi3SetUInt8: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetInt16: ANY;
-    fmi3SetInt16: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetUInt16: ANY;
-    fmi3SetUInt16: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetInt32: ANY;
-    fmi3SetInt32: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetUInt32: ANY;
-    fmi3SetUInt32: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetInt64: ANY;
-    fmi3SetInt64: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetUInt64: ANY;
-    fmi3SetUInt64: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetBoolean: ANY;
-    fmi3SetBoolean: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetString: ANY;
-    fmi3SetString: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetBinary: ANY;
-    fmi3SetBinary: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetClock: ANY;
-    fmi3SetClock: INSTANTIATED | INITIALIZATION | STEP;
-    fmi3GetIntervalDecimal: ANY;
-    fmi3GetIntervalFraction: ANY;
-    fmi3GetShiftDecimal: ANY;
-    fmi3GetShiftFraction: ANY;
-    fmi3SetIntervalDecimal: ANY;
-    fmi3SetIntervalFraction: ANY;
-    fmi3SetShiftDecimal: ANY;
-    fmi3SetShiftFraction: ANY;
-    fmi3GetFMUState: ANY;
-    fmi3SetFMUState: ANY;
-    fmi3FreeFMUState: ANY;
-    fmi3SerializedFMUStateSize: ANY;
-    fmi3SerializeFMUState: ANY;
-    fmi3DeserializeFMUState: ANY;
-    fmi3GetDirectionalDerivative: INITIALIZATION | STEP | AFTER;
-    fmi3GetAdjointDerivative: NOWHERE;
-    fmi3GetNumberOfVariableDependencies: NOWHERE;
-    fmi3GetVariableDependencies: NOWHERE;
-    fmi3GetOutputDerivatives: STEP | AFTER;
-    fmi3DoStep: STEP;
-    fmi3EnterContinuousTimeMode: NOWHERE;
-    fmi3CompletedIntegratorStep: NOWHERE;
-    fmi3SetTime: NOWHERE;
-    fmi3SetContinuousStates: NOWHERE;
-    fmi3GetContinuousStateDerivatives: NOWHERE;
-    fmi3GetEventIndicators: NOWHERE;
-    fmi3GetContinuousStates: NOWHERE;
-    fmi3GetNominalsOfContinuousStates: NOWHERE;
-    fmi3GetNumberOfEventIndicators: NOWHERE;
-    fmi3GetNumberOfContinuousStates: NOWHERE;
-    fmi3ActivateModelPartition: NOWHERE;
-}
-
-/// What an instance marks itself with, so that a pointer to something else is noticed.
+/// First field of every instance, by which a pointer to something else is noticed.
 const MARK: u64 = 0x6569_786f_2d46_4d55;
 
 /// An instance, as the importer's pointer leads to it.
@@ -212,88 +42,8 @@ pub(crate) struct Body {
     pub log: Log,
 }
 
-/// Where log messages go.
-pub(crate) struct Log {
-    pub name: CString,
-    pub sink: Sink,
-    /// By status: warning, discard, error, fatal.
-    pub on: [bool; 4],
-}
-
-/// The importer's logger, by the version of FMI.
-#[derive(Clone, Copy)]
-pub(crate) enum Sink {
-    /// FMI 2.0: a variadic function.
-    Two(Callbacks),
-    /// FMI 3.0.
-    Three {
-        /// Handed back to the logger.
-        environment: *mut std::ffi::c_void,
-        /// Log messages go here.
-        message: Option<crate::fmi3::LogMessage>,
-    },
-}
-
-/// A message on the stack; too long a text is cut.
-struct Message {
-    bytes: [u8; 480],
-    len: usize,
-}
-
-impl Write for Message {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for c in text.bytes().filter(|b| *b != 0) {
-            // The last byte stays zero: C's end of text.
-            if self.len + 1 < self.bytes.len() {
-                self.bytes[self.len] = c;
-                self.len += 1;
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Log {
-    /// Whether messages of a status go out.
-    fn wants(&self, status: Status) -> bool {
-        let kind = status as usize;
-        (1..=4).contains(&kind) && self.on[kind - 1]
-    }
-
-    /// Sends a message of that status, if anyone listens.
-    pub fn send(&self, status: Status, message: impl fmt::Display) {
-        let there = match self.sink {
-            Sink::Two(callbacks) => callbacks.logger.is_some(),
-            Sink::Three { message, .. } => message.is_some(),
-        };
-        if !there || !self.wants(status) {
-            return;
-        }
-        let mut text = Message { bytes: [0; 480], len: 0 };
-        // Cannot fail: what does not fit is cut.
-        let _ = write!(text, "{message}");
-        let mut category = Message { bytes: [0; 480], len: 0 };
-        let _ = category.write_str(LOG_CATEGORIES[status as usize - 1].0);
-        let category = category.bytes.as_ptr().cast();
-        // SAFETY: the logger has the signature of its version; all texts end in zero and live through the call; in FMI 2.0
-        // the message goes through "%s", so that no sign in it is taken for a format.
-        unsafe {
-            match self.sink {
-                Sink::Two(Callbacks { logger: Some(logger), environment, .. }) => {
-                    let text = text.bytes.as_ptr();
-                    logger(environment, self.name.as_ptr(), status as i32, category, c"%s".as_ptr(), text);
-                }
-                Sink::Three { environment, message: Some(message) } => {
-                    message(environment, status as i32, category, text.bytes.as_ptr().cast());
-                }
-                _ => {}
-            }
-        }
-    }
-}
-
 impl Body {
-    /// What a call is refused with.
+    /// Logs why a call is refused, and gives its status.
     fn refuse(&self, function: Function, fault: &Fault) -> Status {
         self.log.send(Status::Error, format_args!("{}: {fault}", function.name()));
         Status::Error
@@ -430,7 +180,7 @@ pub(crate) unsafe fn enter(
 ) -> Status {
     // SAFETY: the caller's.
     let Some(instance) = (unsafe { instance(c) }) else { return Status::Error };
-    // Taken and looked at in one: two threads at once, which the standard forbids, do not both come in.
+    // Set and tested in one operation: of two threads at once, which the standard forbids, only one enters.
     if instance.busy.swap(true, Ordering::Acquire) {
         return Status::Error;
     }
@@ -468,9 +218,13 @@ pub(crate) unsafe fn text<'a>(text: super::abi::Text) -> &'a str {
 
 #[cfg(test)]
 mod tests {
+    use std::ffi::CString;
+
+    use super::super::abi::Callbacks;
+    use super::super::log::Sink;
     use super::*;
 
-    fn quiet() -> Log {
+    fn silent_log() -> Log {
         let callbacks = Callbacks {
             logger: None,
             allocate: None,
@@ -483,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_panic_becomes_fatal_and_only_freeing_is_left() {
-        let c = create(Starts::default(), quiet());
+        let c = create(Starts::default(), silent_log());
         // SAFETY: a live instance, freed at the end.
         unsafe {
             assert_eq!(enter(c, Function::fmi2Reset, |_| panic!("a fault on purpose")), Status::Fatal);
@@ -495,7 +249,7 @@ mod tests {
 
     #[test]
     fn the_logger_cannot_call_back_into_a_busy_instance() {
-        let c = create(Starts::default(), quiet());
+        let c = create(Starts::default(), silent_log());
         // SAFETY: a live instance, freed at the end; the inner calls are what is tested.
         unsafe {
             let outer = enter(c, Function::fmi2Reset, |_| {
@@ -507,14 +261,5 @@ mod tests {
             assert_eq!(enter(c, Function::fmi2Reset, |_| Ok(Status::Ok)), Status::Ok);
             destroy(c);
         }
-    }
-
-    #[test]
-    fn a_long_message_is_cut_and_ends_in_zero() {
-        let mut message = Message { bytes: [0; 480], len: 0 };
-        assert!(write!(message, "{}\0{}", "a".repeat(300), "b".repeat(300)).is_ok());
-        assert_eq!(message.len, 479);
-        assert_eq!(message.bytes[479], 0);
-        assert_eq!(message.bytes[300], b'b');
     }
 }

@@ -4,84 +4,17 @@
 //! communication point plus `j*h`, never accumulated. A communication step of any length is cut into equal internal
 //! steps no longer than `dt_internal`, so that the order of the result never changes.
 
-use std::fmt;
-
+use super::outputs::Outputs;
+use super::step_error::{MOST_STEPS, StepError};
 use crate::axis::{Axis, ParameterError, State, Structure};
-use crate::effects::{Effect, Ramp, Reading, SensorHistory, TorqueHistory, effect_scope};
-use crate::scalar::{Dual, Scalar};
-use crate::variables::{Slot, Starts, Values, Variable, all, effect_of};
+use crate::effects::{Effect, Ramp, SensorHistory, TorqueHistory, effect_scope};
+use crate::scalar::Dual;
+use crate::variables::{Slot, Starts, Values, all, effect_of};
 
-/// Most internal steps in one communication step: about a second of work with every effect on, so that no call is taken
-/// for one that hangs.
-pub(super) const MOST_STEPS: f64 = 2e6;
 /// A communication step that is longer than whole internal steps by less than this share is cut into that many.
 const SLACK: f64 = 1e-6;
 /// Share of the internal step over which the output derivatives of an axis with effects look ahead.
 const AHEAD: f64 = 1.0 / 16.0;
-
-/// Why a step could not be done. Nothing has changed then, but for [`StepError::NotFinite`].
-#[derive(Debug, Clone, PartialEq)]
-pub enum StepError {
-    /// The parameters make no axis.
-    Parameter(ParameterError),
-    /// Too many internal steps in one communication step.
-    TooLong {
-        /// The communication step, s.
-        step: f64,
-        /// The longest internal step, s.
-        internal: f64,
-    },
-    /// A delay longer than what is remembered.
-    Delay {
-        /// What is delayed.
-        effect: Effect,
-        /// The delay, s.
-        delay: f64,
-        /// The internal step, s.
-        internal: f64,
-    },
-    /// The motion left the range of numbers.
-    NotFinite {
-        /// Communication point, s.
-        time: f64,
-    },
-}
-
-impl fmt::Display for StepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Parameter(error) => error.fmt(f),
-            Self::TooLong { step, internal } => {
-                write!(
-                    f,
-                    "a step of {step} s holds more than {MOST_STEPS:e} internal steps of {internal} s: raise dt_internal"
-                )
-            }
-            Self::Delay { effect, delay, internal } => {
-                let info = effect.info();
-                let name = effect.delay_parameter().map_or("", |i| info.parameters[i].name);
-                write!(
-                    f,
-                    "{}.{name} = {delay} s reaches back further than the history of past steps at an internal step of \
-                     {internal} s: use longer steps or a shorter delay",
-                    info.id
-                )
-            }
-            Self::NotFinite { time } => {
-                write!(
-                    f,
-                    "the motion is no longer finite after the step from {time} s: check the parameters and the step"
-                )
-            }
-        }
-    }
-}
-
-impl From<ParameterError> for StepError {
-    fn from(error: ParameterError) -> Self {
-        Self::Parameter(error)
-    }
-}
 
 /// The simulation; see the module's head.
 #[derive(Debug, Clone, Copy)]
@@ -152,7 +85,7 @@ impl Kernel {
         self.stop
     }
 
-    /// Sets an input or a parameter; what may be set when is the caller's to know.
+    /// Sets an input or a parameter; the caller checks that it may be set now.
     pub fn set(&mut self, index: usize, value: f64) {
         self.values.0[index] = value;
         // The torque is no part of the axis, so that setting it each step costs nothing; before the first step it
@@ -258,7 +191,7 @@ impl Kernel {
         self.state = state;
     }
 
-    /// The same with effects on the torque's way in or on the positions' way out.
+    /// The same with effects that transform the torque (an input) or the readings (a sensor).
     fn run_with_histories(&mut self, from: f64, torque: f64, count: u32, h: f64) -> Result<(), StepError> {
         let (axis, effects) = (&self.axis, self.axis.effects());
         let delay = |effect: Effect| effect.delay_parameter().map_or(0.0, |i| effects.of(effect)[i]);
@@ -268,7 +201,7 @@ impl Kernel {
                 return Err(too_long(effect, delay(effect)));
             }
         }
-        // What two delays of the readings need together is told of the longer one.
+        // The sum of the readings' delays must be covered; the error names the longest of them.
         let sensors = axis.on().sensors();
         let all: f64 = sensors.iter().map(|&e| delay(e)).sum();
         let longest = sensors.iter().copied().reduce(|a, b| if delay(b) > delay(a) { b } else { a });
@@ -300,7 +233,7 @@ impl Kernel {
     }
 
     fn output(&self, index: usize) -> f64 {
-        let scene = Scene {
+        let outputs = Outputs {
             axis: &self.axis,
             state: &self.state,
             readings: &self.readings,
@@ -308,7 +241,7 @@ impl Kernel {
             torque: self.values.of(Slot::Torque),
             time: self.time,
         };
-        scene.output(index, &self.torques)
+        outputs.value(index, &self.torques)
     }
 
     /// First derivative to time of an output, at the end of the last step.
@@ -408,26 +341,26 @@ impl Kernel {
             state = axis.state(x1, v1, x2, v2, self.time);
             readings = axis.effects().initial_readings(axis.on(), state.reading(), h);
         }
-        let scene = Scene { axis: &axis, state: &state, readings: &readings, rho, torque, time: self.time };
-        unknown(&mut |index| scene.output(index, &self.torques).eps[0]);
+        let outputs = Outputs { axis: &axis, state: &state, readings: &readings, rho, torque, time: self.time };
+        unknown(&mut |index| outputs.value(index, &self.torques).eps[0]);
         Ok(())
     }
 
-    /// Hands every number of the simulation to `word`, which may change it: the one way in and out of a stored state,
+    /// Calls `visit` on every number of the simulation, which it may change: a stored state is written and read by this function alone,
     /// but for the axis: see [`Kernel::restore`].
-    pub(super) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
-        self.values.0.iter_mut().for_each(&mut *word);
+    pub(super) fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
+        self.values.0.iter_mut().for_each(&mut *visit);
         for number in [&mut self.rate, &mut self.last_rate, &mut self.start, &mut self.stop, &mut self.time] {
-            word(number);
+            visit(number);
         }
         for flag in [&mut self.live, &mut self.stale] {
             let mut value = f64::from(u8::from(*flag));
-            word(&mut value);
+            visit(&mut value);
             *flag = value != 0.0;
         }
-        self.state.words(word);
-        self.torques.words(word);
-        self.readings.words(word);
+        self.state.visit_numbers(visit);
+        self.torques.visit_numbers(visit);
+        self.readings.visit_numbers(visit);
     }
 
     /// Length of the internal step last used, s.
@@ -435,63 +368,17 @@ impl Kernel {
         self.axis.h()
     }
 
-    /// Makes the axis anew for what [`Kernel::words`] has put in, with internal steps of `h` s; false when the values
-    /// are none that could have been stored.
+    /// Makes the axis anew from the numbers that [`Kernel::visit_numbers`] has set, with internal steps of `h` s; false when a
+    /// number is out of its bounds.
     pub(super) fn restore(&mut self, h: f64) -> bool {
-        let within = |(value, v): (&f64, Variable)| {
-            value.is_finite() && v.min.is_none_or(|m| m <= *value) && v.max.is_none_or(|m| *value <= m)
-        };
-        let sound = self.values.0.iter().zip(all()).all(within)
+        let valid = self.values.0.iter().zip(all()).all(|(value, v)| v.allows(*value))
             && [self.rate, self.last_rate, self.start, self.time].iter().all(|x| x.is_finite())
             && h > 0.0
             && h.is_finite();
-        if sound {
+        if valid {
             let v = &self.values;
             self.axis = Axis::new(v.parameters(), v.structure(), v.effects(), v.scheme(), h);
         }
-        sound
-    }
-}
-
-/// Everything an output is computed from, over any scalar.
-struct Scene<'a, S> {
-    axis: &'a Axis<S>,
-    state: &'a State<S>,
-    readings: &'a SensorHistory<S>,
-    rho: S,
-    torque: S,
-    time: f64,
-}
-
-impl<S: Scalar> Scene<'_, S> {
-    fn reading(&self) -> Reading<S> {
-        if self.axis.on().sensors().is_empty() {
-            self.state.reading()
-        } else {
-            self.axis.effects().transform_sensor(self.axis.on(), self.readings, self.axis.h())
-        }
-    }
-
-    fn acceleration(&self, inertia: usize, torques: &TorqueHistory<f64>) -> S {
-        let torque = self.axis.effects().input_now(self.axis.on(), self.torque, torques);
-        self.axis.accelerations(self.state, torque, self.time)[inertia]
-    }
-
-    fn output(&self, index: usize, torques: &TorqueHistory<f64>) -> S {
-        const THETA1: usize = Slot::Theta1 as usize;
-        const OMEGA1: usize = Slot::Omega1 as usize;
-        const ALPHA1: usize = Slot::Alpha1 as usize;
-        const THETA2: usize = Slot::Theta2 as usize;
-        const OMEGA2: usize = Slot::Omega2 as usize;
-        const ALPHA2: usize = Slot::Alpha2 as usize;
-        match index {
-            THETA1 => self.reading().theta1,
-            OMEGA1 => self.reading().omega1,
-            ALPHA1 => self.acceleration(0, torques),
-            THETA2 => self.reading().theta2,
-            OMEGA2 => self.reading().omega2,
-            ALPHA2 => self.acceleration(1, torques),
-            _ => self.rho * self.reading().theta2,
-        }
+        valid
     }
 }

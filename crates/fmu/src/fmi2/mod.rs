@@ -1,8 +1,8 @@
 //! The FMU: FMI 2.0 co-simulation, its C ABI and the simulation behind it, which [`crate::fmi3`] shares.
 //!
-//! [`simulation`] is what runs, safe and without a heap: [`kernel`] the axis, [`drive`] the drive; [`stored`] is its state as bytes; `gate` the one way in from C (null
-//! check, call sequence, `catch_unwind`), and `exports` the functions of `fmi2Functions.h`. No globals: everything lives
-//! in the instance.
+//! [`simulation`] is what runs, in safe code and without a heap: [`kernel`] is the axis, [`drive`] the drive, [`stored`] its
+//! state as bytes. Every call from C passes `gate` (null check, `catch_unwind`) and `sequence` (which call is legal when) to
+//! `exports`, the functions of `fmi2Functions.h`. No globals: everything lives in the instance.
 
 mod abi;
 mod baked;
@@ -11,7 +11,11 @@ mod exports;
 mod fault;
 mod gate;
 pub mod kernel;
+mod log;
+mod outputs;
+mod sequence;
 pub mod simulation;
+pub mod step_error;
 pub mod stored;
 
 pub use abi::*;
@@ -23,5 +27,7 @@ pub(crate) use exports::{
     output_derivatives, resolve, serialise, serialised_size, set, set_state, step, typed,
 };
 pub(crate) use fault::Fault;
-pub use gate::Mode;
-pub(crate) use gate::{Body, Function, Log, Sink, create, destroy, enter, text};
+pub(crate) use gate::{Body, create, destroy, enter, text};
+pub(crate) use log::{Log, Sink};
+pub(crate) use sequence::Function;
+pub use sequence::Mode;

@@ -1,7 +1,8 @@
 //! The simulation behind an instance: the axis or the drive.
 
 use super::drive::DriveKernel;
-use super::kernel::{Kernel, StepError};
+use super::kernel::Kernel;
+use super::step_error::StepError;
 use crate::axis::ParameterError;
 use crate::variables::{Model, Starts};
 
@@ -60,7 +61,7 @@ impl Simulation {
         each!(self, k => k.stop())
     }
 
-    /// Sets an input or a parameter; what may be set when is the caller's to know.
+    /// Sets an input or a parameter; the caller checks that it may be set now.
     #[inline]
     pub fn set(&mut self, index: usize, value: f64) {
         each!(self, k => k.set(index, value));
@@ -135,12 +136,12 @@ impl Simulation {
         }
     }
 
-    /// Hands every number of the simulation to `word`, which may change it.
-    pub(super) fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
-        each!(self, k => k.words(word));
+    /// Calls `visit` on every number of the simulation, which it may change.
+    pub(super) fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
+        each!(self, k => k.visit_numbers(visit));
     }
 
-    /// What [`Simulation::restore`] needs beside the words.
+    /// What [`Simulation::restore`] needs beside the numbers of [`Simulation::visit_numbers`].
     pub(super) fn internal_step(&self) -> f64 {
         match self {
             Self::Axis(axis) => axis.internal_step(),
@@ -148,11 +149,11 @@ impl Simulation {
         }
     }
 
-    /// Makes what follows from the words; false when they are none that could have been stored.
+    /// Computes what depends on the numbers read; false when one is out of its bounds.
     pub(super) fn restore(&mut self, internal_step: f64) -> bool {
         match self {
             Self::Axis(axis) => axis.restore(internal_step),
-            Self::Drive(drive) => drive.is_sound(),
+            Self::Drive(drive) => drive.is_valid(),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! An FMU state as bytes, little-endian: magic, GUID, mode, the kernel's numbers, and a checksum over all before it.
 //!
-//! What comes back may come from anywhere, so nothing in it is trusted: length, magic, GUID and checksum must fit, and
-//! every number that is no `f64` is brought into its range as it is read.
+//! Bytes read may come from anywhere and are not trusted: length, magic, GUID and checksum must fit, and a count or a flag,
+//! stored as `f64`, is clamped to its range.
 
-use super::gate::Mode;
+use super::sequence::Mode;
 use super::simulation::Simulation;
 use crate::variables::{Starts, guid};
 
@@ -12,7 +12,7 @@ const MAGIC: [u8; 8] = *b"eixoFMU1";
 const HEAD: usize = 8 + 16 + 8 + 8;
 const CHECKSUM: usize = 8;
 
-/// A copy of everything an instance can go back to.
+/// The part of an instance that an FMU state restores.
 #[derive(Debug, Clone, Copy)]
 pub struct Snapshot {
     /// The simulation.
@@ -33,7 +33,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 pub fn size(kernel: &Simulation) -> usize {
     let mut count = 0;
     let mut copy = *kernel;
-    copy.words(&mut |_| count += 1);
+    copy.visit_numbers(&mut |_| count += 1);
     HEAD + 8 * count + CHECKSUM
 }
 
@@ -50,8 +50,8 @@ pub fn write(snapshot: &Snapshot, starts: &Starts, bytes: &mut [u8]) -> bool {
     bytes[32..HEAD].copy_from_slice(&snapshot.kernel.internal_step().to_le_bytes());
     let mut at = HEAD;
     let mut copy = snapshot.kernel;
-    copy.words(&mut |word| {
-        bytes[at..at + 8].copy_from_slice(&word.to_le_bytes());
+    copy.visit_numbers(&mut |number| {
+        bytes[at..at + 8].copy_from_slice(&number.to_le_bytes());
         at += 8;
     });
     let sum = checksum(&bytes[..size - CHECKSUM]);
@@ -62,7 +62,7 @@ pub fn write(snapshot: &Snapshot, starts: &Starts, bytes: &mut [u8]) -> bool {
 /// Reads a state back.
 ///
 /// # Errors
-/// Says what does not fit.
+/// With the reason, when length, magic, GUID, checksum, mode or a value does not fit.
 pub fn read(starts: &Starts, bytes: &[u8]) -> Result<Snapshot, &'static str> {
     let mut kernel = Simulation::new(starts);
     let size = size(&kernel);
@@ -75,22 +75,22 @@ pub fn read(starts: &Starts, bytes: &[u8]) -> Result<Snapshot, &'static str> {
     if bytes[8..24] != guid(starts).number().to_le_bytes() {
         return Err("it is the state of an FMU with another GUID");
     }
-    let word = |at: usize| {
+    let raw = |at: usize| {
         let mut raw = [0; 8];
         raw.copy_from_slice(&bytes[at..at + 8]);
         raw
     };
-    if checksum(&bytes[..size - CHECKSUM]) != u64::from_le_bytes(word(size - CHECKSUM)) {
+    if checksum(&bytes[..size - CHECKSUM]) != u64::from_le_bytes(raw(size - CHECKSUM)) {
         return Err("its checksum is wrong");
     }
-    let flags = u64::from_le_bytes(word(24));
+    let flags = u64::from_le_bytes(raw(24));
     let mode = Mode::from_bits(flags as u8).ok_or("its mode is unknown")?;
     let mut at = HEAD;
-    kernel.words(&mut |value| {
-        *value = f64::from_le_bytes(word(at));
+    kernel.visit_numbers(&mut |value| {
+        *value = f64::from_le_bytes(raw(at));
         at += 8;
     });
-    if !kernel.restore(f64::from_le_bytes(word(32))) {
+    if !kernel.restore(f64::from_le_bytes(raw(32))) {
         return Err("it holds values out of their bounds");
     }
     Ok(Snapshot { kernel, mode, set_up: flags & 0x100 != 0 })

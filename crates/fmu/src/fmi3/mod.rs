@@ -1,14 +1,14 @@
 //! The FMU in FMI 3.0: a second C ABI over the simulation of [`crate::fmi2`]: the same variables by the same value
 //! references, the same gate (null check, call sequence, `catch_unwind`), the same states.
 //!
-//! A Real is a `Float64`, an enumeration an `Int64`; beside the table there is the independent variable
+//! A Real is a `Float64`, an enumeration an `Int64`; in addition to the table there is the independent variable
 //! ([`TIME_REFERENCE`]), which FMI 3.0 asks for. There is no event mode (`hasEventMode` is false), no early return, and
 //! nothing is updated between communication points.
 //!
 //! # Safety
 //! All functions, as the standard asks of importers: an instance is a null pointer or one that
 //! `fmi3InstantiateCoSimulation` gave and that has not been freed, and is used by one thread at a time; an array holds as
-//! many entries as said.
+//! many entries as its argument for the length states.
 
 #![allow(unsafe_code)]
 #![allow(non_snake_case, reason = "the names are the standard's")]

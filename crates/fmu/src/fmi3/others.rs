@@ -59,7 +59,7 @@ no_clock! {
     fmi3SetShiftFraction(_counters: *const u64, _resolutions: *const u64);
 }
 
-/// Not offered: the capability flags say so.
+/// Not offered, as the capability flags declare.
 macro_rules! not_offered {
     ($($name:ident ($($arg:ident: $kind:ty),*);)*) => {$(
         #[unsafe(no_mangle)]

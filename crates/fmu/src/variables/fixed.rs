@@ -26,7 +26,7 @@ const DT: f64 = 5.626e-4;
 /// Smallest inertia, and other values that must be greater than zero.
 const POSITIVE: f64 = 1e-12;
 
-/// A real parameter without bounds, before anything is said of it.
+/// A real parameter without bounds, start value or description yet.
 pub(super) const BLANK: Variable = Variable {
     reference: 0,
     group: "",

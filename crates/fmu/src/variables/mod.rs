@@ -117,6 +117,14 @@ pub struct Variable {
     pub doc: &'static str,
 }
 
+impl Variable {
+    /// Whether a value, in the variable's unit, is finite and within its bounds.
+    #[must_use]
+    pub fn allows(&self, value: f64) -> bool {
+        value.is_finite() && self.min.is_none_or(|min| min <= value) && self.max.is_none_or(|max| value <= max)
+    }
+}
+
 impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.group.is_empty() {
@@ -255,7 +263,7 @@ mod tests {
     fn every_start_value_lies_within_its_bounds() {
         for v in all() {
             if let Some(start) = v.start {
-                assert!(v.min.is_none_or(|m| m <= start) && v.max.is_none_or(|m| start <= m), "{v}");
+                assert!(v.allows(start), "{v}");
             }
             assert_eq!(v.start.is_none(), v.causality == Causality::Output, "{v}");
             assert!(v.nominal > 0.0 && !v.doc.is_empty(), "{v}");

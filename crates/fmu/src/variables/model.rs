@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{COUNT, Causality, DRIVE, DriveSlot, Slot, Variable};
 
-/// A model of the library. The start values that an export writes into the binary say which one it is.
+/// A model of the library; the start values that an export writes into the binary contain which one it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u64)]
 pub enum Model {
@@ -47,7 +47,7 @@ impl Model {
 
     /// How many variables at the head of the table are Reals with their index as value reference.
     #[must_use]
-    pub const fn plain(self) -> usize {
+    pub const fn leading_reals(self) -> usize {
         match self {
             Self::Axis => Slot::Structure as usize,
             Self::Drive => DRIVE.len(),
@@ -123,11 +123,11 @@ mod tests {
                 assert_eq!(model.index_of(v.reference), Some(index), "{v}");
                 assert_eq!(v.start.is_none(), v.causality == Causality::Output, "{v}");
                 if let Some(start) = v.start {
-                    assert!(v.min.is_none_or(|m| m <= start) && v.max.is_none_or(|m| start <= m), "{v}");
+                    assert!(v.allows(start), "{v}");
                 }
                 assert!(v.nominal > 0.0 && !v.doc.is_empty(), "{v}");
             }
-            for index in 0..model.plain() {
+            for index in 0..model.leading_reals() {
                 assert_eq!(model.at(index).reference, index as u32);
                 assert_eq!(model.at(index).kind, super::super::Type::Real);
             }

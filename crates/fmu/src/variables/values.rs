@@ -9,7 +9,7 @@ use crate::drive::Gains;
 use crate::effects::{PARAMETERS, Settings};
 use crate::scalar::Scalar;
 
-/// Start values of every variable (zero for outputs), as an FMU carries them.
+/// Start values of every variable (zero for outputs), as they are stored in an FMU.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Starts {
     /// Of which model.

@@ -12,7 +12,7 @@ use crate::scalar::Scalar;
 pub struct Axis<S = f64> {
     pub(super) full: Mechanics<S>,
     /// The same without derivatives.
-    pub(super) plain: Mechanics<f64>,
+    pub(super) primal: Mechanics<f64>,
 }
 
 impl<S: Scalar> Axis<S> {
@@ -34,7 +34,7 @@ impl<S: Scalar> Axis<S> {
     }
 
     pub(super) fn of(full: Mechanics<S>) -> Self {
-        Self { full, plain: full.plain() }
+        Self { full, primal: full.primal() }
     }
 
     /// The parameters.
@@ -86,7 +86,7 @@ impl<S: Scalar> Axis<S> {
 
     /// Accelerations `[alpha1, alpha2]` under the torque `torque` on the motor at `time` s, rad/s2 (paper, eq. 2).
     ///
-    /// Dry friction at rest answers the torque of now, whatever it held over the step before: up to its level the
+    /// Dry friction at rest balances the present torque, whatever it was over the step before: up to its level the
     /// inertia stays.
     pub fn accelerations(&self, s: &State<S>, torque: S, time: f64) -> [S; 2] {
         let coupling = match self.full.structure {
@@ -117,8 +117,8 @@ impl<S: Scalar> Axis<S> {
     /// Gives each inertia an impulse at the state, N.m.s, and returns what took effect: an inertia that dry friction holds
     /// takes none of an impulse that, spread over `span` s, stays below what its friction can still hold.
     ///
-    /// A correction of the motion enters here as the torque that it is, so that friction at rest meets it as it meets any
-    /// torque (a rigid axis takes both on its one inertia).
+    /// A correction of the motion enters here as a torque, which friction at rest resists like any other (a rigid axis
+    /// takes both on its one inertia).
     pub fn kick(&self, s: &mut State<S>, impulse: [S; 2], span: f64, time: f64) -> [S; 2] {
         let mut taken = impulse;
         let sticks = self.full.sticks(s);

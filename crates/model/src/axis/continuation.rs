@@ -43,7 +43,7 @@ impl<S: Scalar> State<S> {
     /// The same without derivatives.
     #[must_use]
     #[inline]
-    pub fn plain(&self) -> State<f64> {
+    pub fn primal(&self) -> State<f64> {
         State {
             linear: self.linear.map(S::re),
             friction: self.friction.map(S::re),
@@ -63,13 +63,13 @@ impl State<f64> {
         self.linear.iter().map(|x| x * 0.0).sum::<f64>() == 0.0
     }
 
-    /// Hands every number of the state to `word`, which may change it: the one way in and out of a stored state.
-    pub fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+    /// Calls `visit` on every number of the state, which it may change: a stored state is written and read by this function alone.
+    pub fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
         let numbers = self.linear.iter_mut().chain(&mut self.friction).chain(&mut self.force).chain(&mut self.memory);
-        numbers.for_each(&mut *word);
+        numbers.for_each(&mut *visit);
         for mode in self.modes.dry.iter_mut().chain([&mut self.modes.contact]) {
             let mut value = f64::from(*mode);
-            word(&mut value);
+            visit(&mut value);
             *mode = if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
         }
     }

@@ -1,18 +1,18 @@
-//! Effects on both inertias, and dry friction that holds beside them: two equations of two unknowns.
+//! Effects on both inertias together with sticking friction: two equations of two unknowns.
 
 use super::axis_model::State;
-use super::hold::Hold;
 use super::mechanics::{Mechanics, Motions, motions};
 use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::{Linear, Propagator};
 use super::segment::{Segment, before};
+use super::stick::StickTorques;
 use crate::effects::{Forces, Internal, Internals, Memory, Motion, StepMotion, memory_of};
 use crate::scalar::Scalar;
 
-/// Torques on both inertias, beside dry friction that holds.
+/// The equations of the torques on both inertias, with the friction that sticks.
 pub(super) struct Coupled<'a, S> {
     mechanics: &'a Mechanics<S>,
-    hold: Hold<S>,
+    stick: StickTorques<S>,
     step: &'a Propagator<S>,
     from: &'a State<S>,
     start: Motions<S>,
@@ -21,7 +21,7 @@ pub(super) struct Coupled<'a, S> {
     /// The end without torques there.
     free: Linear<S>,
     time: f64,
-    /// Whether there is no torque but friction that holds.
+    /// Whether sticking friction is the only torque, so that nothing has to be solved.
     known: bool,
 }
 
@@ -34,7 +34,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
         let compliance = segment.length.compliance.unwrap_or_else(|| step.compliance());
         Self {
             mechanics,
-            hold: Hold::new(sticks, step, compliance, mechanics.structure),
+            stick: StickTorques::new(sticks, step, compliance, mechanics.structure),
             step,
             from,
             start: motions(&from.linear),
@@ -53,17 +53,17 @@ impl<'a, S: Scalar> Coupled<'a, S> {
         self.state(force, force, memory)
     }
 
-    /// The end that some torques led to and where the laws give others.
+    /// The end that the torques `led` lead to, and the torques `found` that the laws give there, N.m.
     fn state(&self, led: [S; 2], found: [S; 2], memory: Memory<S>) -> State<S> {
         let (linear, friction) = self.end(led);
         State { linear, friction, force: found, memory, ..*self.from }
     }
 
-    /// The end under torques, and the friction that holds.
+    /// The end under torques, and the torques of sticking friction, N.m.
     fn end(&self, force: [S; 2]) -> (Linear<S>, [S; 2]) {
         let free = self.step.less(&self.free, force);
         let tau1 = [self.tau1[0] - force[0], self.tau1[1] - force[1]];
-        self.hold.apply(self.step, &self.from.linear, self.tau0, tau1, free)
+        self.stick.apply(self.step, &self.from.linear, self.tau0, tau1, free)
     }
 
     /// Torques of the effects for that end, and their tangent.
@@ -75,7 +75,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
 }
 
 impl Coupled<'_, f64> {
-    /// The state at the end; `input`: torque on the motor to measure by.
+    /// The state at the end; the residual is judged against `input`, the torque on the motor, N.m.
     pub fn solve(&self, input: f64) -> State<f64> {
         let (mut memory, force) = (self.from.memory, self.from.force);
         let [led, found] = if self.known { [force; 2] } else { newton(self, force, input, &mut memory) };
@@ -93,7 +93,7 @@ impl<S: Scalar> TorqueEquations<S, 2> for Coupled<'_, S> {
     fn pass(&self, torque: [S; 2], internals: &mut Internals<S>) -> Pass<S, 2> {
         let Forces { torque: found, stiffness, damping, curvature } = self.laws(&self.end(torque).0, internals);
         let off = [torque[0] - found[0], torque[1] - found[1]];
-        let correction = solve2(&self.hold.jacobian(&[stiffness, damping]), off);
+        let correction = solve2(&self.stick.jacobian(&[stiffness, damping]), off);
         Pass { found, correction, left: if curvature == 0.0 { 0.0 } else { f64::INFINITY } }
     }
 

@@ -1,6 +1,6 @@
 //! Events inside a step: a velocity through zero under dry friction, a contact of backlash that closes or opens.
 //!
-//! They are found and located in time on plain numbers.
+//! They are found and located in time in `f64`.
 
 use super::axis_model::State;
 use super::mechanics::Mechanics;
@@ -40,8 +40,8 @@ impl<S: Scalar> Stretch<S> {
     }
 
     /// The same without derivatives.
-    pub fn plain(&self) -> Stretch<f64> {
-        Stretch { ramp: self.ramp.plain(), begin: self.begin, h: self.h.re() }
+    pub fn primal(&self) -> Stretch<f64> {
+        Stretch { ramp: self.ramp.primal(), begin: self.begin, h: self.h.re() }
     }
 }
 
@@ -111,8 +111,8 @@ impl Mechanics<f64> {
         self.solve(from, &Segment { ramp: stretch.until(t), length: &self.length(t), end: stretch.begin + t })
     }
 
-    /// Time into a stretch, and the state, at which the event's indicator is zero; `to` is the end beyond it. `None` if it
-    /// is there from the first.
+    /// Time into a stretch, s, and the state, at which the event's indicator is zero; `to` is the end after it. `None` if the
+    /// indicator is zero at the start already.
     ///
     /// By inverse quadratic interpolation inside a bracket, halved where that is not to be trusted (Chandrupatla, Advances
     /// in Engineering Software 28(3), 1997).
@@ -128,7 +128,7 @@ impl Mechanics<f64> {
             return None;
         }
         let tolerance = LOCATE_TOLERANCE * self.whole.step.h();
-        // The newest point, the one across the zero from it, and the one that was given up.
+        // The newest point, the end of the bracket on the other side of the zero, and the point last dropped.
         let mut newest = (stretch.h, self.indicator(event, from, to));
         let mut across = before;
         let mut t = stretch.h * before.1 / (before.1 - newest.1);
@@ -155,7 +155,7 @@ impl Mechanics<f64> {
     }
 }
 
-/// Where a function through three points is zero: the first two lie on both sides of that.
+/// Zero of the inverse quadratic through three points, of which the first two bracket it.
 fn interpolate(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
     let (xi, phi) = ((a.0 - b.0) / (c.0 - b.0), (a.1 - b.1) / (c.1 - b.1));
     let share = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {

@@ -64,7 +64,7 @@ impl<S: Scalar> Mechanics<S> {
             (&[one], []) | ([], &[one]) => Some(one),
             _ => None,
         };
-        // A friction that grows with the torque transmitted hangs on the motion of both inertias.
+        // A friction that grows with the transmitted torque depends on the motion of both inertias.
         let single_law = single_law.filter(|&one| base.rigid || !effects.is_loaded(one));
         let step = Propagator::new(&parameters, structure, scheme, h.into());
         let whole = Length { compliance: Some(step.compliance()), ..Length::new(step, single_law) };
@@ -77,9 +77,9 @@ impl<S: Scalar> Mechanics<S> {
     }
 
     /// The same without derivatives.
-    pub fn plain(&self) -> Mechanics<f64> {
+    pub fn primal(&self) -> Mechanics<f64> {
         let h = self.whole.step.h().re();
-        Mechanics::new(self.parameters.plain(), self.structure, self.effects.plain(), self.on, self.scheme, h)
+        Mechanics::new(self.parameters.primal(), self.structure, self.effects.primal(), self.on, self.scheme, h)
     }
 
     /// Level up to which dry friction holds inertia `i` of a state against a push that way under a `load`, N.m.
@@ -120,8 +120,8 @@ impl<S: Scalar> Mechanics<S> {
         ((s.linear[2] - self.half_play * side) * self.base.k + s.linear[3] * self.base.b) * side
     }
 
-    /// What is missing for a side to push, rad: negative where the twist is beyond the gap's end and the contact would
-    /// not pull. A contact that has opened while compressed closes again only when both hold.
+    /// Distance of a side from contact, rad: negative where the twist is beyond the gap's end and the contact would not
+    /// pull. A contact that has opened while compressed closes again only when both conditions hold.
     pub fn clearance(&self, side: i8, s: &State<S>) -> S {
         let gap = self.half_play - s.linear[2] * f64::from(side);
         let pull = -(self.pressure(side, s) / self.base.k);

@@ -14,7 +14,6 @@ mod continuation;
 mod coupled;
 mod criterion;
 mod events;
-mod hold;
 mod mechanics;
 mod newton;
 mod oscillator;
@@ -24,6 +23,7 @@ mod segment;
 mod simulate;
 mod single_law;
 mod step;
+mod stick;
 
 pub use axis_model::{Axis, State};
 pub use criterion::{dt_criterion, period_elongation};

@@ -9,8 +9,8 @@ const NEWTON: usize = 30;
 /// Newton ends when the torques repeat to this share of their size.
 const NEWTON_TOLERANCE: f64 = 1e-13;
 
-/// Newton's method from `torque`, with `input` on the motor to measure by: the torques that led to the end, and those that
-/// the laws give there; `memory` goes along.
+/// Newton's method from `torque`, N.m, with a tolerance relative to `input`, the torque on the motor: the torques that led to
+/// the end, and those that the laws give there. `memory` is left as it is at that end.
 #[inline]
 pub(super) fn newton<const N: usize>(
     equations: &impl TorqueEquations<f64, N>,
@@ -33,7 +33,7 @@ pub(super) fn newton<const N: usize>(
         let kink = size > previous * 2.0;
         previous = size;
         let less = if kink { pass.correction.map(|c| c * 0.5) } else { pass.correction };
-        // Newton squares the share that is missing.
+        // Newton's method converges quadratically: the relative residual is squared.
         if size <= NEWTON_TOLERANCE.sqrt() * scale || (pass.left <= NEWTON_TOLERANCE * scale && !kink) {
             equations.remember(&internals, torque, less, memory);
             torque = std::array::from_fn(|i| torque[i] - less[i]);
@@ -61,10 +61,10 @@ pub(super) trait TorqueEquations<S, const N: usize> {
     /// Internal states of its laws over the segment.
     type Internals;
 
-    /// They as they are committed.
+    /// The internal states as committed.
     fn internals(&self) -> Self::Internals;
 
-    /// What the laws give for the motion under `torque`; the internal states reach their end there.
+    /// The torques of the laws for the motion under `torque`; it sets the end of the internal states.
     fn pass(&self, torque: [S; N], internals: &mut Self::Internals) -> Pass<S, N>;
 
     /// Leaves in `memory` the internal states for `less` than the `torque` of the last pass, by their tangents there.
@@ -74,8 +74,8 @@ pub(super) trait TorqueEquations<S, const N: usize> {
 pub(super) struct Pass<S, const N: usize> {
     /// Torques of the laws.
     pub found: [S; N],
-    /// What is to be taken from the torques for them to agree with the laws, to first order.
+    /// The Newton correction: subtracted from the torques, it makes them agree with the laws to first order.
     pub correction: [S; N],
-    /// What is then still missing, at most.
+    /// Bound of the residual after the correction.
     pub left: f64,
 }

@@ -123,7 +123,7 @@ impl<S: Scalar> Parameters<S> {
 
     /// The same without derivatives.
     #[must_use]
-    pub fn plain(&self) -> Parameters<f64> {
+    pub fn primal(&self) -> Parameters<f64> {
         Parameters { i1: self.i1.re(), i2: self.i2.re(), b: self.b.re(), k: self.k.re(), rho: self.rho.re() }
     }
 

@@ -109,12 +109,12 @@ impl<S: Scalar> Propagator<S> {
         ]
     }
 
-    /// How the velocity of inertia `i` at the end answers to a torque on inertia `j` constant over the step.
+    /// Compliance of the velocity of inertia `i` at the end to a torque on inertia `j` that is constant over the step, rad/(N.m.s).
     pub(super) fn velocity_per_constant_torque(&self) -> [[S; 2]; 2] {
         self.gain(|c| c.v0 + c.v1)
     }
 
-    /// How position and velocity at the end answer to the torque at the end: the real parts, row = inertia that moves.
+    /// Compliance of position and velocity at the end to the torque at the end: the real parts, row = inertia that moves.
     pub(super) fn compliance(&self) -> Compliance {
         let re = |g: [[S; 2]; 2]| g.map(|row| row.map(S::re));
         Compliance {
@@ -135,7 +135,7 @@ impl<S: Scalar> Propagator<S> {
     }
 }
 
-/// Real 2 x 2 answers of the end of the step to torques; row = inertia that moves, column = inertia that is pushed.
+/// Real 2 x 2 compliances of the end of the step to torques; row = inertia that moves, column = inertia under the torque.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Compliance {
     pub position: [[f64; 2]; 2],

@@ -1,6 +1,7 @@
 //! The end of a segment, a part of a step without an event: the torques of the effects solve `tau = law(motion(tau))`.
 //!
-//! A single law is one equation in one unknown; several, or one beside dry friction at rest, are coupled through the axis.
+//! A single law is one equation in one unknown; several, or one together with dry friction at rest, are coupled through
+//! the axis.
 
 use super::axis_model::State;
 use super::coupled::Coupled;

@@ -1,4 +1,4 @@
-//! A single law on a motion that nothing holds: one equation in one unknown, the law's torque along its own coordinate.
+//! A single law on a motion without sticking friction: one equation in one unknown, the law's torque along its own coordinate.
 
 use std::marker::PhantomData;
 
@@ -21,7 +21,7 @@ pub(super) struct Solve<'a> {
 impl WithLaw for Solve<'_> {
     type Output = State<f64>;
 
-    // Each law a function of its own: in one for all, the registers of one are saved for all.
+    // One function per law: a common one would save the registers of the law that needs most of them, for every law.
     #[inline(never)]
     fn with<L: Law>(self) -> State<f64> {
         let Self { effect, mechanics, from, segment } = self;
@@ -67,7 +67,7 @@ struct SingleLaw<'a, S, L> {
     segment: &'a Segment<'a, S>,
     /// The end without the torque there.
     free: Linear<S>,
-    /// The same, and what one unit of the torque takes from it, along the law's coordinate.
+    /// The same along the law's coordinate, and its derivative to the torque, with the sign turned.
     end: Motion<S>,
     per_torque: Motion<S>,
     law: PhantomData<L>,
@@ -83,7 +83,7 @@ impl<'a, S: Scalar, L: Law> SingleLaw<'a, S, L> {
         Self { mechanics, effect, from, segment, free, end, per_torque, law: PhantomData }
     }
 
-    /// The end that one torque led to and where the law gives another.
+    /// The end that the torque `led` leads to, and the torque `found` that the law gives there, N.m.
     #[inline]
     fn state(&self, led: S, found: S, memory: Memory<S>) -> State<S> {
         let linear = std::array::from_fn(|i| self.free[i] - self.segment.length.response[i] * led);
@@ -109,7 +109,7 @@ impl<S: Scalar, L: Law> TorqueEquations<S, 1> for SingleLaw<'_, S, L> {
     #[inline]
     fn pass(&self, [torque]: [S; 1], internals: &mut Self::Internals) -> Pass<S, 1> {
         let Self { mechanics, from, segment, end, per_torque: per, .. } = self;
-        // A friction alone does not grow with its load, or it were not alone; but it may have the derivative to that.
+        // Friction that grows with the load is never solved here; its derivative to the load may still be asked for.
         let load = if L::LOADED && S::HAS_DERIVATIVES && !mechanics.base.rigid {
             let twist = |i: usize| self.free[i] - segment.length.response[i] * torque;
             (mechanics.base.k * twist(2) + mechanics.base.b * twist(3)).abs()

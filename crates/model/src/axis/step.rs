@@ -9,7 +9,7 @@
 //! and the step is continued from there, so that reversals and impacts keep the order of the step (hybrid automaton;
 //! Acary & Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, chapter 8, event-driven schemes).
 //!
-//! All that is sought (torques, events) is sought on plain numbers; one pass over [`Scalar`] numbers then carries the
+//! Torques and events are solved for in `f64`; one pass over [`Scalar`] numbers then carries the
 //! derivatives through, jumps at events included.
 
 use super::axis_model::{Axis, State};
@@ -38,7 +38,8 @@ impl<S: Scalar> Axis<S> {
         let h = self.full.whole.step.h();
         if !self.full.has_events() {
             let end = time + h.re();
-            let solved = self.plain.solve(&s.plain(), &Segment { ramp: ramp.plain(), length: &self.plain.whole, end });
+            let solved =
+                self.primal.solve(&s.primal(), &Segment { ramp: ramp.primal(), length: &self.primal.whole, end });
             return self.differentiate(s, ramp, None, end, &solved);
         }
         let mut now = *s;
@@ -46,27 +47,27 @@ impl<S: Scalar> Axis<S> {
         for event in 0..=EVENTS {
             let length;
             let (ramp, length, left) = if event == 0 {
-                (ramp, &self.plain.whole, None)
+                (ramp, &self.primal.whole, None)
             } else {
                 let left = h - done;
-                length = self.plain.length(left.re());
+                length = self.primal.length(left.re());
                 (Ramp { start: ramp.at(done / h), end: ramp.end }, &length, Some(left))
             };
             let begin = time + done.re();
-            let segment = Segment { ramp: ramp.plain(), length, end: time + h.re() };
-            let mut from = now.plain();
-            let mut solved = self.plain.solve(&from, &segment);
-            if self.plain.sticks(&from) != [false, false] {
+            let segment = Segment { ramp: ramp.primal(), length, end: time + h.re() };
+            let mut from = now.primal();
+            let mut solved = self.primal.solve(&from, &segment);
+            if self.primal.sticks(&from) != [false, false] {
                 self.leave_rest(&mut now, &mut from, &mut solved, &segment, begin);
             }
-            let reached = self.plain.first_event(&from, &solved).filter(|_| event < EVENTS);
-            let Some(reached) = reached else {
+            let next = self.primal.first_event(&from, &solved).filter(|_| event < EVENTS);
+            let Some(next) = next else {
                 return self.differentiate(&now, ramp, left, segment.end, &solved);
             };
             let at;
-            (at, now) = self.locate(reached, &now, &from, &solved, &Stretch { ramp, begin, h: left.unwrap_or(h) });
+            (at, now) = self.locate(next, &now, &from, &solved, &Stretch { ramp, begin, h: left.unwrap_or(h) });
             done += at;
-            self.full.enter(reached, &mut now, time + done.re());
+            self.full.enter(next, &mut now, time + done.re());
             if (h - done).re() <= LOCATE_TOLERANCE * h.re() {
                 break;
             }
@@ -74,7 +75,8 @@ impl<S: Scalar> Axis<S> {
         now
     }
 
-    /// What was solved on plain numbers, with derivatives if there are any; `h` is the length of a segment that is not whole.
+    /// The solution found in `f64`, with derivatives if there are any; `h` is the length in s of a segment that is not the whole
+    /// step.
     #[inline]
     fn differentiate(&self, s: &State<S>, ramp: Ramp<S>, h: Option<S>, end: f64, solved: &State<f64>) -> State<S> {
         if !S::HAS_DERIVATIVES {
@@ -91,8 +93,8 @@ impl<S: Scalar> Axis<S> {
         self.full.differentiate(s, &Segment { ramp, length, end }, solved)
     }
 
-    /// Where dry friction sticks and cannot hold, lets it slip in the direction of the excess: `now`, which is `from` with
-    /// derivatives, and what is `solved` from there.
+    /// Lets friction slip whose sticking torque exceeds its level, in the direction of the excess. It changes `from`, the same
+    /// state with derivatives `now`, and `solved`, the end computed from it; `time` is the start of the segment, s.
     fn leave_rest(
         &self,
         now: &mut State<S>,
@@ -101,15 +103,15 @@ impl<S: Scalar> Axis<S> {
         segment: &Segment<f64>,
         time: f64,
     ) {
-        let plain = &self.plain;
+        let primal = &self.primal;
         for _ in 0..3 {
-            let sticks = plain.sticks(from);
+            let sticks = primal.sticks(from);
             let mut worst = (0.0, 0, 0);
-            // The friction that holds is one over the segment, so its level is that of the mean load.
-            let load = 0.5 * (plain.load(from, time) + plain.load(solved, segment.end));
+            // The torque of sticking friction is constant over the segment, so its level is that of the mean load.
+            let load = 0.5 * (primal.load(from, time) + primal.load(solved, segment.end));
             for i in (0..2).filter(|i| sticks[*i]) {
                 let hold = solved.friction[i];
-                let level = plain.rest_level(i, hold.signum(), from, load, time);
+                let level = primal.rest_level(i, hold.signum(), from, load, time);
                 let excess = hold.abs() - level;
                 if excess > 1e-12 * level.abs() && excess > worst.0 {
                     worst = (excess, i, hold.signum() as i8);
@@ -119,8 +121,8 @@ impl<S: Scalar> Axis<S> {
                 break;
             }
             from.modes.dry[worst.1] = worst.2;
-            plain.refresh_force(from, time);
-            *solved = plain.solve(from, segment);
+            primal.refresh_force(from, time);
+            *solved = primal.solve(from, segment);
         }
         if from.modes.dry != now.modes.dry {
             now.modes.dry = from.modes.dry;
@@ -137,8 +139,8 @@ impl<S: Scalar> Axis<S> {
         to: &State<f64>,
         left: &Stretch<S>,
     ) -> (S, State<S>) {
-        let plain = left.plain();
-        let Some((found, solved)) = self.plain.locate(event, from, to, &plain) else {
+        let stretch = left.primal();
+        let Some((found, solved)) = self.primal.locate(event, from, to, &stretch) else {
             return (S::default(), *now);
         };
         let at = |t: S| self.differentiate(now, left.until(t), Some(t), left.begin + t.re(), &solved);
@@ -147,7 +149,7 @@ impl<S: Scalar> Axis<S> {
         if !S::HAS_DERIVATIVES {
             return (t, state);
         }
-        let slope = self.plain.slope(event, found, from, &plain);
+        let slope = self.primal.slope(event, found, from, &stretch);
         if slope == 0.0 {
             return (t, state);
         }

@@ -1,4 +1,4 @@
-//! Hysteresis of the coupling: a rate-independent loop beside the spring.
+//! Hysteresis of the coupling: a rate-independent loop in parallel with the spring.
 //!
 //! `f = level*z`, `reach*dz = dd*(1 - |z|^sharpness*(1 + sgn(dd*z))/2)`: the Bouc-Wen loop with beta = gamma, which turns
 //! with the stiffness `level/reach` and closes at `level`. Wen, J. Eng. Mech. 102(2), 1976; Ikhouane, Rodellar, Systems
@@ -71,7 +71,7 @@ impl Force for CouplingHysteresis {
         let dx = if m.h.re() == 0.0 { S::default() } else { (m.end.x - m.start.x) * per_reach };
         let after = advance(z[0].start, dx, p[2]);
         let tangent = slope(after, if dx.re() < 0.0 { -1.0 } else { 1.0 }, p[2]).re() * per_reach.re();
-        z[0].reach(after, tangent, 0.0);
+        z[0].set_end(after, tangent, 0.0);
         Reaction { torque: p[0] * after, stiffness: p[0].re() * tangent, damping: 0.0, curvature: f64::INFINITY }
     }
 }

@@ -1,4 +1,4 @@
-//! An amplifier that does not answer to small commands: `T = command - min(max(command, -width), width)`.
+//! An amplifier that does not respond to small commands: `T = command - min(max(command, -width), width)`.
 //!
 //! A ramp that crosses the edge within a step has a kink there. What is left of it is taken with its mean and its first
 //! moment (see [`Ramp`]), so that its momentum is exact wherever in the step the edge lies.

@@ -1,7 +1,8 @@
 //! What the encoders read of a motion, under all effects on its way out.
 
+use super::active::ActiveEffects;
 use super::sensor::{Reading, Seen, SensorHistory};
-use super::settings::{ActiveEffects, Settings};
+use super::settings::Settings;
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Settings<S> {

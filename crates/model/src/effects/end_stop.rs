@@ -5,7 +5,7 @@
 
 use super::family::Family;
 use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction, natural_frequency};
 use crate::scalar::Scalar;
 
 /// Travel limit of the table.
@@ -60,7 +60,7 @@ impl Force for EndStop {
     };
 
     fn rate(p: &[f64], inertia: f64) -> f64 {
-        if inertia > 0.0 { (p[0] / inertia).sqrt() } else { 0.0 }
+        natural_frequency(p[0], inertia)
     }
 
     #[inline]

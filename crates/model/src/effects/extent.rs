@@ -35,7 +35,7 @@ pub struct Extent<'a> {
 const MEASURED: f64 = 1.5;
 /// Least share of the record over which a coupling with play is in contact: one that never closes couples nothing.
 const CONTACT: f64 = 0.1;
-/// Periods that tell a frequency from a torque that changes slowly: fewer are a transient.
+/// Least number of periods that make a frequency: a torque with fewer changes slowly, as a transient does.
 const PERIODS: f64 = 3.0;
 /// Least amplitude of a torque that repeats, over the largest torque: no drive knows its own better.
 const KNOWN: f64 = 1e-3;
@@ -47,7 +47,7 @@ fn share_beyond(sorted: &[f64], lower: f64, upper: f64) -> f64 {
 }
 
 impl Extent<'_> {
-    /// Whether an amplitude, N.m, is one that a drive's torque can have: no more than the largest, and not lost in what that is true to.
+    /// Whether an amplitude, N.m, is one that a drive's torque can have: no more than the largest, and not below the accuracy of that.
     #[must_use]
     pub fn has_amplitude(&self, torque: f64) -> bool {
         (KNOWN * self.torque..=self.torque).contains(&torque.abs())
@@ -59,12 +59,12 @@ impl Extent<'_> {
         self.positions.last().unwrap_or(&0.0) - self.positions.first().unwrap_or(&0.0)
     }
 
-    /// Whether a dry friction of a level, N.m, that springs back by `reach`, rad, at every reversal can have taken no more energy than there
-    /// was: friction dissipates, and a level that holds against any torque is not one that slides all the way.
+    /// Whether a dry friction of a level, N.m, can have dissipated no more energy than there was. It slides over the whole way but for the
+    /// presliding at every reversal, of the displacement `presliding`, rad; a level above every torque would not slide.
     #[must_use]
-    pub fn feeds_dry(&self, level: f64, reach: f64) -> bool {
+    pub fn feeds_dry(&self, level: f64, presliding: f64) -> bool {
         let (way, reversals) = self.way;
-        level.abs() * (way - 4.0 * reach * (1.0 + reversals)).max(0.0) <= MEASURED * self.energy
+        level.abs() * (way - 4.0 * presliding * (1.0 + reversals)).max(0.0) <= MEASURED * self.energy
     }
 
     /// The same of a friction that grows with a power of the speed, of `coefficient*speed^power`: at the least that of a steady motion over

@@ -2,7 +2,7 @@
 
 use super::family::Family;
 use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
-use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction, natural_frequency};
 use crate::scalar::Scalar;
 
 /// A spring to the frame.
@@ -31,10 +31,10 @@ impl Force for ExternalSpring {
         example: &[5e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
-    const CARRIED: bool = true;
+    const STATIC_LOAD: bool = true;
 
     fn rate(p: &[f64], inertia: f64) -> f64 {
-        if inertia > 0.0 { (p[0] / inertia).sqrt() } else { 0.0 }
+        natural_frequency(p[0], inertia)
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Kinds of effects, whatever their place: one list, in which each kind has everything that is known of it.
 
-/// What an experiment must vary to tell effects of a family from their rivals.
+/// What an experiment must vary to distinguish the effects of a family from their rivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Contrast {
     /// How far the coupling is twisted: play, a cubic spring and a loop grow differently with it.
@@ -26,7 +26,7 @@ macro_rules! families {
                 match self { $(Self::$name => $id,)* }
             }
 
-            /// What tells it from its rivals; `None` where they scale differently with the amplitude.
+            /// What distinguishes it from its rivals; `None` where they scale differently with the amplitude.
             #[must_use]
             pub const fn contrast(self) -> Option<Contrast> {
                 match self { $(Self::$name => first([$(Some($contrast),)? None]),)* }

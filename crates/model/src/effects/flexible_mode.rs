@@ -14,11 +14,11 @@ use super::shapes::{Base, Force, Internal, Moment, Reaction};
 use super::side::Side;
 use crate::scalar::Scalar;
 
-/// Least damping ratio of a mode: that of a bare piece of steel. Without any it is a line that swings on from where it began.
+/// Least damping ratio of a mode: that of bare steel. An undamped mode would vibrate on for the whole record from its start.
 const UNDAMPED: f64 = 1e-3;
 
-/// A mode swings in the band, its peak as wide as half of its power, against the inertia that it hangs on, is damped, and is not damped to
-/// death.
+/// The half-power band of the mode's peak lies in the excited band, computed against the inertia that the mode is attached to, and the mode
+/// is damped, but not overdamped.
 fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
     let (inertia, stiffness, damping) = (p[0], p[1], p[2]);
     let coupled = (stiffness * (1.0 / inertia + 1.0 / x.inertia[0])).sqrt();
@@ -102,9 +102,9 @@ impl<I: Side> Force for Mode<I> {
         let torque = inertia * a;
         let [per_x, per_v] = [k, b].map(|c| c.re() / effective.re());
         let h2 = half.re();
-        memory[0].reach(e + dx - half * (w3 + w), 1.0 - h2 * h2 * per_x, -h2 * h2 * per_v);
-        memory[1].reach(m.end.v - w, -h2 * per_x, 1.0 - h2 * per_v);
-        memory[2].reach(a, per_x, per_v);
+        memory[0].set_end(e + dx - half * (w3 + w), 1.0 - h2 * h2 * per_x, -h2 * h2 * per_v);
+        memory[1].set_end(m.end.v - w, -h2 * per_x, 1.0 - h2 * per_v);
+        memory[2].set_end(a, per_x, per_v);
         let inertia = inertia.re();
         Reaction { torque, stiffness: inertia * per_x, damping: inertia * per_v, curvature: 0.0 }
     }

@@ -39,7 +39,7 @@ impl Force for Gravity {
         example: &[2e-3, 1e-3, 1.5],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };
-    const CARRIED: bool = true;
+    const STATIC_LOAD: bool = true;
 
     fn rate(p: &[f64], inertia: f64) -> f64 {
         if inertia > 0.0 { (p[0].hypot(p[1]) * p[2] / inertia).sqrt() } else { 0.0 }

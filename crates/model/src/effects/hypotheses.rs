@@ -1,4 +1,4 @@
-//! Which effects may be named of an axis, which of them beside each other, and what tells them from their rivals.
+//! Which effects may be named of an axis, which of them together, and what distinguishes them from their rivals.
 
 use super::family::Family;
 use super::info::{ParameterInfo, Place, Start};
@@ -14,7 +14,7 @@ impl ParameterInfo {
 }
 
 impl Effect {
-    /// Whether the effect can be told from a record of an axis of that structure and motion: a rigid one has no coupling and no second
+    /// Whether the effect can be identified from a record of an axis of that structure and motion: a rigid one has no coupling and no second
     /// encoder, and of two laws that differ by their side alone the motor's stands for both; a weight on a slide pulls alike everywhere.
     #[must_use]
     pub fn may_be_named(self, structure: Structure, motion: Motion) -> bool {

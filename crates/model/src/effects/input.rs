@@ -2,7 +2,7 @@
 //!
 //! Over a step the torque is a [`Ramp`]. Where the true waveform is none (a held torque that jumps inside the step, an
 //! exponential), the ramp has its mean and its first moment: the velocity and the position it gives a free inertia at
-//! the end of the step are then exact, and the answer is smooth in the delay and in the time constant.
+//! the end of the step are then exact, and the response is smooth in the delay and in the time constant.
 
 use super::family::Family;
 use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
@@ -27,7 +27,7 @@ impl<S: Scalar> Ramp<S> {
     /// The same without derivatives.
     #[must_use]
     #[inline]
-    pub fn plain(&self) -> Ramp<f64> {
+    pub fn primal(&self) -> Ramp<f64> {
         Ramp { start: self.start.re(), end: self.end.re() }
     }
 
@@ -102,7 +102,7 @@ impl<S: Scalar> TorqueHistory<S> {
     #[must_use]
     pub fn covers(&self, delay: f64, h: f64) -> bool {
         if self.uniform == self.recorded {
-            // Equal steps so far: say at once what equal steps to come cannot do.
+            // Equal steps so far: a delay that equal steps to come cannot cover is refused at once.
             return delay <= LONGEST_DELAY as f64 * h;
         }
         if self.recorded < LONGEST_DELAY {
@@ -164,18 +164,18 @@ impl<S: Scalar> TorqueHistory<S> {
 }
 
 impl TorqueHistory<f64> {
-    /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
-    pub fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+    /// Calls `visit` on every number of the history, which it may change: a stored state is written and read by this function alone.
+    pub fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
         for (ramp, length) in self.past.iter_mut().zip(&mut self.lengths) {
-            word(&mut ramp.start);
-            word(&mut ramp.end);
-            word(length);
+            visit(&mut ramp.start);
+            visit(&mut ramp.end);
+            visit(length);
         }
-        word(&mut self.lag);
+        visit(&mut self.lag);
         let size = self.past.len();
         for (count, most) in [(&mut self.next, size - 1), (&mut self.uniform, size), (&mut self.recorded, size)] {
             let mut value = *count as f64;
-            word(&mut value);
+            visit(&mut value);
             *count = (value.max(0.0) as usize).min(most);
         }
     }
@@ -330,7 +330,7 @@ impl Input for ActuatorLag {
         memory: 0,
         named: true,
         textbook: false,
-        // Every bus shifts a log's torque in time; a lag beside that few logs show.
+        // Every bus shifts a log's torque in time; few logs show a lag in addition to that.
         odds: 0.2,
         bounds: |p, x| x.turns_phase(p[0]) && p[0] * x.band <= 20.0,
         example: &[3e-3],
@@ -338,7 +338,7 @@ impl Input for ActuatorLag {
     };
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S> {
-        // In units of the step: x = h/tau; the lag's answer to the ramp c + g*s is c + g*(s - 1/x) + A*exp(-x*s).
+        // In units of the step: x = h/tau; the lag's response to the ramp c + g*s is c + g*(s - 1/x) + A*exp(-x*s).
         let tau = p[0] / h;
         if tau.re() < 1e-3 {
             // Far below the step: mean and moment to first order in tau.
@@ -350,13 +350,13 @@ impl Input for ActuatorLag {
             return Ramp::from_moments(m0, m1);
         }
         let g = ramp.end - ramp.start;
-        let settled = ramp.start - tau * g;
-        let a = history.lag - settled;
+        let steady = ramp.start - tau * g;
+        let a = history.lag - steady;
         let decay = (S::from(-1.0) / tau).exp();
-        let gone = S::from(1.0) - decay;
-        let m0 = settled + g * 0.5 + a * tau * gone;
-        let m1 = settled * 0.5 + g * (1.0 / 3.0) + a * tau * (tau * gone - decay);
-        history.lag = settled + g + a * decay;
+        let rise = S::from(1.0) - decay;
+        let m0 = steady + g * 0.5 + a * tau * rise;
+        let m1 = steady * 0.5 + g * (1.0 / 3.0) + a * tau * (tau * rise - decay);
+        history.lag = steady + g + a * decay;
         Ramp::from_moments(m0, m1)
     }
 

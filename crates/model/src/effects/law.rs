@@ -11,19 +11,19 @@ pub trait Law {
     const COORDINATE: Coordinate;
     /// Number of internal states.
     const MEMORY: usize;
-    /// Whether it may hang on the torque transmitted.
+    /// Whether it may depend on the torque transmitted.
     const LOADED: bool = false;
 
-    /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
+    /// The torque at the end of the step and its tangent; it sets the end of the internal states, with their tangents.
     fn react<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
 }
 
-/// Something to be done with the law of an effect, compiled for each law.
+/// An operation on the law of an effect, compiled for each law.
 pub trait WithLaw {
-    /// What comes of it.
+    /// Its result.
     type Output;
 
-    /// Does it.
+    /// Runs it for the law `L`.
     fn with<L: Law>(self) -> Self::Output;
 }
 
@@ -65,7 +65,7 @@ impl<D: DryFriction> Law for Sliding<D> {
         // On trial the velocity may have passed zero: the sliding law continues there until the event is found.
         let slides = moment.slides;
         let found = D::level(p, &slip(moment));
-        // A level that hangs on the slip may do so in any way.
+        // A level that depends on the slip may do so in any way.
         let curvature = if found.constant { 0.0 } else { f64::INFINITY };
         Reaction {
             torque: found.level * slides,

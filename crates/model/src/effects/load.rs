@@ -30,15 +30,15 @@ impl<I: Side> Force for Load<I> {
         memory: 0,
         named: true,
         textbook: [true, false][I::INDEX],
-        // Every axis has friction, few carry a weight. Above a half: an equal friction beside a weight would be told as one friction
-        // that is unlike either way, which is rarer still.
+        // Every axis has friction, few carry a weight. Above a half: with less, a symmetric friction together with a weight would be
+        // named one asymmetric friction, which is rarer still.
         odds: 0.6,
         bounds: |p, x| p[0].abs() <= 20.0 * x.torque,
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
 
-    const CARRIED: bool = true;
+    const STATIC_LOAD: bool = true;
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, _m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {

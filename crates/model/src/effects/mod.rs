@@ -6,28 +6,34 @@
 //! in [the list](EFFECTS)** (`tests/new_effect.rs` adds one). Everything else (the FMU's parameters, `--set`, the diagnosis, the documentation, the
 //! tests every effect must pass) iterates the list.
 
+mod active;
 mod encoders;
 mod extent;
 mod family;
+mod forces;
 mod hypotheses;
 mod info;
 mod input;
 mod law;
+mod lookup;
 mod sensor;
 mod settings;
 mod shapes;
 mod side;
 mod transmitted;
 
+pub use active::{ActiveEffects, effect_scope};
 pub use extent::Extent;
 pub use family::{Contrast, Family};
+pub(crate) use forces::{Forces, StepMotion};
 pub use info::{EffectInfo, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 use law::{Absent, Forced, Sliding};
 pub use law::{Law, WithLaw};
+pub use lookup::UnknownEffect;
 pub use sensor::{Reading, Seen, SensorHistory};
-pub use settings::{ActiveEffects, MEMORY, Memory, PARAMETERS, Settings, UnknownEffect, effect_scope, memory_of};
-pub(crate) use settings::{Forces, Internals, MEMORY_OF_ONE, StepMotion};
+pub(crate) use settings::{Internals, MEMORY_OF_ONE};
+pub use settings::{MEMORY, Memory, PARAMETERS, Settings, memory_of};
 pub(crate) use shapes::Modes;
 pub use shapes::{
     Base, Coordinate, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip,
@@ -118,11 +124,11 @@ macro_rules! effects {
                 }
             }
 
-            /// True for a force that is constant or given by the position alone: see [`Force::CARRIED`].
+            /// True for a static load, a force that is constant or given by the position alone: see [`Force::STATIC_LOAD`].
             #[must_use]
-            pub const fn is_carried(self) -> bool {
+            pub const fn is_static_load(self) -> bool {
                 match self {
-                    $(Self::$name => when!(force, $shape, <$law as Force>::CARRIED, false),)*
+                    $(Self::$name => when!(force, $shape, <$law as Force>::STATIC_LOAD, false),)*
                 }
             }
 
@@ -190,7 +196,7 @@ macro_rules! effects {
                 }
             }
 
-            /// Brings its internal states along when the speed at its place jumps: see [`Force::jumped`].
+            /// Corrects its internal states when the speed at its place jumps: see [`Force::jumped`].
             pub(crate) fn jumped<S: Scalar>(self, p: &[S], memory: &mut [S], jump: S) {
                 match self {
                     $(Self::$name => when!(force, $shape, <$law>::jumped(p, memory, jump), { let _ = (p, memory, jump); }),)*
@@ -204,7 +210,7 @@ macro_rules! effects {
                 }
             }
 
-            /// Does it with the effect's law on the motion.
+            /// Runs an operation with the effect's law on the motion.
             #[inline]
             pub fn with_law<W: WithLaw>(self, work: W) -> W::Output {
                 match self {

@@ -63,7 +63,7 @@ impl<I: Side> Force for Presliding<I> {
         let towards = if dx.re() < 0.0 { -1.0 } else { 1.0 };
         // What the bristle lacks of sliding that way: dz/dx = 1 - sgn(dx)*z.
         let lack = (S::from(1.0) - z.start * towards) * (-dx.abs()).exp();
-        z.reach(S::from(towards) - lack * towards, 0.0, lack.re() * per_speed.re());
+        z.set_end(S::from(towards) - lack * towards, 0.0, lack.re() * per_speed.re());
         // The bristle's rate over the speed at the end; that may have turned since.
         let v = m.end.v;
         let rate = if v.re() * towards < 0.0 { S::from(2.0) - lack } else { lack };

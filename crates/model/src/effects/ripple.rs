@@ -82,7 +82,7 @@ impl Force for Unbalance {
     };
     const LENGTH: Option<Length> = Some(Length::Turn);
 
-    const CARRIED: bool = true;
+    const STATIC_LOAD: bool = true;
 
     #[inline]
     fn torque<S: Scalar>(p: &[S], _base: &Base<S>, m: &Moment<S>, _memory: &mut [Internal<S>]) -> Reaction<S> {

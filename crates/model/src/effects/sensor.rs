@@ -166,7 +166,7 @@ fn table<S: Scalar>(r: &Reading<S>) -> (S, S) {
 /// motion was at the first angle and speed then, and is at the second now.
 ///
 /// The filtered speed `l` obeys `filter*l' = omega - l`, and the filtered angle is `theta - filter*l`. Between the samples
-/// the speed is the quadratic of its two ends and of the mean that the angle's rise gives, and the answer to that is exact.
+/// the speed is the quadratic through both ends whose mean is the angle's rise over `gap`, and the response to that is exact.
 fn filtered<S: Scalar>(filter: S, gap: f64, motion: [(S, S); 2], lagged: S) -> (S, S) {
     let [(from, v0), (to, v1)] = motion;
     let lag = if filter.re() > 0.0 {
@@ -218,16 +218,16 @@ impl<S: Scalar> Seen<'_, S> {
 }
 
 impl SensorHistory<f64> {
-    /// Hands every number of the history to `word`, which may change it: the one way in and out of a stored state.
-    pub fn words(&mut self, word: &mut impl FnMut(&mut f64)) {
+    /// Calls `visit` on every number of the history, which it may change: a stored state is written and read by this function alone.
+    pub fn visit_numbers(&mut self, visit: &mut impl FnMut(&mut f64)) {
         for r in self.past.iter_mut().chain([&mut self.motion]) {
-            [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2].into_iter().for_each(&mut *word);
+            [&mut r.theta1, &mut r.omega1, &mut r.theta2, &mut r.omega2].into_iter().for_each(&mut *visit);
         }
-        self.gaps.iter_mut().for_each(&mut *word);
+        self.gaps.iter_mut().for_each(&mut *visit);
         let counts = [(&mut self.newest, LONGEST - 1), (&mut self.uniform, LONGEST), (&mut self.recorded, LONGEST)];
         for (count, most) in counts {
             let mut value = *count as f64;
-            word(&mut value);
+            visit(&mut value);
             *count = (value.max(0.0) as usize).min(most);
         }
     }

@@ -115,7 +115,7 @@ pub struct Reaction<S> {
 }
 
 impl<S: Scalar> Reaction<S> {
-    /// A torque that does not hang on the end of the step.
+    /// A torque that does not depend on the end of the step.
     #[inline]
     pub fn given(torque: S) -> Self {
         Self { torque, stiffness: 0.0, damping: 0.0, curvature: 0.0 }
@@ -140,14 +140,14 @@ impl<S: Scalar> Internal<S> {
         Self { start, end: start, per: Motion::default() }
     }
 
-    /// The end on trial, and its derivative to position and velocity there.
+    /// Sets the end on trial, and its derivative to position and velocity there.
     #[inline]
-    pub fn reach(&mut self, end: S, x: f64, v: f64) {
+    pub fn set_end(&mut self, end: S, x: f64, v: f64) {
         self.end = end;
         self.per = Motion { x, v };
     }
 
-    /// The end after the end of the motion `moved`.
+    /// The end on trial, corrected to first order for a move `moved` of the end of the step.
     #[inline]
     pub(crate) fn after(&self, moved: &Motion<S>) -> S {
         self.end + moved.x * self.per.x + moved.v * self.per.v
@@ -185,7 +185,7 @@ pub struct Level<S> {
 }
 
 impl<S: Scalar> Level<S> {
-    /// A level that does not hang on the slip.
+    /// A level that does not depend on the slip.
     #[inline]
     pub fn constant(level: S) -> Self {
         Self { level, per_speed: 0.0, per_position: 0.0, per_load: 0.0, constant: true }
@@ -205,13 +205,14 @@ pub trait DryFriction {
 
 /// A torque from the motion.
 ///
-/// Its internal states keep what is committed beside what is on trial, so that Newton may retry a step (trial / commit /
-/// revert, as OpenSees' `UniaxialMaterial`).
+/// Its internal states keep the committed value next to the one on trial, so that Newton's method may retry a step (trial /
+/// commit / revert, as OpenSees' `UniaxialMaterial`).
 pub trait Force {
     /// What the effect is.
     const INFO: EffectInfo;
-    /// Whether the torque is constant or given by the position alone, as a weight's is: on a rigid axis the guides carry it.
-    const CARRIED: bool = false;
+    /// Whether the torque is a static load, constant or given by the position alone, as a weight's is: on a rigid axis it loads
+    /// the guides.
+    const STATIC_LOAD: bool = false;
     /// Which of its angles the table shows as a length.
     const LENGTH: Option<Length> = None;
     /// The parameter at whose zero the effect is a simpler one of the list.
@@ -224,10 +225,10 @@ pub trait Force {
         0.0
     }
 
-    /// Brings the internal states along when the speed at its place jumps by `jump` rad/s: those that are relative to it.
+    /// Corrects the internal states that are relative to the speed at its place when that jumps by `jump` rad/s.
     fn jumped<S: Scalar>(_p: &[S], _memory: &mut [S], _jump: S) {}
 
-    /// The torque at the end of the step and its tangent; the internal states reach their end, with theirs.
+    /// The torque at the end of the step and its tangent; it sets the end of the internal states, with their tangents.
     fn torque<S: Scalar>(p: &[S], base: &Base<S>, moment: &Moment<S>, memory: &mut [Internal<S>]) -> Reaction<S>;
 }
 
@@ -282,6 +283,11 @@ pub trait Sensor {
     fn filter<S: Scalar>(_p: &[S]) -> S {
         S::default()
     }
+}
+
+/// Undamped natural frequency of an inertia, kg.m2, on a spring, N.m/rad, in rad/s; zero without an inertia.
+pub(super) fn natural_frequency(stiffness: f64, inertia: f64) -> f64 {
+    if inertia > 0.0 { (stiffness / inertia).sqrt() } else { 0.0 }
 }
 
 /// `(1 - exp(-a))/a`, with its limit at zero.

@@ -1,7 +1,9 @@
-//! The torque that the axis transmits: what a friction that grows with its load sees.
+//! The torque that the axis transmits, which is the load of a friction that grows with it.
 
 use super::Effect;
-use super::settings::{ActiveEffects, Forces, React, Settings, StepMotion};
+use super::active::ActiveEffects;
+use super::forces::{Forces, React, StepMotion};
+use super::settings::Settings;
 use super::shapes::{Base, Coordinate, Reaction};
 use crate::scalar::Scalar;
 
@@ -11,7 +13,7 @@ impl<S: Scalar> Settings<S> {
         effect.load_parameter().is_some_and(|i| self.of(effect)[i].re() != 0.0)
     }
 
-    /// Whether the torque transmitted counts: a dry friction grows with it, or would by a derivative.
+    /// Whether the transmitted torque is needed: a dry friction grows with it, or its derivative to that share is asked for.
     pub(crate) fn counts_load(&self, on: &ActiveEffects) -> bool {
         on.dry().iter().any(|e| e.load_parameter().is_some() && (S::HAS_DERIVATIVES || self.is_loaded(*e)))
     }
@@ -24,11 +26,11 @@ impl<S: Scalar> Settings<S> {
             let twist = &step.end[Coordinate::Twist as usize];
             let (stiffness, damping) = (base.k.re(), base.b.re());
             let torque = base.k * twist.x + base.b * twist.v;
-            // Its row is that of the motor; the table's is the same turned round.
+            // The load is the motor's row; the table's is its negative.
             sum.add(Coordinate::Twist, &Reaction { torque, stiffness, damping, curvature: f64::INFINITY });
             return sum;
         }
-        for &effect in on.forces().iter().filter(|e| e.is_carried()) {
+        for &effect in on.forces().iter().filter(|e| e.is_static_load()) {
             let moment = step.moment(effect.info().place.coordinate(), S::default());
             let found = effect.with_law(React { p: self.of(effect), base, moment: &moment, memory: &mut [] });
             // One body: what acts anywhere acts on the row of the motor.

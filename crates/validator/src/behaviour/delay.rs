@@ -4,7 +4,7 @@
 use super::super::description::{BaseType, Causality, Value, Variability, Variable};
 use super::super::host::{HostError, Instance};
 use super::probe::{Probe, Stop, Tested, not_applicable, not_tested, type_index};
-use super::steps::{by_size, range, two_sizes};
+use super::step_size::{by_size, range, two_sizes};
 use super::values::get;
 
 pub(in super::super) fn delay(p: &Probe) -> Tested {

@@ -34,7 +34,7 @@ fn against_inputs(p: &Probe, soon: bool) -> Tested {
     if outputs.is_empty() {
         return not_applicable("no Real output has declared dependencies");
     }
-    super::steps::size_counts(p)?;
+    super::step_size::size_counts(p)?;
     let inputs: Vec<(usize, &Variable)> =
         p.inputs().enumerate().filter(|(_, v)| v.base() == BaseType::Real).take(MOST).collect();
     if inputs.is_empty() {
@@ -77,7 +77,7 @@ pub(in super::super) fn outputs_soon(p: &Probe) -> Tested {
     against_inputs(p, true)
 }
 
-/// Unknowns and outputs in initialisation mode, where they answer at once if at all.
+/// Unknowns and outputs in initialisation mode, where they respond at once or not at all.
 pub(in super::super) fn initial(p: &Probe) -> Tested {
     let outputs = declared(p, &p.d, &p.d.structure.outputs);
     let initial = declared(p, &p.d, &p.d.structure.initial_unknowns);
@@ -122,7 +122,7 @@ fn at_initialisation(
             instance = p.initializing()?;
             continue;
         };
-        // An FMU that does not come back to where it was shows nothing by moving.
+        // Where an FMU does not return to its first value, a change proves nothing.
         if instance.get_real(&references)? != base {
             instance = p.initializing()?;
             continue;

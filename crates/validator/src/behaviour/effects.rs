@@ -1,4 +1,4 @@
-//! What an FMU does beside computing: to the process, to its host's memory, to the log.
+//! Side effects of an FMU: on the process, on its host's memory, on the log.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use super::probe::{Probe, Tested, not_applicable};
 use super::{Instance, Setup};
 use std::sync::Arc;
 
-/// A whole life of the FMU, from loading to freeing.
+/// A life cycle of the FMU, from loading to freeing.
 fn life(setup: &Setup) -> Result<(), HostError> {
     let p = setup.probe()?;
     let mut instance = p.ready()?;
@@ -169,7 +169,7 @@ pub(in super::super) fn logging_off(p: &Probe) -> Tested {
         }
         let options = InstanceOptions { logging: on, ..p.options() };
         let mut instance = Instance::new(Arc::clone(&p.binary), None, &options)?;
-        // That this succeeds is another rule's.
+        // That this succeeds is tested by another rule.
         if on && instance.set_debug_logging(false, &[]).is_err() {
             break;
         }
@@ -185,7 +185,7 @@ pub(in super::super) fn logging_off(p: &Probe) -> Tested {
         if let Some(first) = idle.next() {
             let (text, count) = (first.message.chars().take(80).collect::<String>(), 1 + idle.count());
             let category = &first.category;
-            // One that does not look at loggingOn fails in both ways.
+            // An FMU that ignores loggingOn fails in both ways.
             return Ok(vec![format!(
                 "an instance {how} logs all the same: {count} messages with fmi2OK, first {text:?} of {category:?}"
             )]);
@@ -235,7 +235,7 @@ pub(in super::super) fn log_chosen(p: &Probe) -> Tested {
     if p.interface().only_once {
         return not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
     }
-    // What is logged even where debug logging is off is another rule's, and so is what is not declared.
+    // Messages while debug logging is off, and undeclared categories, are reported by other rules.
     let off = logged(p, &p.options(), None)?;
     let on = logged(p, &InstanceOptions { logging: true, ..p.options() }, None)?;
     let all = logged(p, &p.options(), Some(&[]))?;
@@ -265,7 +265,7 @@ pub(in super::super) fn log_chosen(p: &Probe) -> Tested {
 /// one may be taken or refused, and is survived.
 pub(in super::super) fn log_unknown(p: &Probe) -> Tested {
     let mut instance = p.instantiate()?;
-    // Whether it is refused is the FMU's affair; an instance that has returned fmi2Error is only to be freed.
+    // The FMU may refuse it; an instance that has returned fmi2Error may only be freed.
     let taken = instance.set_debug_logging(true, &["noSuchCategory"]).is_ok();
     if taken {
         p.enter(&mut instance)?;

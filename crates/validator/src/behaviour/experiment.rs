@@ -4,10 +4,10 @@ use std::time::{Duration, Instant};
 
 use super::super::description::{BaseType, Causality, Value, Variable};
 use super::super::host::{HostError, Status};
-use super::lifecycle::last_words;
+use super::lifecycle::last_log_message;
 use super::probe::{Learned, Probe, Snapshot, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
-use super::values::{get, same, set, show};
+use super::values::{get, same, set};
 
 /// Longest default run, in wall time; later steps are left out.
 const RUN: Duration = Duration::from_millis(500);
@@ -16,7 +16,7 @@ const RUN_STEPS: usize = 20_000;
 /// Steps that are tried with an FMU that declares none and refuses a 500th of the experiment, in s.
 const USUAL: [f64; 5] = [0.01, 0.001, 0.1, 1.0, 0.0001];
 
-/// What became of a run.
+/// The result of a run.
 enum Run {
     /// Wall time of a step, s.
     Done(f64),
@@ -25,7 +25,7 @@ enum Run {
 }
 
 /// Runs the default experiment, in one instance. Where no step size is declared and the FMU refuses the first one, other
-/// usual ones are tried: an FMU with a fixed step of its own has no way to say so in FMI 2.0.
+/// usual ones are tried: an FMU with a fixed step of its own cannot declare it in FMI 2.0.
 pub(in super::super) fn simulate(p: &mut Probe) -> Tested {
     let declared = p.d.default_experiment.and_then(|e| e.step_size).is_some();
     let mut finding = match default_run(p)? {
@@ -72,8 +72,8 @@ fn default_run(p: &Probe) -> Result<Run, super::Stop> {
             Status::Pending | Status::Other(_) => return Ok(Run::Done(cost(k))),
             status if status.is_ok() => {}
             status => {
-                let said = last_words(&instance);
-                let finding = format!("fmi2DoStep from t = {time} by {step} returned {status}{said}");
+                let message = last_log_message(&instance);
+                let finding = format!("fmi2DoStep from t = {time} by {step} returned {status}{message}");
                 return Ok(Run::Failed(finding, k == 0));
             }
         }
@@ -119,7 +119,7 @@ pub(in super::super) fn inputs_initial(p: &Probe) -> Tested {
                 if !early {
                     instance.set_real(&[v.value_reference], &[value])?;
                 }
-                // What does not read as it was set is another rule's.
+                // A value that does not read as it was set is reported by another rule.
                 let there = instance.get_real(&[v.value_reference])?[0];
                 instance.exit_initialization()?;
                 let mut after = instance.get_real(&[v.value_reference])?[0];
@@ -144,7 +144,7 @@ pub(in super::super) fn inputs_initial(p: &Probe) -> Tested {
                 }
                 Ok(None) => {}
                 Err(HostError::OnlyOnce) => return Err(HostError::OnlyOnce.into()),
-                // Whether it can be set then is another rule's.
+                // Whether it can be set then is tested by another rule.
                 Err(_) => {}
             }
         }
@@ -182,14 +182,14 @@ pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
             instance.exit_initialization()?;
             Ok((get(&mut instance, v)?, p.run(&mut instance, 0, n)?))
         };
-        // What cannot be set at all, or fails with that value, is another rule's.
+        // A value that cannot be set at all, or fails, is reported by another rule.
         let (before, within) = match (run(true), run(false)) {
             (Err(HostError::OnlyOnce), _) | (_, Err(HostError::OnlyOnce)) => return Err(HostError::OnlyOnce.into()),
             (Err(_), _) => continue,
             (Ok(before), within) => (before, within),
         };
         any = true;
-        let (name, value) = (&v.name, show(value));
+        let (name, value) = (&v.name, value.to_string());
         let own = [v.value_reference];
         match within {
             Err(error) => problems.push(format!(
@@ -197,10 +197,10 @@ pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
             )),
             Ok(within) if !same(&within.0, &before.0) => problems.push(format!(
                 "the parameter \"{name}\" was set to {value} in initialisation mode and reads {} after it; set before it, it reads {}",
-                show(&within.0),
-                show(&before.0)
+                within.0,
+                before.0
             )),
-            Ok(within) if p.answers(&expected, &before.1, &own) && !p.answers(&expected, &within.1, &own) => problems
+            Ok(within) if p.responds(&expected, &before.1, &own) && !p.responds(&expected, &within.1, &own) => problems
                 .push(format!(
                     "the parameter \"{name}\" set to {value} in initialisation mode changes nothing; set before it, it does"
                 )),

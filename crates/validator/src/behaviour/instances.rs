@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use super::super::description::Causality;
 use super::super::host::{HostError, Status};
-use super::lifecycle::diverted;
 use super::probe::{Learned, Probe, STEPS, Tested, not_applicable, not_tested};
+use super::reset::diverted;
 
 /// Longest trial of what an FMU can be asked for.
 const TRIAL: Duration = Duration::from_secs(2);
@@ -178,10 +178,10 @@ pub(in super::super) fn threads(p: &Probe) -> Tested {
     let expected = p.run(&mut alone, 0, n)?;
     alone.free();
     let mut problems = Vec::new();
-    let together = std::sync::Barrier::new(THREADS);
+    let barrier = std::sync::Barrier::new(THREADS);
     let results: Vec<Result<Option<String>, HostError>> = std::thread::scope(|scope| {
         let many = || {
-            together.wait();
+            barrier.wait();
             let end = Instant::now() + Duration::from_millis(120);
             while Instant::now() < end {
                 let mut instance = p.ready()?;

@@ -23,8 +23,8 @@ pub(super) fn change(p: &Probe, v: &Variable, order: usize) -> Option<(f64, f64)
     (value + size >= low).then_some((value, size))
 }
 
-/// "Calling fmi2SetRealInputDerivatives has an effect" (canInterpolateInputs, section 4.3.1): a slope that brings the
-/// input where a step's result answers to it.
+/// "Calling fmi2SetRealInputDerivatives has an effect" (canInterpolateInputs, section 4.3.1): the
+/// slope moves the input so far that the result of a step responds to it.
 pub(in super::super) fn effect(p: &Probe) -> Tested {
     let inputs = continuous_inputs(p)?;
     let stepped = |change: Option<(&Variable, f64)>, slope: Option<(&Variable, f64)>| -> Result<Snapshot, HostError> {
@@ -40,17 +40,17 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
         instance.do_step(p.time(2), p.step)?;
         p.observe(&mut instance)
     };
-    let plain = [stepped(None, None)?];
+    let reference = [stepped(None, None)?];
     let (mut silent, mut answered) = (Vec::new(), false);
     for (order, v) in inputs.into_iter().take(10) {
         let Some((value, size)) = change(p, v, order) else { continue };
-        // Without the input itself, and what is computed from it at once, the course of the rest must answer.
+        // The input itself and direct feedthrough left out, the other variables must respond.
         let Ok(moved) = stepped(Some((v, value + size)), None) else { continue };
-        if !p.answers(&plain, &[moved], &[v.value_reference]) {
+        if !p.responds(&reference, &[moved], &[v.value_reference]) {
             continue;
         }
         let sloped = stepped(None, Some((v, 2.0 * size / p.step)))?;
-        match p.answers(&plain, &[sloped], &[v.value_reference]) {
+        match p.responds(&reference, &[sloped], &[v.value_reference]) {
             true => answered = true,
             false => silent.push(v.name.as_str()),
         }
@@ -74,10 +74,10 @@ pub(in super::super) fn input_derivatives(p: &Probe) -> Tested {
     let flat = p.observe(&mut instance)?;
     instance.free();
     // A slope of zero is what happens without derivatives.
-    let mut plain = p.ready()?;
-    p.drive(&mut plain, p.start)?;
-    plain.do_step(p.start, p.step)?;
-    let what = p.difference(&p.observe(&mut plain)?, &flat);
+    let mut reference = p.ready()?;
+    p.drive(&mut reference, p.start)?;
+    reference.do_step(p.start, p.step)?;
+    let what = p.difference(&p.observe(&mut reference)?, &flat);
     Ok(what.map(|what| format!("input derivatives of 0 change the step: {what}")).into_iter().collect())
 }
 
@@ -93,7 +93,7 @@ pub(in super::super) fn output_derivatives(p: &Probe) -> Tested {
     if outputs.is_empty() {
         return not_applicable("there is no continuous Real output");
     }
-    super::steps::size_counts(p)?;
+    super::step_size::size_counts(p)?;
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 3)?;
     let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();

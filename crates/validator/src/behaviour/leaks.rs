@@ -15,7 +15,7 @@ const WINDOWS: usize = 4;
 const GROWTH: i64 = 16;
 const WINDOW_GROWTH: i64 = 300;
 
-/// Repeats something until the heap is warm, then looks whether all windows grow; by how many bytes a cycle.
+/// Repeats something until the heap is warm, then measures windows of cycles: bytes per cycle, where every window grows.
 fn grows(slow: Duration, mut cycle: impl FnMut() -> Result<(), HostError>) -> Result<Option<i64>, Stop> {
     let mut sizes = Vec::with_capacity(WINDOWS + 1);
     let begin = Instant::now();

@@ -1,8 +1,8 @@
-//! What of this process an FMU may have changed or used up, as far as the system tells.
+//! What of this process an FMU may have changed or used up, as far as the system reports it.
 
 #![allow(unsafe_code)]
 
-/// Bytes that the C library has handed out and not got back.
+/// Bytes that the C library has allocated and that are not freed yet.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub(super) fn heap() -> Option<i64> {
     type Counters = unsafe extern "C" fn() -> libc::mallinfo2;
@@ -11,7 +11,7 @@ pub(super) fn heap() -> Option<i64> {
     unsafe {
         let found = libc::dlsym(libc::RTLD_DEFAULT, c"mallinfo2".as_ptr());
         if found.is_null() {
-            // Its counters begin again at 4 GiB, which looks like a fall: it may hide a leak, and makes up none.
+            // Its counters begin again at 4 GiB, which looks like a fall: it may hide a leak, but never simulates one.
             let info = libc::mallinfo();
             return Some(i64::from(info.uordblks.cast_unsigned()) + i64::from(info.hblkhd.cast_unsigned()));
         }
@@ -20,13 +20,13 @@ pub(super) fn heap() -> Option<i64> {
     }
 }
 
-/// Bytes that the C library has handed out and not got back.
+/// Bytes that the C library has allocated and that are not freed yet.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(super) fn heap() -> Option<i64> {
     None
 }
 
-/// Lets free memory, and what `malloc` hands out anew, hold a byte; 0 for no more.
+/// Fills freed memory, and what `malloc` allocates, with a byte; 0 ends that.
 pub(super) fn perturb_memory(byte: u8) {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: the option takes any byte; each block is written within its size and freed once.
@@ -53,13 +53,13 @@ fn count(folder: &str) -> usize {
     std::fs::read_dir(folder).map_or(0, Iterator::count)
 }
 
-/// Bytes of address space that this process has mapped; 0 where the system does not tell.
+/// Bytes of address space that this process has mapped; 0 where the system does not report it.
 pub(super) fn mapped() -> usize {
     let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     text.split(' ').next().and_then(|pages| pages.parse::<usize>().ok()).unwrap_or(0) * 4096
 }
 
-/// What an FMU may change of the process beside files, numbers and signal handlers, each with its name.
+/// What an FMU may change of the process other than files, numbers and signal handlers, each with its name.
 #[cfg(unix)]
 pub(super) fn process() -> Vec<(&'static str, String)> {
     // SAFETY: all-zero bytes are valid for the structures, which the calls fill in; the mask is set back at once.
@@ -88,7 +88,7 @@ pub(super) fn process() -> Vec<(&'static str, String)> {
     }
 }
 
-/// What an FMU may change of the process beside files, numbers and signal handlers, each with its name.
+/// What an FMU may change of the process other than files, numbers and signal handlers, each with its name.
 #[cfg(not(unix))]
 pub(super) fn process() -> Vec<(&'static str, String)> {
     Vec::new()

@@ -1,5 +1,6 @@
-//! Behavioural rules: each loads the FMU in a process of its own (see [`super::isolation`]) and looks what it does.
+//! Behavioural rules: each loads the FMU in a process of its own (see [`super::isolation`]) and observes what it does.
 
+pub(super) mod changes;
 pub(super) mod delay;
 pub(super) mod dependencies;
 pub(super) mod effects;
@@ -9,17 +10,21 @@ pub(super) mod interpolation;
 pub(super) mod leaks;
 pub(super) mod lifecycle;
 mod measure;
+mod no_set_prior;
+pub(super) mod observed;
 pub(super) mod partial;
 pub(crate) mod probe;
-mod promise;
 pub(super) mod references;
+pub(super) mod reset;
 pub(super) mod rounded;
 pub(super) mod settings;
 pub(super) mod slope;
 pub(super) mod start;
 pub(super) mod state;
+pub(super) mod step_size;
 pub(super) mod steps;
 pub(super) mod surroundings;
+pub(super) mod symbols;
 pub(super) mod three;
 pub(super) mod values;
 
@@ -59,7 +64,7 @@ pub(crate) enum Behaviour {
     Raw(fn(&Setup) -> Tested),
     /// On the loaded binary.
     Loaded(fn(&Probe) -> Tested),
-    /// On the loaded binary, by calls whose success is another rule's: where one fails, this rule is not tested.
+    /// On the loaded binary, by calls whose success is tested by another rule: where one fails, this rule is not tested.
     Indirect(fn(&Probe) -> Tested),
     /// On the loaded binary, learning what later rules need.
     Learning(fn(&mut Probe) -> Tested),
@@ -110,7 +115,7 @@ impl Probe {
 }
 
 /// A number as a variable holds it: one of 32 bits rounds it.
-fn held(v: &Variable, x: f64) -> f64 {
+fn clamped(v: &Variable, x: f64) -> f64 {
     if v.cell.is_some_and(|c| c.kind == Kind::Float32) { f64::from(x as f32) } else { x }
 }
 
@@ -127,6 +132,6 @@ fn settable_real(p: &Probe, v: &Variable) -> Option<f64> {
     let step = 0.05 * start.abs().max(if start == 0.0 { 1.0 } else { 0.0 });
     [start + step, start - step, 0.5 * (start + high), 0.5 * (start + low)]
         .into_iter()
-        .map(|x| held(v, x))
+        .map(|x| clamped(v, x))
         .find(|x| x.is_finite() && (low..=high).contains(x) && *x != start)
 }

@@ -12,7 +12,7 @@ use super::super::description::{
 };
 use super::super::host::{Binary, HostError, Instance, InstanceOptions, Layout, needs_event_mode, resource_location};
 
-/// Largest number of variables of a type that are observed beside the outputs.
+/// Largest number of variables of a type that are observed in addition to the outputs.
 const MOST_OBSERVED: usize = 2000;
 /// Communication steps of a comparison.
 pub(super) const STEPS: usize = 20;
@@ -26,7 +26,7 @@ pub struct Learned {
     pub observe_all: bool,
     /// Variables that differ between equal runs, by type and value reference: compared no more.
     pub masked: Vec<(u8, u32)>,
-    /// References of Strings that are no texts, which is told once: to the other rules they are of variables of the FMU's own.
+    /// References of Strings that are no texts, which one rule reports: the other rules do not read them.
     pub no_texts: Vec<u32>,
     /// Communication steps that fit into a comparison of a slow FMU, or one that ends early; 0 is not known.
     pub steps: usize,
@@ -74,7 +74,7 @@ pub(super) fn not_tested<T>(why: impl Into<String>) -> Result<T, Stop> {
 pub(crate) struct Observed {
     pub name: String,
     pub reference: u32,
-    /// Whether it follows from the rest: an output or a local variable.
+    /// Whether it is computed: an output or a local variable.
     pub calculated: bool,
 }
 
@@ -259,7 +259,7 @@ impl Probe {
         let phase = 0.7 + 1.3 * order as f64;
         let turns = (time - self.start) / (STEPS as f64 * self.step);
         let value = start + 0.1 * room * (std::f64::consts::TAU * 1.7 * turns + phase).sin();
-        super::held(v, value.clamp(low.min(high), high))
+        super::clamped(v, value.clamp(low.min(high), high))
     }
 
     /// Sets the inputs for a time.
@@ -310,25 +310,25 @@ impl Probe {
     /// The first difference between two snapshots, bit for bit (NaN equals NaN), as a sentence.
     pub fn difference(&self, a: &Snapshot, b: &Snapshot) -> Option<String> {
         let same = |x: f64, y: f64| x == y || x.is_nan() && y.is_nan();
-        let say = |name: &str, a: String, b: String| Some(format!("\"{name}\" is {a} instead of {b}"));
+        let describe = |name: &str, a: String, b: String| Some(format!("\"{name}\" is {a} instead of {b}"));
         for ((o, &x), &y) in self.observed[0].iter().zip(&a.reals).zip(&b.reals) {
             if !same(x, y) {
-                return say(&o.name, y.to_string(), x.to_string());
+                return describe(&o.name, y.to_string(), x.to_string());
             }
         }
         for ((o, x), y) in self.observed[1].iter().zip(&a.integers).zip(&b.integers) {
             if x != y {
-                return say(&o.name, y.to_string(), x.to_string());
+                return describe(&o.name, y.to_string(), x.to_string());
             }
         }
         for ((o, x), y) in self.observed[2].iter().zip(&a.booleans).zip(&b.booleans) {
             if x != y {
-                return say(&o.name, y.to_string(), x.to_string());
+                return describe(&o.name, y.to_string(), x.to_string());
             }
         }
         for ((o, x), y) in self.observed[3].iter().zip(&a.strings).zip(&b.strings) {
             if x != y {
-                return say(&o.name, format!("{y:?}"), format!("{x:?}"));
+                return describe(&o.name, format!("{y:?}"), format!("{x:?}"));
             }
         }
         None
@@ -348,8 +348,8 @@ impl Probe {
         declared.map_or(1e-6, |t| t.clamp(1e-12, 1e-3))
     }
 
-    /// As [`Probe::difference_of_runs`], leaving out what a solver's tolerance explains. That is local to a step; over a
-    /// run a few ten of it come together.
+    /// As [`Probe::difference_of_runs`], leaving out what a solver's tolerance explains. It bounds the
+    /// local error of a step; over a run some tens of it add up.
     pub fn difference_beyond_tolerance(&self, a: &[Snapshot], b: &[Snapshot], from: usize) -> Option<String> {
         const OVER_A_RUN: f64 = 30.0;
         self.difference_of_runs(a, b, from)?;
@@ -383,8 +383,8 @@ impl Probe {
         None
     }
 
-    /// Whether an output or local variable other than those left out answers to what is different in the second run.
-    pub fn answers(&self, a: &[Snapshot], b: &[Snapshot], without: &[u32]) -> bool {
+    /// Whether an output or local variable, except `without`, responds to what is different in the second run: differs by more than rounding.
+    pub fn responds(&self, a: &[Snapshot], b: &[Snapshot], without: &[u32]) -> bool {
         a.iter().zip(b).any(|(x, y)| {
             let real = |((o, x), y): ((&Observed, &f64), &f64)| {
                 o.calculated && !without.contains(&o.reference) && (x - y).abs() > 1e-12 * x.abs().max(y.abs())

@@ -43,7 +43,7 @@ pub(in super::super) fn bad_reference_set(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// A reference of which the FMU looks at 16 bits is one of another variable.
+/// An FMU that reads 16 bits of a reference takes it for that of another variable.
 pub(in super::super) fn bits(p: &Probe) -> Tested {
     let mut instance = p.ready()?;
     if instance.get_real(&[p.unused_reference(BaseType::Real)]).is_ok() {
@@ -90,7 +90,7 @@ pub(in super::super) fn string_values(p: &mut Probe) -> Tested {
     Ok(problems)
 }
 
-/// Texts read together are those read one by one.
+/// Texts read joint are those read one by one.
 pub(in super::super) fn string_buffers(p: &Probe) -> Tested {
     let text = |v: &&Variable| v.base() == BaseType::String && !p.learned.no_texts.contains(&v.value_reference);
     let strings: Vec<&Variable> = p.d.variables.iter().filter(text).take(50).collect();
@@ -104,12 +104,10 @@ pub(in super::super) fn string_buffers(p: &Probe) -> Tested {
         alone.append(&mut instance.get_string(&[v.value_reference])?);
     }
     let references: Vec<u32> = strings.iter().map(|v| v.value_reference).collect();
-    let together = instance.get_string(&references)?;
-    let wrong = strings.iter().zip(alone).zip(together).find(|((_, alone), together)| alone != together);
+    let joint = instance.get_string(&references)?;
+    let wrong = strings.iter().zip(alone).zip(joint).find(|((_, alone), joint)| alone != joint);
     Ok(wrong
-        .map(|((v, alone), together)| {
-            format!("\"{}\" reads {together:?} among other strings, but {alone:?} alone", v.name)
-        })
+        .map(|((v, alone), joint)| format!("\"{}\" reads {joint:?} among other strings, but {alone:?} alone", v.name))
         .into_iter()
         .collect())
 }

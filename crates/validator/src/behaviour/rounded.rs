@@ -1,13 +1,13 @@
 //! What is right within the FMU's tolerance, but not to the last digit: worth knowing where results are to be reproduced, and
 //! no more than that, for a solver may go on with the step size or the derivative that it had.
 
-use super::lifecycle;
 use super::probe::{Probe, Tested, not_applicable, not_tested};
+use super::reset;
 
 pub(in super::super) fn reset(p: &Probe) -> Tested {
     p.comparable()?;
-    let (expected, mut instance) = lifecycle::before_reset(p)?;
-    let again = lifecycle::after_reset(p, &mut instance)?;
+    let (expected, mut instance) = reset::before_reset(p)?;
+    let again = reset::after_reset(p, &mut instance)?;
     if p.difference_beyond_tolerance(&expected, &again, 0).is_some() {
         return not_tested("fmi2Reset does not restore a new instance");
     }

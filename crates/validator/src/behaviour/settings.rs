@@ -4,7 +4,7 @@ use super::super::description::{BaseType, Causality, Value, Variable};
 use super::super::host::{HostError, Instance, InstanceOptions};
 use super::probe::{Probe, Tested, not_applicable, not_tested, settable};
 use super::settable_real;
-use super::values::{get, set, show};
+use super::values::{get, set};
 use std::sync::Arc;
 
 /// Most variables of a type that are set.
@@ -66,7 +66,7 @@ pub(in super::super) fn others(p: &Probe) -> Tested {
     let (mut problems, mut texts) = (Vec::new(), 0);
     for ((v, value), read) in found {
         if *value != read {
-            let (name, value, read) = (&v.name, show(value), show(&read));
+            let (name, value, read) = (&v.name, value.to_string(), read.to_string());
             problems.push(format!("the parameter \"{name}\" was set to {value} and reads {read}"));
         } else if let Value::String(text) = value
             && texts < 20
@@ -78,10 +78,10 @@ pub(in super::super) fn others(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// What becomes of a text longer than buffers are, where the FMU has just borne another short one: it may refuse the long
-/// one, but not take a part of it for the whole, or write past its memory and end its host.
+/// Tests a text longer than usual buffers, after the FMU has taken another short one: it may refuse the long one, but not
+/// truncate it, or write past its memory and crash its host.
 fn cut(p: &Probe, v: &Variable, short: &str) -> Option<String> {
-    /// Longer than the buffers of 32 to 256 bytes that are met with, and than names of files may be.
+    /// Length in bytes: above the common buffers of 32 to 256 bytes, and above the limit of file names.
     const LONG: usize = 300;
     let mut text = short.to_owned();
     for n in 3.. {
@@ -95,7 +95,7 @@ fn cut(p: &Probe, v: &Variable, short: &str) -> Option<String> {
         instance.set_string(&[v.value_reference], &[&text])?;
         instance.initialize(p.start, None)?;
         let read = get(&mut instance, v)?;
-        // Spoilt memory is often found out when it is freed, and by what is taken from it next.
+        // Corrupted memory is often detected when it is freed, or at the next allocation.
         instance.free();
         p.instantiate()?;
         Ok(read)
@@ -117,7 +117,7 @@ fn reals(p: &Probe) -> Vec<(&Variable, f64)> {
 }
 
 /// Values set in one call, and one by one in two orders, are the same values: what an initialised instance reads.
-pub(in super::super) fn together(p: &Probe) -> Tested {
+pub(in super::super) fn joint(p: &Probe) -> Tested {
     let chosen = reals(p);
     if chosen.len() < 2 {
         return not_applicable("there are no two Real parameters or inputs with another value to set");
@@ -125,42 +125,42 @@ pub(in super::super) fn together(p: &Probe) -> Tested {
     let references: Vec<u32> = chosen.iter().map(|(v, _)| v.value_reference).collect();
     let values: Vec<f64> = chosen.iter().map(|c| c.1).collect();
     let _venture = super::super::host::venture();
-    let read = |way: Way| -> Result<Vec<f64>, HostError> {
+    let read = |set_order: SetOrder| -> Result<Vec<f64>, HostError> {
         let mut instance = p.instantiate()?;
         let mut order: Vec<usize> = (0..references.len()).collect();
-        match way {
-            Way::AtOnce => instance.set_real(&references, &values)?,
-            Way::Backwards => order.reverse(),
-            Way::OneByOne => {}
+        match set_order {
+            SetOrder::AtOnce => instance.set_real(&references, &values)?,
+            SetOrder::Backwards => order.reverse(),
+            SetOrder::OneByOne => {}
         }
-        for at in order.into_iter().filter(|_| way != Way::AtOnce) {
+        for at in order.into_iter().filter(|_| set_order != SetOrder::AtOnce) {
             instance.set_real(&[references[at]], &[values[at]])?;
         }
         instance.initialize(p.start, None)?;
         instance.get_real(&references)
     };
-    let plain = match read(Way::OneByOne) {
-        Ok(plain) => plain,
+    let reference = match read(SetOrder::OneByOne) {
+        Ok(reference) => reference,
         Err(HostError::OnlyOnce) => return Err(HostError::OnlyOnce.into()),
         Err(error) => return not_tested(format!("the FMU does not run with other parameters: {error}")),
     };
-    for (way, how) in [(Way::AtOnce, "in one call"), (Way::Backwards, "in the opposite order")] {
-        let found = match read(way) {
+    for (set_order, how) in [(SetOrder::AtOnce, "in one call"), (SetOrder::Backwards, "in the opposite order")] {
+        let found = match read(set_order) {
             Ok(found) => found,
             Err(error) => return Ok(vec![format!("values that can be set one by one cannot be set {how}: {error}")]),
         };
-        let differs = (0..plain.len()).find(|&at| plain[at] != found[at] && !found[at].is_nan());
+        let differs = (0..reference.len()).find(|&at| reference[at] != found[at] && !found[at].is_nan());
         if let Some(at) = differs {
-            let (name, one) = (&chosen[at].0.name, plain[at]);
-            let said = format!("\"{name}\" reads {one} where {} variables are set one by one", plain.len());
-            return Ok(vec![format!("{said}, and {} where the same values are set {how}", found[at])]);
+            let (name, one) = (&chosen[at].0.name, reference[at]);
+            let message = format!("\"{name}\" reads {one} where {} variables are set one by one", reference.len());
+            return Ok(vec![format!("{message}, and {} where the same values are set {how}", found[at])]);
         }
     }
     Ok(vec![])
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum SetOrder {
     OneByOne,
     AtOnce,
     Backwards,

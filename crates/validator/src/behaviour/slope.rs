@@ -5,9 +5,9 @@ use super::super::description::Variable;
 use super::super::host::{HostError, Instance};
 use super::interpolation::{change, continuous_inputs, effect};
 use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
-use super::steps::size_counts;
+use super::step_size::size_counts;
 
-/// Small steps for one.
+/// Number of small steps in one.
 const PARTS: usize = 8;
 
 /// An input, its value where the tested step begins, and how far it rises over that step.
@@ -30,38 +30,38 @@ impl Rise<'_> {
         instance.set_real(&[self.v.value_reference], &[value])
     }
 
-    /// Sets the slope with which the input gets so far over a step.
+    /// Sets the slope, rise over step size, of an input.
     fn set_slope(&self, p: &Probe, instance: &mut Instance, rise: f64) -> Result<(), HostError> {
         instance.set_input_derivatives(&[self.v.value_reference], &[1], &[rise / p.step])
     }
 
     /// What is observed at the end of the step, and of one more with the input at its end.
-    fn run(&self, p: &Probe, way: Way) -> Result<[Snapshot; 2], HostError> {
+    fn run(&self, p: &Probe, course: Course) -> Result<[Snapshot; 2], HostError> {
         let mut instance = self.instance(p)?;
-        let parts = match way {
-            Way::Slope => 1,
-            Way::Flat(parts) | Way::Stairs(parts) => parts,
+        let parts = match course {
+            Course::Slope => 1,
+            Course::Flat(parts) | Course::Stairs(parts) => parts,
         };
         let part = p.step / parts as f64;
         for k in 0..parts {
-            let middle = if matches!(way, Way::Stairs(_)) { (k as f64 + 0.5) / parts as f64 } else { 0.0 };
+            let middle = if matches!(course, Course::Stairs(_)) { (k as f64 + 0.5) / parts as f64 } else { 0.0 };
             self.set(&mut instance, self.value + middle * self.rise)?;
-            if matches!(way, Way::Slope) {
+            if matches!(course, Course::Slope) {
                 self.set_slope(p, &mut instance, self.rise)?;
             }
             instance.do_step(p.time(2) + k as f64 * part, part)?;
         }
         let end = p.observe(&mut instance)?;
         self.set(&mut instance, self.value + self.rise)?;
-        if matches!(way, Way::Slope) {
+        if matches!(course, Course::Slope) {
             self.set_slope(p, &mut instance, 0.0)?;
         }
         instance.do_step(p.time(3), p.step)?;
         Ok([end, p.observe(&mut instance)?])
     }
 
-    /// How far along the slope the input stands at the end of the step, of its rise: 1 where it ran along it, 0 where it
-    /// stayed. Seen in what follows from it at once.
+    /// Position of the input at the end of the step as a share of its rise: 1 where it followed the slope, 0 where it was held.
+    /// Observed in the variables with direct feedthrough.
     fn at_its_end(&self, p: &Probe) -> Result<Vec<(String, f64)>, HostError> {
         let mut instance = self.instance(p)?;
         self.set(&mut instance, self.value)?;
@@ -75,7 +75,7 @@ impl Rise<'_> {
         Ok(self.ratios(p, [&end, &low], [&high, &low], 1e-9))
     }
 
-    /// By how much variables have moved, of what is due, where that is clear.
+    /// Change of each variable over the change that is due, 1, where that is larger than `clear` times the value.
     fn ratios(&self, p: &Probe, moved: [&Snapshot; 2], due: [&Snapshot; 2], clear: f64) -> Vec<(String, f64)> {
         let mut ratios = Vec::new();
         for (at, o) in p.observed[0].iter().enumerate() {
@@ -90,28 +90,28 @@ impl Rise<'_> {
     }
 }
 
-/// How an input goes through a step.
+/// The course of an input over a step.
 #[derive(Clone, Copy)]
-enum Way {
-    /// By its derivative, in one.
+enum Course {
+    /// One step with the derivative set.
     Slope,
-    /// Along the same course, in small ones with the value in the middle of each.
+    /// So many small steps along the same slope, each with the value at its middle.
     Stairs(usize),
-    /// Not at all, in as many.
+    /// So many small steps with a constant value.
     Flat(usize),
 }
 
-/// The first of some ratios where none of them is in a range: where some of the variables go along, the others may be computed
-/// otherwise.
-fn astray(ratios: Vec<(String, f64)>, range: std::ops::RangeInclusive<f64>) -> Option<(String, f64)> {
+/// The first of the ratios, where none of them lies in a range: where some variables follow the input, the others may be
+/// computed otherwise.
+fn all_outside(ratios: Vec<(String, f64)>, range: std::ops::RangeInclusive<f64>) -> Option<(String, f64)> {
     let all = ratios.iter().all(|(_, ratio)| !range.contains(ratio));
     ratios.into_iter().next().filter(|_| all)
 }
 
 pub(in super::super) fn course(p: &Probe) -> Tested {
-    /// What goes further from the course than this is another slope: by its factor, or its sign.
+    /// A ratio outside this range is another slope: another factor, or another sign.
     const FITS: std::ops::RangeInclusive<f64> = 0.6..=1.6;
-    /// As much of it as a solver of low order with few steps may leave open, which takes the slope for nothing at the least.
+    /// The range that a solver of low order with few steps may reach; at the least it ignores the slope.
     const LOOSE: std::ops::RangeInclusive<f64> = -0.4..=1.6;
     let inputs = continuous_inputs(p)?;
     size_counts(p)?;
@@ -125,7 +125,7 @@ pub(in super::super) fn course(p: &Probe) -> Tested {
         let slope = format!("a slope of the input \"{}\" set with fmi2SetRealInputDerivatives", v.name);
         if let Ok(ends) = input.at_its_end(p) {
             tested |= !ends.is_empty();
-            if let Some((name, share)) = astray(ends, LOOSE) {
+            if let Some((name, share)) = all_outside(ends, LOOSE) {
                 return Ok(vec![format!(
                     "at the end of a step with {slope} \"{name}\" is as if that input had gone {share:.2} times as far as its slope leads"
                 )]);
@@ -135,26 +135,27 @@ pub(in super::super) fn course(p: &Probe) -> Tested {
             continue;
         }
         let courses = || -> Result<[[Snapshot; 2]; 6], HostError> {
-            let ways = [Way::Slope, Way::Flat(1), Way::Stairs(PARTS), Way::Flat(PARTS)];
-            let [sloped, plain, stairs, flat] = ways.map(|way| input.run(p, way));
-            let [fewer, fewer_flat] = [Way::Stairs(PARTS / 2), Way::Flat(PARTS / 2)].map(|way| input.run(p, way));
-            Ok([sloped?, plain?, stairs?, flat?, fewer?, fewer_flat?])
+            let all = [Course::Slope, Course::Flat(1), Course::Stairs(PARTS), Course::Flat(PARTS)];
+            let [sloped, reference, stairs, flat] = all.map(|course| input.run(p, course));
+            let [fewer, fewer_flat] =
+                [Course::Stairs(PARTS / 2), Course::Flat(PARTS / 2)].map(|course| input.run(p, course));
+            Ok([sloped?, reference?, stairs?, flat?, fewer?, fewer_flat?])
         };
-        let Ok([sloped, plain, stairs, flat, fewer, fewer_flat]) = courses() else { continue };
+        let Ok([sloped, reference, stairs, flat, fewer, fewer_flat]) = courses() else { continue };
         let clear = 3.0 * p.tolerance();
-        let of = |when: usize| input.ratios(p, [&sloped[when], &plain[when]], [&stairs[when], &flat[when]], clear);
+        let of = |when: usize| input.ratios(p, [&sloped[when], &reference[when]], [&stairs[when], &flat[when]], clear);
         let at_end = of(0);
         tested |= !at_end.is_empty();
-        if let Some((name, ratio)) = astray(at_end, FITS) {
+        if let Some((name, ratio)) = all_outside(at_end, FITS) {
             return Ok(vec![format!(
                 "with {slope} \"{name}\" moves {ratio:.2} times as far as in {PARTS} small steps along that slope"
             )]);
         }
-        // One step later the input is the same in all, and what it gave to an output at once is gone: what is left has come
-        // through the states. An FMU with a step of its own that is longer than the small ones sees other stairs.
+        // One step later the input is the same in all, and its direct feedthrough is the same: the difference has come
+        // through the states. An FMU with a step of its own that is longer than the small ones samples the stairs otherwise.
         let seen = input.ratios(p, [&fewer[1], &fewer_flat[1]], [&stairs[1], &flat[1]], clear);
         let fine = seen.iter().all(|(_, ratio)| (0.8..=1.25).contains(ratio));
-        if fine && let Some((name, ratio)) = astray(of(1), LOOSE) {
+        if fine && let Some((name, ratio)) = all_outside(of(1), LOOSE) {
             return Ok(vec![format!(
                 "one step after one with {slope} \"{name}\" has moved {ratio:.2} times as far as after {PARTS} small steps along that slope"
             )]);

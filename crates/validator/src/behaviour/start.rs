@@ -3,10 +3,10 @@
 
 use super::super::description::{BaseType, Causality, Unknown, Variable};
 use super::super::host::{HostError, Instance, Status};
-use super::lifecycle::last_words;
+use super::lifecycle::last_log_message;
 use super::partial::{MOST, real};
 use super::probe::{Probe, Tested, not_applicable, not_tested};
-use super::steps::range;
+use super::step_size::range;
 
 /// A run from another start time.
 pub(in super::super) fn start_time(p: &Probe) -> Tested {
@@ -24,13 +24,13 @@ pub(in super::super) fn start_time(p: &Probe) -> Tested {
     let before = read(&mut instance)?;
     let status = instance.do_step_status(start, p.step, true)?;
     if matches!(status, Status::Error | Status::Fatal) {
-        let said = last_words(&instance);
+        let message = last_log_message(&instance);
         return Ok(vec![format!(
-            "a step from the start time {start} s returned {status}, one from {} s does not{said}",
+            "a step from the start time {start} s returned {status}, one from {} s does not{message}",
             p.start
         )]);
     }
-    // Some FMUs tell the time only after a step; those with a step of their own, longer than this one, at its end only.
+    // Some FMUs update their time only after a step; those with a step of their own, longer than this one, at its end only.
     if let (Some(before), Some(after), Some(v)) = (before, read(&mut instance)?, time)
         && !close(before, start)
         && !close(after, start + p.step)
@@ -45,7 +45,7 @@ pub(in super::super) fn start_time(p: &Probe) -> Tested {
 /// excitation is counted from the beginning of the run. An equation without the time moves alike too, and dependencies may
 /// name more than there is, so that this is no breach of the standard; without a declaration nothing is to be seen.
 pub(in super::super) fn effect(p: &Probe) -> Tested {
-    /// Start times beside that of the default experiment, in parts of the run: no period is a whole part of both.
+    /// Start times other than that of the default experiment, in parts of the run: no period divides both.
     const LATER: [f64; 2] = [0.367_879, 0.618_034];
     let time = p.d.variables.iter().position(|v| v.causality == Causality::Independent).map(|i| i as u32 + 1);
     let names = |(u, _): &(&Unknown, &Variable)| u.dependencies.iter().flatten().any(|&i| Some(i) == time);
@@ -78,7 +78,7 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
         }
         Ok(rows)
     };
-    let plain = course(p.start)?;
+    let reference = course(p.start)?;
     let mut others = Vec::new();
     for part in LATER {
         let start = p.start + part * n as f64 * p.step;
@@ -88,10 +88,10 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
         }
     }
     let alike = |at: usize| {
-        let swing = range(&plain, at);
+        let swing = range(&reference, at);
         // What an FMU computes of times that are rounded otherwise.
         let close = |(a, b): (&Vec<f64>, &Vec<f64>)| (a[at] - b[at]).abs() <= 1e-9 * swing.max(a[at].abs());
-        swing > 1e-9 * plain[0][at].abs() && others.iter().all(|rows| plain.iter().zip(rows).all(close))
+        swing > 1e-9 * reference[0][at].abs() && others.iter().all(|rows| reference.iter().zip(rows).all(close))
     };
     Ok(unknowns
         .iter()

@@ -2,10 +2,10 @@
 
 use super::super::description::{Causality, Variability};
 use super::super::host::{HostError, Instance};
+use super::no_set_prior;
+use super::observed::get_consistent;
 use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested};
-use super::promise;
 use super::settable_real;
-use super::values::get_consistent;
 
 fn needs_state(p: &Probe) -> Result<(), super::Stop> {
     if !p.interface().can_get_and_set_state {
@@ -14,7 +14,7 @@ fn needs_state(p: &Probe) -> Result<(), super::Stop> {
     p.comparable()
 }
 
-/// Changes what the environment may change during a run, so that a restored state must bring it back.
+/// Changes what the environment may change during a run, so that a restored state must restore it.
 fn disturb(p: &Probe, instance: &mut Instance) {
     for v in &p.d.variables {
         if v.causality == Causality::Parameter
@@ -46,7 +46,7 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     // Some things show late: an event time, a delay, a counter.
     let (n, cut) = (p.long(), p.steps() / 3);
     let disturbed = takes_disturbance(p);
-    let plain = without_states(p)?;
+    let reference = without_states(p)?;
     let mut instance = p.ready()?;
     // Without this the FMU need not keep what lies before the communication point (section 4.2.2).
     instance.may_go_back = true;
@@ -63,9 +63,9 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
         }
     }
     let n = cut + expected.len();
-    if let Some(plain) = &plain {
-        let both = plain.len().min(n);
-        if let Some(what) = p.difference_beyond_tolerance(&plain[cut..both], &expected[..both - cut], cut) {
+    if let Some(reference) = &reference {
+        let both = reference.len().min(n);
+        if let Some(what) = p.difference_beyond_tolerance(&reference[cut..both], &expected[..both - cut], cut) {
             return Ok(vec![format!("fmi2GetFMUstate changes the run: {what}")]);
         }
     }
@@ -75,7 +75,7 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
         disturb(p, &mut instance);
     }
     p.drive(&mut instance, p.time(n + 5))?;
-    // At its end an FMU may refuse to go on, which is no matter here.
+    // At its end an FMU may refuse to go on, which is not tested here.
     let _ = instance.do_step_status(p.time(n), p.step, false)?;
     instance.set_state(&early)?;
     let at_once = [p.observe(&mut instance)?];
@@ -103,7 +103,7 @@ pub(in super::super) fn restore(p: &Probe) -> Tested {
     instance.free_state(early)?;
     instance.free_state(late)?;
     if problems.is_empty() {
-        problems.extend(promise::kept(p)?);
+        problems.extend(no_set_prior::check(p)?);
     }
     Ok(problems)
 }
@@ -138,7 +138,7 @@ pub(in super::super) fn serialise(p: &Probe) -> Tested {
     p.run(&mut instance, 0, cut)?;
     let state = instance.get_state()?;
     let bytes = instance.serialize_state(&state)?;
-    // What the unserialised state gives is the measure; whether that is right is another rule's.
+    // The run from the unserialised state is the reference; whether that is right is tested by another rule.
     instance.set_state(&state)?;
     let expected = p.run(&mut instance, cut, n)?;
     instance.set_state(&state)?;
@@ -176,7 +176,7 @@ pub(in super::super) fn serialise(p: &Probe) -> Tested {
 /// (section 2.1.8). Nothing where the FMU does not run so.
 fn serialise_diverted(p: &Probe) -> Result<Option<String>, HostError> {
     let _venture = super::super::host::venture();
-    let Some(mut instance) = super::lifecycle::diverted(p)? else { return Ok(None) };
+    let Some(mut instance) = super::reset::diverted(p)? else { return Ok(None) };
     let (n, cut) = (p.steps(), p.steps() / 2);
     instance.may_go_back = true;
     let state = instance.get_state()?;

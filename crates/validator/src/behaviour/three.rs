@@ -1,4 +1,4 @@
-//! What FMI 3.0 alone has: what a step tells, early return, event mode, configuration mode, arrays (FMI 3.0, sections
+//! What FMI 3.0 alone has: the output arguments of a step, early return, event mode, configuration mode, arrays (FMI 3.0, sections
 //! 2.2.6.2, 2.3.5, 2.3.6 and 4.2.1).
 
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use super::super::description::{Causality, Kind, Value};
 use super::super::host::{HostError, Instance, InstanceOptions, Status};
 use super::probe::{Probe, Tested, not_applicable, not_tested};
 
-/// Steps of a run that looks at what each tells.
+/// Steps of a run in which the output arguments of each are tested.
 const STEPS: usize = 50;
 
 fn with(p: &Probe, event_mode: bool, early_return: bool) -> Result<Instance, HostError> {
@@ -31,29 +31,29 @@ pub(in super::super) fn report(p: &Probe) -> Tested {
         if !instance.do_step_status(p.time(k), p.step, true)?.is_ok() {
             break;
         }
-        let (told, end) = (instance.told(), p.time(k + 1));
-        if told.early {
+        let (result, end) = (instance.step_result(), p.time(k + 1));
+        if result.early {
             return Ok(vec![format!(
                 "fmi3DoStep from t = {} returned early, though earlyReturnAllowed was false",
                 p.time(k)
             )]);
         }
-        if told.time.is_nan() {
+        if result.time.is_nan() {
             return Ok(vec!["fmi3DoStep does not write its output arguments, or lastSuccessfulTime is NaN".into()]);
         }
         let slack = 1e-6 * p.step + 1e-9 * end.abs();
-        let problem = format!("lastSuccessfulTime is {} after a whole step to t = {end}", told.time);
-        if told.time > end + slack {
+        let problem = format!("lastSuccessfulTime is {} after a whole step to t = {end}", result.time);
+        if result.time > end + slack {
             return Ok(vec![problem]);
         }
-        // One with a fixed step of its own may stand before the communication point now and then.
-        in_time |= told.time >= end - slack;
+        // An FMU with a fixed step of its own may be before the communication point now and then.
+        in_time |= result.time >= end - slack;
         lagging = lagging.or(Some(problem));
     }
     Ok(lagging.filter(|_| !in_time).into_iter().collect())
 }
 
-/// Runs with early return allowed: each early return is announced, gets on, and can be gone on from.
+/// Runs with early return allowed: each early return is reported, advances the time, and can be continued.
 pub(in super::super) fn early_return(p: &Probe) -> Tested {
     if !p.interface().might_return_early {
         return not_applicable("mightReturnEarlyFromDoStep is false");
@@ -72,21 +72,21 @@ pub(in super::super) fn early_return(p: &Probe) -> Tested {
             if !instance.do_step_status(from, step, true)?.is_ok() {
                 return Ok(vec![]);
             }
-            let told = instance.told();
-            let reached = if told.early { told.time } else { end };
-            if !(reached >= from - 1e-9 * p.step && reached <= end + 1e-6 * p.step) {
+            let result = instance.step_result();
+            let end_time = if result.early { result.time } else { end };
+            if !(end_time >= from - 1e-9 * p.step && end_time <= end + 1e-6 * p.step) {
                 return Ok(vec![format!(
                     "fmi3DoStep from t = {from} by {step} returned early with lastSuccessfulTime = {}",
-                    told.time
+                    result.time
                 )]);
             }
             if part > 1000 {
                 return Ok(vec![format!("steps from t = {from} return early without getting on")]);
             }
-            if told.event && event_mode {
+            if result.event && event_mode {
                 instance.handle_events(|_| Ok(()))?;
             }
-            from = reached;
+            from = end_time;
         }
     }
     Ok(vec![])
@@ -107,14 +107,14 @@ pub(in super::super) fn event_mode(p: &Probe) -> Tested {
         if !instance.do_step_status(time, p.step, true)?.is_ok() {
             break;
         }
-        if instance.told().event {
+        if instance.step_result().event {
             instance.handle_events(|_| Ok(()))?;
-            if instance.told().terminate {
+            if instance.step_result().terminate {
                 break;
             }
         }
-        let said = p.observe(&mut instance);
-        if let Err(error) = said {
+        let message = p.observe(&mut instance);
+        if let Err(error) = message {
             return Ok(vec![format!("after t = {} with event mode used, {error}", p.time(k + 1))]);
         }
     }
@@ -130,9 +130,9 @@ pub(in super::super) fn configuration_mode(p: &Probe) -> Tested {
     }
     p.comparable()?;
     let n = p.steps();
-    let mut plain = p.ready()?;
-    let expected = p.run(&mut plain, 0, n)?;
-    plain.free();
+    let mut reference = p.ready()?;
+    let expected = p.run(&mut reference, 0, n)?;
+    reference.free();
     let mut instance = p.instantiate()?;
     instance.configure(|instance| {
         for v in &structural {
@@ -189,7 +189,7 @@ pub(super) fn status(p: &Probe) -> Tested {
             status @ (Status::Other(_) | Status::Pending) => {
                 return Ok(vec![format!("fmi3DoStep returned {}", status.to_string().replace("fmi2", "fmi3"))]);
             }
-            Status::Discard if !instance.told().terminate => {
+            Status::Discard if !instance.step_result().terminate => {
                 return not_tested("the first steps are discarded");
             }
             _ => {}

@@ -1,8 +1,8 @@
-//! Getting and setting values (FMI 2.0.4, section 2.1.7).
+//! Values that are set, and start values (FMI 2.0.4, section 2.1.7).
 
 use super::super::description::{BaseType, Causality, Initial, Value, Variability, Variable};
 use super::super::host::{HostError, Instance};
-use super::probe::{Probe, Snapshot, Tested, not_applicable, not_tested, settable, type_index};
+use super::probe::{Probe, Tested, settable, type_index};
 use super::settable_real;
 
 /// Relative tolerance between a start value as printed in the XML and as compiled: tools print six digits and more.
@@ -28,20 +28,11 @@ pub(super) fn set(instance: &mut Instance, v: &Variable, value: &Value) -> Resul
     }
 }
 
-pub(super) fn show(value: &Value) -> String {
-    match value {
-        Value::Real(x) => x.to_string(),
-        Value::Integer(x) => x.to_string(),
-        Value::Boolean(x) => x.to_string(),
-        Value::String(x) => format!("{x:?}"),
-    }
-}
-
-/// Whether two values are the same but for what printing takes off them.
+/// Whether two values are the same up to the digits that printing cuts.
 pub(super) fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Real(x), Value::Real(y)) => {
-            // What is next to nothing beside 1 may print as 0.
+            // A subnormal number may be printed as 0.
             x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= (PRINTED * x.abs().max(y.abs())).max(1e-300)
         }
         _ => a == b,
@@ -63,9 +54,7 @@ pub(in super::super) fn start_values(p: &Probe) -> Tested {
             if !same(start, &value) {
                 problems.push(format!(
                     "\"{}\" starts at {} in the binary, at {} in modelDescription.xml",
-                    v.name,
-                    show(&value),
-                    show(start)
+                    v.name, value, start
                 ));
             }
         }
@@ -90,7 +79,7 @@ pub(in super::super) fn start_settable(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// What was set and read again: name, kind, as set, as read.
+/// A variable that was set and read again: name, kind, value set, value read.
 type Kept<'a> = (&'a str, &'static str, f64, f64);
 
 /// Sets Real parameters before initialisation and inputs after it, and reads them. An input that takes effect with the
@@ -106,7 +95,7 @@ fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
             written.push((v, value));
         }
     }
-    // Other parameters may not go together; then only inputs are tested.
+    // Other parameters may contradict each other; then only inputs are tested.
     if instance.initialize(p.start, None).is_err() {
         instance.free();
         instance = p.instantiate()?;
@@ -147,9 +136,10 @@ fn is_rounded(value: f64, read: f64) -> bool {
 }
 
 pub(in super::super) fn set_get(p: &Probe) -> Tested {
-    let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
+    let describe =
+        |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
     let mut problems: Vec<String> =
-        kept(p)?.into_iter().filter(|(_, _, value, read)| !is_rounded(*value, *read)).map(say).collect();
+        kept(p)?.into_iter().filter(|(_, _, value, read)| !is_rounded(*value, *read)).map(describe).collect();
     let mut instance = p.ready()?;
     for v in p.inputs() {
         let Some(value) = &v.start else { continue };
@@ -160,12 +150,7 @@ pub(in super::super) fn set_get(p: &Probe) -> Tested {
                 found = get(&mut instance, v)?;
             }
             if found != *value {
-                problems.push(format!(
-                    "the input \"{}\" was set to {} and reads {}",
-                    v.name,
-                    show(value),
-                    show(&found)
-                ));
+                problems.push(format!("the input \"{}\" was set to {} and reads {}", v.name, value, found));
             }
         }
     }
@@ -174,311 +159,9 @@ pub(in super::super) fn set_get(p: &Probe) -> Tested {
 
 pub(in super::super) fn set_get_rounded(p: &Probe) -> Tested {
     let rounded = kept(p)?.into_iter().filter(|(_, _, value, read)| value != read && is_rounded(*value, *read));
-    let say = |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
-    Ok(rounded.map(say).collect())
-}
-
-/// A tunable parameter that acts when it is set before the run acts when it is set during it.
-pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
-    let tunable = |v: &&Variable| v.causality == Causality::Parameter && v.variability == Variability::Tunable;
-    p.comparable()?;
-    let (n, cut) = (p.steps(), p.steps() / 3);
-    p.affordable(12 * n)?;
-    // As far as the FMU goes: some end their run of themselves.
-    let as_far = |instance: &mut Instance, from: usize| -> Vec<Snapshot> {
-        let mut record = Vec::new();
-        for k in from..3 * n {
-            match p.run(instance, k, k + 1) {
-                Ok(mut one) => record.append(&mut one),
-                Err(_) => break,
-            }
-        }
-        record
-    };
-    let mut plain = p.ready()?;
-    let expected = as_far(&mut plain, 0);
-    plain.free();
-    if expected.len() < n {
-        return not_tested("the run is too short");
-    }
-    let (mut problems, mut any) = (Vec::new(), false);
-    for v in p.d.variables.iter().filter(tunable).take(20) {
-        let Some(value) = other(p, v) else { continue };
-        if Some(&value) == v.start.as_ref() {
-            continue;
-        }
-        let _venture = super::super::host::venture();
-        let early = || -> Result<_, HostError> {
-            let mut instance = p.instantiate()?;
-            set(&mut instance, v, &value)?;
-            p.enter(&mut instance)?;
-            instance.exit_initialization()?;
-            p.run(&mut instance, 0, n)
-        };
-        let late = || -> Result<_, HostError> {
-            let mut instance = p.ready()?;
-            p.run(&mut instance, 0, cut)?;
-            set(&mut instance, v, &value)?;
-            Ok(as_far(&mut instance, cut))
-        };
-        // What cannot be set, or fails with that value, is another rule's.
-        let (early, late) = match (early(), late()) {
-            (Err(HostError::OnlyOnce), _) | (_, Err(HostError::OnlyOnce)) => return Err(HostError::OnlyOnce.into()),
-            (Ok(early), Ok(late)) => (early, late),
-            _ => continue,
-        };
-        any = true;
-        let own = [v.value_reference];
-        if p.answers(&expected[..n], &early, &own) && !p.answers(&expected[cut..], &late, &own) {
-            problems.push(format!(
-                "the tunable parameter \"{}\" set to {} during the run changes nothing; set before it, it does",
-                v.name,
-                show(&value)
-            ));
-        }
-    }
-    if any { Ok(problems) } else { not_applicable("there is no tunable parameter with another value to set") }
-}
-
-pub(in super::super) fn get_consistent(p: &Probe) -> Tested {
-    p.comparable()?;
-    let n = p.steps();
-    let mut instance = p.ready()?;
-    for k in 0..n {
-        let read = p.run(&mut instance, k, k + 1)?.swap_remove(0);
-        let again = p.observe(&mut instance)?;
-        if let Some(what) = p.difference(&read, &again) {
-            return Ok(vec![format!("reading twice gives two values: {what} at t = {}", p.time(k + 1))]);
-        }
-        // One by one, backwards.
-        for (o, &expected) in p.observed[0].iter().zip(&read.reals).rev().take(50) {
-            let value = instance.get_real(&[o.reference])?[0];
-            if value != expected && !(value.is_nan() && expected.is_nan()) {
-                return Ok(vec![format!("\"{}\" reads {value} alone, but {expected} among others", o.name)]);
-            }
-        }
-    }
-    let end = p.observe(&mut instance)?;
-    instance.free();
-    let mut quiet = p.ready()?;
-    for k in 0..n {
-        p.drive(&mut quiet, p.time(k))?;
-        quiet.do_step(p.time(k), p.step)?;
-    }
-    let what = p.difference(&p.observe(&mut quiet)?, &end);
-    Ok(what
-        .map(|what| format!("reading values changes the run: {what} when values were read at every step"))
-        .into_iter()
-        .collect())
-}
-
-pub(in super::super) fn boolean_values(p: &Probe) -> Tested {
-    let mut instance = p.ready()?;
-    let booleans: Vec<&Variable> = p.d.variables.iter().filter(|v| v.base() == BaseType::Boolean).collect();
-    if booleans.is_empty() {
-        return not_applicable("there is no Boolean variable");
-    }
-    p.run(&mut instance, 0, 3)?;
-    let references: Vec<u32> = booleans.iter().map(|v| v.value_reference).collect();
-    let say = |v: &Variable, value: i32| format!("\"{}\" is {value}, neither fmi2False (0) nor fmi2True (1)", v.name);
-    let wrong = |values: Vec<i32>| -> Vec<String> {
-        let odd = booleans.iter().zip(values).filter(|(_, value)| !matches!(value, 0 | 1));
-        odd.map(|(v, value)| say(v, value)).collect()
-    };
-    let found = wrong(instance.get_boolean_raw(&references)?);
-    if !found.is_empty() {
-        return Ok(found);
-    }
-    instance.free();
-    let look = |instance: &mut Instance, time: f64| {
-        let first = wrong(instance.get_boolean_raw(&references)?).into_iter().next();
-        Ok(first.map(|said| format!("{said}, at t = {time}")))
-    };
-    Ok(watch(p, false, look)?.into_iter().collect())
-}
-
-pub(in super::super) fn unchanging(p: &Probe) -> Tested {
-    let kept: Vec<&Variable> = p
-        .d
-        .variables
-        .iter()
-        .filter(|v| {
-            matches!(v.variability, Variability::Constant | Variability::Fixed) || v.causality == Causality::Parameter
-        })
-        .take(5000)
-        .collect();
-    if kept.is_empty() {
-        return not_applicable("there is no constant or fixed variable");
-    }
-    let mut instance = p.ready()?;
-    let mut before = Vec::new();
-    for v in &kept {
-        before.push(get(&mut instance, v)?);
-    }
-    p.run(&mut instance, 0, p.steps())?;
-    let mut problems = Vec::new();
-    for (v, before) in kept.iter().zip(before) {
-        let after = get(&mut instance, v)?;
-        let nan = matches!((&before, &after), (Value::Real(x), Value::Real(y)) if x.is_nan() && y.is_nan());
-        if before != after && !nan {
-            problems.push(format!(
-                "the {} variable \"{}\" went from {} to {} during the run",
-                v.variability,
-                v.name,
-                show(&before),
-                show(&after)
-            ));
-        }
-    }
-    Ok(problems)
-}
-
-/// Looks at an instance before each step of the default experiment, as far as time allows, until there is something to
-/// say; `driven` with varying inputs, and then as long as a comparison.
-fn watch(
-    p: &Probe,
-    driven: bool,
-    mut look: impl FnMut(&mut Instance, f64) -> Result<Option<String>, HostError>,
-) -> Result<Option<String>, HostError> {
-    let mut instance = if driven { p.ready()? } else { p.instantiate()? };
-    if !driven {
-        instance.initialize(p.start, None)?;
-    }
-    let stop = p.stop.filter(|_| !driven).unwrap_or_else(|| p.time(p.steps()));
-    let steps = ((stop - p.start) / p.step * (1.0 - 1e-12)).ceil() as usize;
-    let end = std::time::Instant::now() + std::time::Duration::from_millis(150);
-    for k in 0..=steps {
-        let said = look(&mut instance, p.time(k))?;
-        if said.is_some() || k == steps || std::time::Instant::now() > end {
-            return Ok(said);
-        }
-        if driven {
-            p.drive(&mut instance, p.time(k))?;
-        }
-        // A run that ends early has shown what it has.
-        if !instance.do_step_status(p.time(k), p.step, true)?.is_ok() {
-            return Ok(None);
-        }
-    }
-    Ok(None)
-}
-
-pub(in super::super) fn finite(p: &Probe) -> Tested {
-    let outputs: Vec<&Variable> =
-        p.d.variables.iter().filter(|v| v.causality == Causality::Output && v.base() == BaseType::Real).collect();
-    if outputs.is_empty() {
-        return not_applicable("there is no Real output");
-    }
-    let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
-    let look = |instance: &mut Instance, time: f64| {
-        let values = instance.get_real(&references)?;
-        let bad = outputs.iter().zip(values).find(|(_, value)| !value.is_finite());
-        Ok(bad.map(|(v, value)| format!("the output \"{}\" is {value} at t = {time}", v.name)))
-    };
-    let found = watch(p, false, look)?;
-    // Values chosen here count against an FMU that says which ones it takes.
-    let bounded = |v: &Variable| {
-        let r = p.d.resolved(v);
-        v.base() != BaseType::Real || r.min.is_some() && r.max.is_some()
-    };
-    let driven = found.is_none() && p.learned.stimulus && p.inputs().all(bounded);
-    let found = if driven { watch(p, true, look)? } else { found };
-    Ok(found.into_iter().collect())
-}
-
-pub(in super::super) fn range(p: &Probe) -> Tested {
-    let watched: Vec<(&Variable, f64, f64, Vec<i64>)> =
-        p.d.variables
-            .iter()
-            .filter(|v| matches!(v.causality, Causality::Output | Causality::Local))
-            .filter_map(|v| {
-                let r = p.d.resolved(v);
-                let items: Vec<i64> = r.items.iter().map(|i| i.1).collect();
-                let bounded = r.min.is_some() || r.max.is_some() || !items.is_empty();
-                bounded.then(|| (v, r.min.unwrap_or(f64::NEG_INFINITY), r.max.unwrap_or(f64::INFINITY), items))
-            })
-            .take(2000)
-            .collect();
-    if watched.is_empty() {
-        return not_applicable("no calculated variable has a min, a max or items");
-    }
-    let look = |instance: &mut Instance, time: f64| {
-        for (v, low, high, items) in &watched {
-            let value = match get(instance, v)? {
-                Value::Real(x) => x,
-                Value::Integer(i) if !items.is_empty() && !items.contains(&i) => {
-                    return Ok(Some(format!("\"{}\" is {i} at t = {time}, no item of its enumeration", v.name)));
-                }
-                Value::Integer(i) => i as f64,
-                _ => continue,
-            };
-            // A rounding error beyond the limit is none of the user's concern.
-            let slack = 1e-9 * value.abs().max(1.0);
-            if value < low - slack || value > high + slack {
-                return Ok(Some(format!("\"{}\" is {value} at t = {time}, outside {low} to {high}", v.name)));
-            }
-        }
-        Ok(None)
-    };
-    let found = watch(p, false, look)?;
-    // No input makes an enumeration leave its items.
-    let items = watched.iter().any(|(.., items)| !items.is_empty());
-    let driven = found.is_none() && items && p.learned.stimulus;
-    let found = if driven { watch(p, true, look)?.filter(|said| said.contains("no item")) } else { found };
-    Ok(found.into_iter().collect())
-}
-
-fn other(p: &Probe, v: &Variable) -> Option<Value> {
-    match &v.start {
-        Some(Value::Real(_)) => settable_real(p, v).map(Value::Real),
-        Some(Value::Boolean(b)) => Some(Value::Boolean(!b)),
-        other => other.clone(),
-    }
-}
-
-pub(in super::super) fn fixed_set(p: &Probe) -> Tested {
-    let fixed = |v: &&Variable| {
-        matches!(v.causality, Causality::Parameter | Causality::StructuralParameter)
-            && v.variability == Variability::Fixed
-            || v.variability == Variability::Constant
-    };
-    let mut any = false;
-    let mut accepted = Vec::new();
-    for v in p.d.variables.iter().filter(fixed).take(20) {
-        let Some(value) = other(p, v) else { continue };
-        any = true;
-        // A refusal may leave the instance in its error state: a fresh one each time.
-        let mut instance = p.ready()?;
-        p.run(&mut instance, 0, 1)?;
-        if set(&mut instance, v, &value).is_ok() {
-            accepted.push(format!("\"{}\"", v.name));
-        }
-    }
-    if !any {
-        return not_applicable("there is no fixed or constant variable with a start value");
-    }
-    let list = accepted.join(", ");
-    Ok(if accepted.is_empty() {
-        vec![]
-    } else {
-        vec![format!("accepted during the run, though fixed or constant: {list}")]
-    })
-}
-
-pub(in super::super) fn tunable_set(p: &Probe) -> Tested {
-    let tunable = |v: &&Variable| v.causality == Causality::Parameter && v.variability == Variability::Tunable;
-    let mut any = false;
-    let mut problems = Vec::new();
-    for v in p.d.variables.iter().filter(tunable).take(50) {
-        let Some(value) = &v.start else { continue };
-        any = true;
-        let mut instance = p.ready()?;
-        p.run(&mut instance, 0, 1)?;
-        if let Err(error) = set(&mut instance, v, value) {
-            problems.push(format!("the tunable parameter \"{}\" cannot be set during the run: {error}", v.name));
-        }
-    }
-    if any { Ok(problems) } else { not_applicable("there is no tunable parameter") }
+    let describe =
+        |(name, kind, value, read): Kept| format!("the {kind} \"{name}\" was set to {value} and reads {read}");
+    Ok(rounded.map(describe).collect())
 }
 
 /// Every variable of the description is one of the binary.

@@ -5,16 +5,16 @@
 //! report it (see `rules::schema`, which checks every attribute). [`Description::parse`] fails only on a document that
 //! is not well-formed or whose root is not a model description of FMI 2.0 or 3.0.
 
+mod keywords;
 mod read;
 pub mod three;
-mod words;
 
 use super::xml::{Document, Position, XmlError};
 
+pub use keywords::*;
 use read::*;
 pub use read::{parse_boolean, parse_integer, parse_real};
-pub use three::{Cell, Clock, Kind};
-pub use words::*;
+pub use three::{Cell, Clock};
 
 /// Why no description could be read.
 #[derive(Debug, thiserror::Error)]
@@ -69,6 +69,18 @@ pub enum Value {
     Boolean(bool),
     /// Of a String.
     String(String),
+}
+
+impl std::fmt::Display for Value {
+    /// Numbers as Rust writes them, a text in quotes.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Real(x) => x.fmt(f),
+            Self::Integer(x) => x.fmt(f),
+            Self::Boolean(x) => x.fmt(f),
+            Self::String(x) => write!(f, "{x:?}"),
+        }
+    }
 }
 
 /// The `ModelExchange` or `CoSimulation` element.

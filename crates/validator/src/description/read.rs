@@ -80,7 +80,7 @@ pub(super) fn interface(e: &Element) -> Interface {
     }
 }
 
-/// What stands alike in both versions: the root's attributes, units, log categories and default experiment; `token` is
+/// What both versions write alike: the root's attributes, units, log categories and default experiment; `token` is
 /// the version's name of the attribute that binary and XML have in common. The rest is empty.
 pub(super) fn head(root: &Element, fmi: Fmi, token: &str) -> Description {
     Description {
@@ -178,9 +178,9 @@ pub(super) fn variable(e: &Element) -> Variable {
         name: text(e, "name").unwrap_or_default(),
         value_reference: number(e, "valueReference").unwrap_or(u32::MAX),
         description: text(e, "description"),
-        causality: word(e, "causality").unwrap_or(Causality::Local),
-        variability: word(e, "variability").unwrap_or(Variability::Continuous),
-        declared_initial: word(e, "initial"),
+        causality: keyword(e, "causality").unwrap_or(Causality::Local),
+        variability: keyword(e, "variability").unwrap_or(Variability::Continuous),
+        declared_initial: keyword(e, "initial"),
         can_handle_multiple_set: e.get("canHandleMultipleSetPerTimeInstant").and_then(parse_boolean),
         attributes: type_attributes(base, inner, parse_integer),
         declared_type: text(inner, "declaredType"),
@@ -193,7 +193,7 @@ pub(super) fn variable(e: &Element) -> Variable {
     }
 }
 
-pub(super) fn word<T: FromStr>(e: &Element, name: &str) -> Option<T> {
+pub(super) fn keyword<T: FromStr>(e: &Element, name: &str) -> Option<T> {
     e.get(name).and_then(|text| text.parse().ok())
 }
 

@@ -8,109 +8,11 @@
 use std::collections::HashMap;
 
 use super::super::xml::{Element, Position};
-use super::read::{flag, head, number, parse_boolean, parse_real, real, text, type_attributes, word};
+use super::read::{flag, head, keyword, number, parse_boolean, parse_real, real, text, type_attributes};
 use super::{
-    BaseType, Causality, DependencyKind, Description, Fmi, Interface, ModelStructure, SimpleType, TypeAttributes,
+    BaseType, Causality, DependencyKind, Description, Fmi, Interface, Kind, ModelStructure, SimpleType, TypeAttributes,
     Unknown, Value, Variability, Variable,
 };
-
-/// The types of FMI 3.0 (section 2.4.7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs, reason = "the names are the standard's")]
-pub enum Kind {
-    Float32,
-    Float64,
-    Int8,
-    UInt8,
-    Int16,
-    UInt16,
-    Int32,
-    UInt32,
-    Int64,
-    UInt64,
-    Boolean,
-    String,
-    Binary,
-    Enumeration,
-    Clock,
-}
-
-impl Kind {
-    /// Every type, in the order of the standard.
-    pub const ALL: [Self; 15] = [
-        Self::Float32,
-        Self::Float64,
-        Self::Int8,
-        Self::UInt8,
-        Self::Int16,
-        Self::UInt16,
-        Self::Int32,
-        Self::UInt32,
-        Self::Int64,
-        Self::UInt64,
-        Self::Boolean,
-        Self::String,
-        Self::Binary,
-        Self::Enumeration,
-        Self::Clock,
-    ];
-
-    /// The element's name.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Float32 => "Float32",
-            Self::Float64 => "Float64",
-            Self::Int8 => "Int8",
-            Self::UInt8 => "UInt8",
-            Self::Int16 => "Int16",
-            Self::UInt16 => "UInt16",
-            Self::Int32 => "Int32",
-            Self::UInt32 => "UInt32",
-            Self::Int64 => "Int64",
-            Self::UInt64 => "UInt64",
-            Self::Boolean => "Boolean",
-            Self::String => "String",
-            Self::Binary => "Binary",
-            Self::Enumeration => "Enumeration",
-            Self::Clock => "Clock",
-        }
-    }
-
-    /// The type of an element's name.
-    #[must_use]
-    pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.word() == name)
-    }
-
-    /// The type of FMI 2.0 that it is treated as; bytes are texts of hexadecimal digits, as the XML has them.
-    #[must_use]
-    pub fn base(self) -> BaseType {
-        match self {
-            Self::Float32 | Self::Float64 => BaseType::Real,
-            Self::Boolean | Self::Clock => BaseType::Boolean,
-            Self::String | Self::Binary => BaseType::String,
-            Self::Enumeration => BaseType::Enumeration,
-            _ => BaseType::Integer,
-        }
-    }
-
-    /// Smallest and largest value of an integer type.
-    #[must_use]
-    pub fn range(self) -> Option<(i128, i128)> {
-        Some(match self {
-            Self::Int8 => (i8::MIN.into(), i8::MAX.into()),
-            Self::UInt8 => (0, u8::MAX.into()),
-            Self::Int16 => (i16::MIN.into(), i16::MAX.into()),
-            Self::UInt16 => (0, u16::MAX.into()),
-            Self::Int32 => (i32::MIN.into(), i32::MAX.into()),
-            Self::UInt32 => (0, u32::MAX.into()),
-            Self::Int64 | Self::Enumeration => (i64::MIN.into(), i64::MAX.into()),
-            Self::UInt64 => (0, u64::MAX.into()),
-            _ => return None,
-        })
-    }
-}
 
 /// Where a scalar comes from: an element of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,7 +55,7 @@ struct Raw<'a> {
 
 /// Variability, with the standard's defaults (section 2.4.7.4).
 pub(in super::super) fn variability(e: &Element, kind: Kind, causality: Causality) -> Variability {
-    word(e, "variability").unwrap_or(match kind {
+    keyword(e, "variability").unwrap_or(match kind {
         _ if matches!(
             causality,
             Causality::Parameter | Causality::CalculatedParameter | Causality::StructuralParameter
@@ -189,7 +91,7 @@ fn value(kind: Kind, text: &str) -> Option<Value> {
     })
 }
 
-/// A whole number; of 64 bits without a sign, those above the signed range wrap round, as they do on the way to the FMU.
+/// An integer. An unsigned one of 64 bits above the signed range wraps around, as it does in the call of the FMU.
 fn integer(text: &str) -> Option<i64> {
     let text = text.trim();
     text.parse().ok().or_else(|| text.parse::<u64>().ok().map(|x| x as i64))
@@ -281,7 +183,7 @@ impl Description {
         let raw: Vec<Raw<'_>> = all
             .iter()
             .filter_map(|element| {
-                let kind = Kind::parse(&element.name)?;
+                let kind = element.name.parse().ok()?;
                 let sizes = sizes(element, all);
                 let count = sizes.iter().try_fold(1_usize, |n, size| n.checked_mul(*size)).filter(|n| *n <= left)?;
                 left -= count;
@@ -291,7 +193,7 @@ impl Description {
         let clocks = raw.iter().filter(|r| r.kind == Kind::Clock).map(|r| Clock {
             name: text(r.element, "name").unwrap_or_default(),
             reference: r.reference,
-            causality: word(r.element, "causality").unwrap_or(Causality::Local),
+            causality: keyword(r.element, "causality").unwrap_or(Causality::Local),
             interval: text(r.element, "intervalVariability").unwrap_or_default(),
             position: r.element.position,
         });
@@ -346,7 +248,7 @@ impl Description {
 fn types(root: &Element) -> Vec<SimpleType> {
     let all = root.child("TypeDefinitions").into_iter().flat_map(|t| &t.children);
     all.filter_map(|e| {
-        let kind = Kind::parse(e.name.strip_suffix("Type")?)?;
+        let kind = e.name.strip_suffix("Type")?.parse().ok()?;
         Some(SimpleType {
             name: text(e, "name").unwrap_or_default(),
             attributes: attributes(e, kind),
@@ -360,12 +262,12 @@ fn types(root: &Element) -> Vec<SimpleType> {
 fn expand(r: &Raw<'_>, handles: &mut Handles, variables: &mut Vec<Variable>) {
     let e = r.element;
     let count: usize = r.sizes.iter().product();
-    let causality: Causality = word(e, "causality").unwrap_or(Causality::Local);
+    let causality: Causality = keyword(e, "causality").unwrap_or(Causality::Local);
     let starts = starts(e, r.kind);
     let name = text(e, "name").unwrap_or_default();
     let first = variables.len();
     for at in 0..count {
-        // A single start value stands for all elements.
+        // A single start value is that of all elements.
         let start = starts.as_ref().and_then(|s| if s.len() == 1 { s.first() } else { s.get(at) });
         variables.push(Variable {
             name: name.clone() + &indices(&r.sizes, at),
@@ -373,7 +275,7 @@ fn expand(r: &Raw<'_>, handles: &mut Handles, variables: &mut Vec<Variable>) {
             description: text(e, "description"),
             causality,
             variability: variability(e, r.kind, causality),
-            declared_initial: word(e, "initial"),
+            declared_initial: keyword(e, "initial"),
             can_handle_multiple_set: e.get("canHandleMultipleSetPerTimeInstant").and_then(parse_boolean),
             attributes: attributes(e, r.kind),
             declared_type: text(e, "declaredType"),

@@ -4,7 +4,7 @@
 //! here the byte that it is, because an FMU may put any number there. A status comes back as a raw `i32`, because an FMU may return any number.
 
 #![allow(unsafe_code)]
-// The table is the whole interface, whether or not a method stands for each of its functions.
+// The table is the whole interface, whether or not each of its functions has a method.
 #![allow(dead_code)]
 
 use std::ffi::{c_char, c_void};
@@ -30,7 +30,7 @@ pub(crate) struct Callbacks {
 /// `fmi3LogMessageCallback`.
 pub(crate) type LogMessage3 = unsafe extern "C" fn(*mut c_void, RawStatus, Text, Text);
 /// `fmi3IntermediateUpdateCallback`: environment, time, set requested, get allowed, step finished, can return early, and
-/// what the importer answers: early return requested, and at which time.
+/// the importer's reply: early return requested, and at which time.
 pub(crate) type IntermediateUpdate = unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
 
 macro_rules! functions {

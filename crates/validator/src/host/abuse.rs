@@ -132,7 +132,7 @@ impl Instance {
         ok(Call::get_boolean, status).map(|()| values)
     }
 
-    /// `fmi2GetString` with a check of each: `Err` says what is wrong with the text.
+    /// `fmi2GetString` with a check of each: `Err` is what is wrong with the text.
     pub(crate) fn get_string_raw(
         &mut self,
         references: &[u32],

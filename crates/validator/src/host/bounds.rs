@@ -12,9 +12,9 @@ const STRIP: usize = 16;
 /// Memory that ends before a page that cannot be touched.
 struct Guarded {
     #[cfg(unix)]
-    whole: (*mut libc::c_void, usize),
+    mapping: (*mut libc::c_void, usize),
     #[cfg(not(unix))]
-    whole: Vec<u64>,
+    mapping: Vec<u64>,
 }
 
 #[cfg(unix)]
@@ -33,15 +33,15 @@ impl Guarded {
             if at == libc::MAP_FAILED || libc::mprotect(at.byte_add(page), page, libc::PROT_NONE) != 0 {
                 return None;
             }
-            Some(Self { whole: (at, page) })
+            Some(Self { mapping: (at, page) })
         }
     }
 
     /// A copy of the values whose end is that of the memory.
-    fn hold<T: Copy>(&self, values: &[T]) -> *mut T {
+    fn place<T: Copy>(&self, values: &[T]) -> *mut T {
         // SAFETY: the values fit into the first page, whose end is a multiple of their alignment.
         unsafe {
-            let at = self.whole.0.byte_add(self.whole.1 - size_of_val(values)).cast::<T>();
+            let at = self.mapping.0.byte_add(self.mapping.1 - size_of_val(values)).cast::<T>();
             std::ptr::copy_nonoverlapping(values.as_ptr(), at, values.len());
             at
         }
@@ -52,18 +52,18 @@ impl Guarded {
 impl Drop for Guarded {
     fn drop(&mut self) {
         // SAFETY: memory of this value's own.
-        unsafe { libc::munmap(self.whole.0, 2 * self.whole.1) };
+        unsafe { libc::munmap(self.mapping.0, 2 * self.mapping.1) };
     }
 }
 
 #[cfg(not(unix))]
 impl Guarded {
     fn new(size: usize) -> Option<Self> {
-        Some(Self { whole: vec![0; size.div_ceil(8) + 1] })
+        Some(Self { mapping: vec![0; size.div_ceil(8) + 1] })
     }
 
-    fn hold<T: Copy>(&self, values: &[T]) -> *mut T {
-        let at = self.whole.as_ptr().cast_mut().cast::<T>();
+    fn place<T: Copy>(&self, values: &[T]) -> *mut T {
+        let at = self.mapping.as_ptr().cast_mut().cast::<T>();
         // SAFETY: there is room for as many bytes.
         unsafe { std::ptr::copy_nonoverlapping(values.as_ptr(), at, values.len()) };
         at
@@ -74,7 +74,7 @@ type Get<T> = unsafe extern "C" fn(*mut std::ffi::c_void, *const u32, usize, *mu
 type Set<T> = unsafe extern "C" fn(*mut std::ffi::c_void, *const u32, usize, *const T) -> i32;
 
 impl Instance {
-    /// A getter of some references: what it wrote where it must not, as a sentence. What it returns is another rule's.
+    /// A getter of some references: what it wrote where it must not, as a sentence. What it returns is tested by another rule.
     fn get_within<T: Copy + PartialEq>(
         &mut self,
         (function, call): (Option<Get<T>>, Call),
@@ -86,7 +86,7 @@ impl Instance {
         let mut values = vec![mark; n + STRIP];
         let own = references.to_vec();
         note(call);
-        // SAFETY: the arrays are as long as told, and longer.
+        // SAFETY: the arrays are as long as the lengths passed, and longer.
         let status = Status::from(unsafe { function(self.component, own.as_ptr(), n, values.as_mut_ptr()) });
         note(Call::None);
         if values[n..].iter().any(|value| *value != mark) {
@@ -96,10 +96,10 @@ impl Instance {
             return Some(format!("{name} changed the array of value references, which is const"));
         }
         let room = [Guarded::new(size_of_val(references))?, Guarded::new(n * size_of::<T>())?];
-        let pointers = (room[0].hold(references), room[1].hold(&values[..n]));
+        let pointers = (room[0].place(references), room[1].place(&values[..n]));
         if status.is_ok() {
             note(call);
-            // SAFETY: the arrays are as long as told.
+            // SAFETY: the arrays are as long as the lengths passed.
             unsafe { function(self.component, pointers.0, n, pointers.1) };
             note(Call::None);
         }
@@ -110,9 +110,9 @@ impl Instance {
         let Some(function) = function.filter(|_| !references.is_empty()) else { return };
         let room = (Guarded::new(size_of_val(references)), Guarded::new(size_of_val(values)));
         let (Some(first), Some(second)) = room else { return };
-        let pointers = (first.hold(references), second.hold(values));
+        let pointers = (first.place(references), second.place(values));
         note(call);
-        // SAFETY: the arrays are as long as told.
+        // SAFETY: the arrays are as long as the lengths passed.
         unsafe { function(self.component, pointers.0, references.len(), pointers.1) };
         note(Call::None);
     }

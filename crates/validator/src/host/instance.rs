@@ -1,14 +1,13 @@
 //! One instance of an FMU.
 
 use std::collections::HashMap;
-use std::ffi::{CString, c_void};
+use std::ffi::CString;
 use std::sync::Arc;
 use std::sync::PoisonError;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use tempfile::TempDir;
 
-use super::abi::{self, Call, Callbacks, Component, State, Text};
+use super::abi::{self, Call, Callbacks, Component, Text};
 use super::logger::{self, LogMessage, LogSink, lossy};
 use super::three::{self, Layout, Three};
 use super::{Binary, HostError, Status, note};
@@ -49,10 +48,6 @@ impl Default for InstanceOptions {
     }
 }
 
-/// A captured FMU state; free it with [`Instance::free_state`], else it lives until the process ends.
-#[derive(Debug)]
-pub struct StateHandle(pub(crate) State);
-
 /// One instance. Freed when dropped.
 pub struct Instance {
     pub(crate) component: Component,
@@ -62,7 +57,7 @@ pub struct Instance {
     pub(super) three: Option<Three>,
     log: Arc<LogSink>,
     freed: bool,
-    /// Whether steps may be taken back: what is told by `noSetFMUStatePriorToCurrentPoint`, turned round.
+    /// Whether steps may be taken back: the negation of `noSetFMUStatePriorToCurrentPoint`.
     pub(crate) may_go_back: bool,
     // Kept for FMUs that go on using the pointers handed to them.
     pub(super) texts: [Vec<u8>; 3],
@@ -80,22 +75,6 @@ impl std::fmt::Debug for Instance {
 
 // SAFETY: FMI 2.0 allows an instance to be used from any thread, one at a time; the log sink is locked.
 unsafe impl Send for Instance {}
-
-/// Makes every allocation callback fail, to see how an FMU takes it.
-pub(super) static ALLOCATION_FAILS: AtomicBool = AtomicBool::new(false);
-
-unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
-    if ALLOCATION_FAILS.load(Ordering::Relaxed) {
-        return std::ptr::null_mut();
-    }
-    // SAFETY: `calloc` takes any numbers.
-    unsafe { abi::calloc(count.max(1), size.max(1)) }
-}
-
-unsafe extern "C" fn release(memory: *mut c_void) {
-    // SAFETY: the FMU hands back what `allocate` gave, or null.
-    unsafe { abi::free(memory) }
-}
 
 pub(super) fn c_string(text: &str) -> Result<CString, HostError> {
     CString::new(text).map_err(|_| HostError::Nul(text.to_owned()))
@@ -129,66 +108,14 @@ macro_rules! checked {
     };
 }
 
-// Behind the macros, which it uses.
+// Behind the macros, which they use.
+mod make;
+mod states;
 mod values;
 
-/// `fmi2Instantiate`; the texts are name, GUID and resources.
-fn make(
-    binary: &Binary,
-    options: &InstanceOptions,
-    texts: &[Vec<u8>; 3],
-    callbacks: &Callbacks,
-) -> Result<Component, HostError> {
-    let function = binary.functions.instantiate.ok_or(HostError::Missing("fmi2Instantiate"))?;
-    note(Call::instantiate);
-    // SAFETY: all pointers stay valid as long as the instance; co-simulation is 1 in `fmi2Type`.
-    let component = unsafe {
-        let [name, guid, resources] = texts;
-        let flags = (i32::from(options.visible), i32::from(options.logging));
-        function(
-            name.as_ptr().cast(),
-            1,
-            guid.as_ptr().cast(),
-            resources.as_ptr().cast(),
-            &raw const *callbacks,
-            flags.0,
-            flags.1,
-        )
-    };
-    note(Call::None);
-    Ok(component)
-}
-
-/// `fmi3InstantiateCoSimulation`, likewise.
-fn make3(
-    binary: &Binary,
-    options: &InstanceOptions,
-    texts: &[Vec<u8>; 3],
-    environment: *mut c_void,
-) -> Result<Component, HostError> {
-    let function = binary.functions.instantiate3.ok_or(HostError::Missing("fmi3InstantiateCoSimulation"))?;
-    note(Call::instantiate3);
-    // SAFETY: all pointers stay valid as long as the instance; no intermediate variables are asked for.
-    let component = unsafe {
-        let [name, token, resources] = texts;
-        function(
-            name.as_ptr().cast(),
-            token.as_ptr().cast(),
-            resources.as_ptr().cast(),
-            u8::from(options.visible),
-            u8::from(options.logging),
-            u8::from(options.event_mode),
-            u8::from(options.early_return),
-            std::ptr::null(),
-            0,
-            environment,
-            Some(logger::log_message3),
-            Some(three::intermediate_update),
-        )
-    };
-    note(Call::None);
-    Ok(component)
-}
+pub(super) use make::ALLOCATION_FAILS;
+use make::{allocate, make, make3, release};
+pub use states::StateHandle;
 
 impl Instance {
     /// Makes an instance of a loaded binary; `folder` is kept alive as long as the instance.
@@ -239,8 +166,8 @@ impl Instance {
             _folder: folder,
         };
         if component.is_null() {
-            let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
-            return Err(HostError::Refused { function, said: said.join("; ") });
+            let log: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
+            return Err(HostError::Refused { function, log: log.join("; ") });
         }
         Ok(instance)
     }
@@ -388,7 +315,7 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn last_successful_time(&mut self) -> Result<f64, HostError> {
         if self.three.is_some() {
-            return Ok(self.told().time);
+            return Ok(self.step_result().time);
         }
         let mut time = f64::NAN;
         checked!(self, get_real_status(2, &raw mut time)).map(|()| time)
@@ -400,7 +327,7 @@ impl Instance {
     /// See [`Instance::set_debug_logging`].
     pub fn terminated(&mut self) -> Result<bool, HostError> {
         if self.three.is_some() {
-            return Ok(self.told().terminate);
+            return Ok(self.step_result().terminate);
         }
         let mut value = 0;
         checked!(self, get_boolean_status(3, &raw mut value)).map(|()| value != 0)
@@ -414,76 +341,6 @@ impl Instance {
         self.only_two("fmi2GetStatus")?;
         let mut value = -1;
         checked!(self, get_status(0, &raw mut value)).map(|()| Status::from(value))
-    }
-
-    /// `fmi2GetFMUstate`.
-    ///
-    /// # Errors
-    /// See [`Instance::set_debug_logging`].
-    pub fn get_state(&mut self) -> Result<StateHandle, HostError> {
-        let mut state = std::ptr::null_mut();
-        let got = match self.three {
-            Some(_) => checked!(self, get_state3(&raw mut state)),
-            None => checked!(self, get_state(&raw mut state)),
-        };
-        got.map(|()| StateHandle(state))
-    }
-
-    /// `fmi2SetFMUstate`.
-    ///
-    /// # Errors
-    /// See [`Instance::set_debug_logging`].
-    pub fn set_state(&mut self, state: &StateHandle) -> Result<(), HostError> {
-        if self.three.is_some() { checked!(self, set_state3(state.0)) } else { checked!(self, set_state(state.0)) }
-    }
-
-    /// `fmi2FreeFMUstate`.
-    ///
-    /// # Errors
-    /// See [`Instance::set_debug_logging`].
-    pub fn free_state(&mut self, mut state: StateHandle) -> Result<(), HostError> {
-        match self.three {
-            Some(_) => checked!(self, free_state3(&raw mut state.0)),
-            None => checked!(self, free_state(&raw mut state.0)),
-        }
-    }
-
-    /// `fmi2SerializedFMUstateSize` and `fmi2SerializeFMUstate`.
-    ///
-    /// # Errors
-    /// See [`Instance::set_debug_logging`].
-    pub fn serialize_state(&mut self, state: &StateHandle) -> Result<Vec<u8>, HostError> {
-        let mut size = 0;
-        match self.three {
-            Some(_) => checked!(self, serialized_size3(state.0, &raw mut size))?,
-            None => checked!(self, serialized_size(state.0, &raw mut size))?,
-        }
-        // A strip behind the bytes shows whether the FMU keeps to its own size.
-        const STRIP: usize = 64;
-        let mut bytes = vec![0xA5; size + STRIP];
-        match self.three {
-            Some(_) => checked!(self, serialize3(state.0, bytes.as_mut_ptr(), size))?,
-            None => checked!(self, serialize(state.0, bytes.as_mut_ptr(), size))?,
-        }
-        if bytes[size..].iter().any(|&byte| byte != 0xA5) {
-            let three = self.three.is_some();
-            return Err(HostError::Overrun(if three { "fmi3SerializeFMUState" } else { "fmi2SerializeFMUstate" }));
-        }
-        bytes.truncate(size);
-        Ok(bytes)
-    }
-
-    /// `fmi2DeSerializeFMUstate`.
-    ///
-    /// # Errors
-    /// See [`Instance::set_debug_logging`].
-    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<StateHandle, HostError> {
-        let mut state = std::ptr::null_mut();
-        let read = match self.three {
-            Some(_) => checked!(self, deserialize3(bytes.as_ptr(), bytes.len(), &raw mut state)),
-            None => checked!(self, deserialize(bytes.as_ptr(), bytes.len(), &raw mut state)),
-        };
-        read.map(|()| StateHandle(state))
     }
 
     /// `fmi2FreeInstance`, which dropping does too.

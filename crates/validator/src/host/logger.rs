@@ -3,7 +3,7 @@
 //! Stable Rust cannot define a variadic function. On the common 64-bit Unix ABIs (x86-64 System V, AArch64 Linux) a
 //! variadic call passes its arguments as an ordinary one does: integers and pointers in their registers and then on the
 //! stack, floating-point numbers in theirs. So the logger here takes the remaining integer registers, the eight
-//! floating-point registers and some stack slots as plain parameters, and hands them to the C library's `snprintf`,
+//! floating-point registers and some stack slots as literal parameters, and hands them to the C library's `snprintf`,
 //! which picks what the format asks for. Elsewhere the message is recorded as it stands, with its `%` unexpanded.
 
 #![allow(unsafe_code)]
@@ -16,7 +16,7 @@ use super::Status;
 /// A message that the FMU sent to the logger.
 #[derive(Debug, Clone)]
 pub struct LogMessage {
-    /// Name of the instance, as the FMU says.
+    /// Name of the instance, as the FMU passes it.
     pub instance: String,
     /// Status that it reports.
     pub status: Status,
@@ -106,15 +106,15 @@ mod imp {
                 environment: *mut c_void, name: *const c_char, status: i32, category: *const c_char, format: *const c_char,
                 $($slot: Slot,)* $($real: f64,)*
             ) {
-                let plain = format.is_null()
+                let literal = format.is_null()
                     // SAFETY: not null, and a C string by the standard's contract.
                     || !unsafe { std::ffi::CStr::from_ptr(format) }.to_bytes().contains(&b'%');
-                let message = if plain {
+                let message = if literal {
                     // SAFETY: a C string or null.
                     unsafe { lossy(format) }
                 } else {
                     let mut buffer = [0 as c_char; LONGEST];
-                    // SAFETY: the buffer is as long as told; `snprintf` reads the arguments that the FMU passed, in the
+                    // SAFETY: the buffer is as long as the length passed; `snprintf` reads the arguments that the FMU passed, in the
                     // registers and slots where a variadic call puts them (module head).
                     unsafe {
                         snprintf(buffer.as_mut_ptr(), LONGEST, format, $($slot,)* $($real,)*);

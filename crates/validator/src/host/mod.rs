@@ -116,12 +116,12 @@ pub enum HostError {
     #[error("the binary does not export {0}")]
     Missing(&'static str),
     /// `fmi2Instantiate` or `fmi3InstantiateCoSimulation` returned null.
-    #[error("{function} refused to make an instance{}", match said.is_empty() { true => String::new(), false => format!(": {said}") })]
+    #[error("{function} refused to make an instance{}", match log.is_empty() { true => String::new(), false => format!(": {log}") })]
     Refused {
         /// Which function.
         function: &'static str,
         /// What the FMU logged.
-        said: String,
+        log: String,
     },
     /// A call returned neither `fmi2OK` nor `fmi2Warning`.
     #[error("{function} returned {}", spelt(function, *status))]
@@ -280,7 +280,7 @@ unsafe fn open_library(file: &Path, now: bool) -> Result<Library, libloading::Er
 #[cfg(windows)]
 unsafe fn open_library(file: &Path, _now: bool) -> Result<Library, libloading::Error> {
     use libloading::os::windows;
-    // Dependencies are looked for beside the library first.
+    // Dependencies are looked for in the library's folder first.
     // SAFETY: the caller's.
     unsafe { windows::Library::load_with_flags(file, windows::LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Library::from)
 }
@@ -349,7 +349,7 @@ impl Fmu {
         self.description.co_simulation.as_ref().expect("an opened FMU offers co-simulation")
     }
 
-    /// Where the resources are, as the FMU is told when an instance is made.
+    /// Where the resources are, as passed to the FMU when an instance is made.
     #[must_use]
     pub fn resources(&self) -> String {
         resource_location(self.folder.path(), self.description.fmi)

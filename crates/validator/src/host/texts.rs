@@ -140,7 +140,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 const GONE: &str = "in memory that is not the FMU's any more: freed, or on the stack";
 
 /// A value as text, or what is wrong with it.
-fn sound(given: Given<'_>, k: usize, copied: Option<(&[u8], bool)>) -> Result<String, &'static str> {
+fn intact(given: Given<'_>, k: usize, copied: Option<(&[u8], bool)>) -> Result<String, &'static str> {
     match (given, copied) {
         (Given::Strings(_), None) => Err("a null pointer"),
         (Given::Binaries(sizes, _), None) if sizes[k] == NO_SIZE => Err("without a size"),
@@ -153,10 +153,10 @@ fn sound(given: Given<'_>, k: usize, copied: Option<(&[u8], bool)>) -> Result<St
     }
 }
 
-/// What the FMU gave, as texts, each with a check: `Err` says what is wrong with it.
+/// What the FMU gave, as texts, each with a check: `Err` is what is wrong with it.
 pub(super) fn once(given: Given<'_>, mut room: Room) -> Vec<Result<String, &'static str>> {
     room.read(given);
-    (0..given.len()).map(|k| sound(given, k, room.copied(k))).collect()
+    (0..given.len()).map(|k| intact(given, k, room.copied(k))).collect()
 }
 
 /// As `once`, and whether they stay what they are while the FMU is not called. A part of its caller, so that the stack is used
@@ -166,7 +166,7 @@ pub(super) fn steady(given: Given<'_>, [mut first, mut second]: [Room; 2]) -> Ve
     first.read(given);
     read_in_use(&mut second, given);
     let check = |k: usize| match (first.copied(k), second.copied(k)) {
-        (first, second) if first == second => sound(given, k, first),
+        (first, second) if first == second => intact(given, k, first),
         _ => Err(GONE),
     };
     (0..given.len()).map(check).collect()
@@ -214,6 +214,6 @@ mod tests {
         assert_eq!(room.copied(0), Some((&b"freed"[..], true)));
         // As if the copy had been made of what came there since.
         room.bytes[0] = b'F';
-        assert_eq!(sound(Given::Strings(&[text.as_ptr().cast()]), 0, room.copied(0)), Err(GONE));
+        assert_eq!(intact(Given::Strings(&[text.as_ptr().cast()]), 0, room.copied(0)), Err(GONE));
     }
 }

@@ -16,9 +16,9 @@ use crate::description::Value;
 pub use layout::Layout;
 use layout::Plan;
 
-/// What a step told beside its status.
+/// The output arguments of a step, without its status.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Told {
+pub(crate) struct StepResult {
     /// `eventHandlingNeeded`.
     pub event: bool,
     /// `terminateSimulation`.
@@ -29,18 +29,18 @@ pub(crate) struct Told {
     pub time: f64,
 }
 
-/// What an instance of FMI 3.0 has beside one of 2.0.
+/// What an instance of FMI 3.0 has in addition to one of 2.0.
 pub(super) struct Three {
     pub layout: Arc<Layout>,
     /// Tolerance, start and stop time, which go with `fmi3EnterInitializationMode`.
     pub experiment: (Option<f64>, f64, Option<f64>),
-    /// Whether `eventModeUsed` was said.
+    /// Whether `eventModeUsed` was passed.
     pub event_mode: bool,
     /// Before initialisation: values cannot be read.
     fresh: bool,
     /// Elements of arrays set since.
     drafts: HashMap<u32, Vec<Value>>,
-    pub told: Told,
+    pub step_result: StepResult,
     plan: Plan,
 }
 
@@ -81,7 +81,7 @@ impl Three {
             event_mode,
             fresh: true,
             drafts: HashMap::new(),
-            told: Told::default(),
+            step_result: StepResult::default(),
             plan: Plan::default(),
         }
     }
@@ -90,7 +90,7 @@ impl Three {
     pub fn renew(&mut self) {
         self.fresh = true;
         self.drafts.clear();
-        self.told = Told::default();
+        self.step_result = StepResult::default();
     }
 }
 
@@ -142,7 +142,7 @@ impl Instance {
                 )
             )?;
             if let Some(three) = &mut self.three {
-                three.told.terminate |= terminate != 0;
+                three.step_result.terminate |= terminate != 0;
             }
             if again == 0 || terminate != 0 {
                 return Ok(());
@@ -172,7 +172,7 @@ impl Instance {
         call!(self, exit_configuration_mode())
     }
 
-    /// `fmi3DoStep`. A step after which the FMU asks for the end is [`Status::Discard`], as FMI 2.0 says it.
+    /// `fmi3DoStep`. A step after which the FMU asks for the end is [`Status::Discard`], as in FMI 2.0.
     pub(super) fn do_step3(&mut self, time: f64, step: f64, no_set_prior: bool) -> Result<Status, HostError> {
         let function = self.binary.functions.do_step3.ok_or(HostError::Missing("fmi3DoStep"))?;
         // What the FMU must write; values that are no booleans and no time show that it did not.
@@ -194,18 +194,18 @@ impl Instance {
         note(Call::None);
         let status = status_of(status);
         let Some(three) = &mut self.three else { return Ok(status) };
-        three.told = Told { event: event == 1, terminate: terminate == 1, early: early == 1, time: last };
-        three.told.unset(event, terminate, early);
-        Ok(if status.is_ok() && three.told.terminate { Status::Discard } else { status })
+        three.step_result = StepResult { event: event == 1, terminate: terminate == 1, early: early == 1, time: last };
+        three.step_result.unset(event, terminate, early);
+        Ok(if status.is_ok() && three.step_result.terminate { Status::Discard } else { status })
     }
 
-    /// What the last step told.
-    pub(crate) fn told(&self) -> Told {
-        self.three.as_ref().map_or(Told::default(), |three| three.told)
+    /// The output arguments of the last step.
+    pub(crate) fn step_result(&self) -> StepResult {
+        self.three.as_ref().map_or(StepResult::default(), |three| three.step_result)
     }
 }
 
-impl Told {
+impl StepResult {
     /// Outputs that are no booleans: the FMU did not write them.
     fn unset(&mut self, event: u8, terminate: u8, early: u8) {
         if [event, terminate, early].iter().any(|flag| *flag > 1) {

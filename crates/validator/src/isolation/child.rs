@@ -1,4 +1,4 @@
-//! The child's side: receives an order, does the job, answers, and leaves without running exit handlers.
+//! The child's side: receives an order, does the job, replies, and ends without running exit handlers.
 
 #![allow(unsafe_code)]
 
@@ -24,9 +24,9 @@ mod unix {
     use super::super::super::description::Description;
     use super::super::super::host::{Fmu, HostError};
     use super::super::super::rules::{self, Check, id};
-    use super::super::super::simulate::{self, Record};
+    use super::super::super::simulate::{self, SimulationResult};
     use super::super::super::xml::Document;
-    use super::super::job::{Answer, Head, Job, Nonce, Order, RunTask, Task, numbers, send_numbers};
+    use super::super::job::{Head, Job, Nonce, Order, Reply, RunTask, Task, numbers, send_numbers};
     use super::super::page::{Mapped, Page};
     use super::super::sandbox;
 
@@ -46,37 +46,37 @@ mod unix {
     }
 
     fn attempt() -> io::Result<()> {
-        let mut line = Line::take()?;
-        let order = Order::receive(&mut line.socket)?;
+        let mut channel = Channel::take()?;
+        let order = Order::receive(&mut channel.socket)?;
         // A session of its own: no terminal, and a group that the parent can kill as a whole.
         // SAFETY: the call takes nothing.
         unsafe { libc::setsid() };
         limit(&order);
         let page = Mapped::open(&order.page)?.publish();
-        tell_faults(page, order.nonce);
+        report_panics(page, order.nonce);
         if let Some(fence) = &order.fence {
             let strength = sandbox::raise(fence, &page.refused);
             page.strength.store(strength as u32, Ordering::Relaxed);
         }
         let at_once = !matches!(&order.job, Job::Rule(task) if task.rule == id::UNLOAD.text());
-        let (answer, record) = match order.job {
+        let (reply, record) = match order.job {
             Job::Rule(task) => (rule(task)?, None),
             Job::Simulate(task) => match simulation(&task) {
-                Ok(record) => (Answer { record: Some(Head::of(&record)), ..Answer::default() }, Some(record)),
-                Err(error) => (Answer { error: Some(error), ..Answer::default() }, None),
+                Ok(record) => (Reply { record: Some(Head::of(&record)), ..Reply::default() }, Some(record)),
+                Err(error) => (Reply { error: Some(error), ..Reply::default() }, None),
             },
         };
-        line.answer(&answer, record.as_ref(), &order.nonce, page)?;
+        channel.reply(&reply, record.as_ref(), &order.nonce, page)?;
         leave(at_once);
         Ok(())
     }
 
-    /// Lets a panic of this program's own code, in any thread, be told as one: else the parent sees no more than an exit
-    /// code, and takes it for the FMU's. An FMU in Rust has a standard library of its own, and panics past this.
-    fn tell_faults(page: &'static Page, nonce: Nonce) {
+    /// Reports a panic of this program's own code, in any thread, to the parent: from the exit code alone the parent would
+    /// take it for a fault of the FMU. An FMU in Rust has a standard library of its own, and panics past this.
+    fn report_panics(page: &'static Page, nonce: Nonce) {
         std::panic::set_hook(Box::new(move |panic| {
-            let answer = Answer { fault: Some(panic.to_string().replace('\n', " ")), ..Answer::default() };
-            if let Ok(bytes) = answer.encode(&nonce, 0) {
+            let reply = Reply { fault: Some(panic.to_string().replace('\n', " ")), ..Reply::default() };
+            if let Ok(bytes) = reply.encode(&nonce, 0) {
                 page.put(&bytes);
             }
             // SAFETY: ends the process. Unwinding would call into the FMU, whose fault a crash there would seem.
@@ -84,14 +84,14 @@ mod unix {
         }));
     }
 
-    /// The socket to the parent, where nobody looks for it.
-    struct Line {
+    /// The socket to the parent, under a descriptor that an FMU does not use by mistake.
+    struct Channel {
         socket: UnixStream,
-        /// What the socket is, to tell when the FMU has put something else in its place.
+        /// Inode of the socket, by which a descriptor that the FMU has replaced is noticed.
         inode: u64,
     }
 
-    impl Line {
+    impl Channel {
         fn take() -> io::Result<Self> {
             // SAFETY: standard input is open and a socket of ours; the copy is a descriptor of ours.
             let copy = unsafe {
@@ -104,9 +104,9 @@ mod unix {
             let nothing = File::open("/dev/null")?;
             // SAFETY: both descriptors are open.
             unsafe { libc::dup2(nothing.as_raw_fd(), 0) };
-            let mut line = Self { socket: UnixStream::from(copy), inode: 0 };
-            line.inode = line.now().unwrap_or(0);
-            Ok(line)
+            let mut channel = Self { socket: UnixStream::from(copy), inode: 0 };
+            channel.inode = channel.now().unwrap_or(0);
+            Ok(channel)
         }
 
         fn now(&self) -> Option<u64> {
@@ -117,9 +117,15 @@ mod unix {
             }
         }
 
-        fn answer(&mut self, answer: &Answer, record: Option<&Record>, nonce: &Nonce, page: &Page) -> io::Result<()> {
+        fn reply(
+            &mut self,
+            reply: &Reply,
+            record: Option<&SimulationResult>,
+            nonce: &Nonce,
+            page: &Page,
+        ) -> io::Result<()> {
             if self.now() == Some(self.inode) {
-                let head = answer.encode(nonce, record.map_or(0, numbers))?;
+                let head = reply.encode(nonce, record.map_or(0, numbers))?;
                 self.socket.write_all(&head)?;
                 return record.map_or(Ok(()), |record| send_numbers(record, &mut self.socket));
             }
@@ -127,12 +133,12 @@ mod unix {
             std::mem::forget(std::mem::replace(&mut self.socket, UnixStream::pair()?.0));
             let (_, last) = page.call();
             let error = format!("the FMU closed descriptors of its host's process; {last} was called last");
-            let answer = Answer { error: record.map(|_| error), record: None, ..answer.clone() };
-            if page.put(&answer.encode(nonce, 0)?) { Ok(()) } else { Err(io::Error::other("too long an answer")) }
+            let reply = Reply { error: record.map(|_| error), record: None, ..reply.clone() };
+            if page.put(&reply.encode(nonce, 0)?) { Ok(()) } else { Err(io::Error::other("too long an answer")) }
         }
     }
 
-    fn rule(task: Task) -> io::Result<Answer> {
+    fn rule(task: Task) -> io::Result<Reply> {
         let xml = std::fs::read(task.folder.join("modelDescription.xml"))?;
         // Whether the version is spelt right is a rule of its own.
         let description = Description::from_document(&Document::parse(&xml).map_err(io::Error::other)?);
@@ -142,13 +148,13 @@ mod unix {
         let Task { folder, binary_path, workplace, learned, .. } = task;
         let setup = Setup { description, folder, binary_path, workplace, learned };
         let (tested, learned) = behaviour::run(test, &setup);
-        let mut answer = Answer { learned, ..Answer::default() };
+        let mut reply = Reply { learned, ..Reply::default() };
         match tested {
-            Ok(findings) => answer.findings = findings.into_iter().map(|message| (message, None)).collect(),
-            Err(Stop::NotApplicable(why)) => answer.not_applicable = Some(why),
-            Err(Stop::NotTested(why)) => answer.not_tested = Some(why),
+            Ok(findings) => reply.findings = findings.into_iter().map(|message| (message, None)).collect(),
+            Err(Stop::NotApplicable(why)) => reply.not_applicable = Some(why),
+            Err(Stop::NotTested(why)) => reply.not_tested = Some(why),
             Err(Stop::Host(error)) if matches!(test, Behaviour::Indirect(_)) => {
-                answer.not_tested = Some(error.to_string())
+                reply.not_tested = Some(error.to_string())
             }
             Err(Stop::Host(error)) => {
                 let call = match &error {
@@ -156,13 +162,13 @@ mod unix {
                     HostError::Refused { function, .. } => Some((*function).to_owned()),
                     _ => None,
                 };
-                answer.findings = vec![(error.to_string(), call)];
+                reply.findings = vec![(error.to_string(), call)];
             }
         }
-        Ok(answer)
+        Ok(reply)
     }
 
-    fn simulation(task: &RunTask) -> Result<Record, String> {
+    fn simulation(task: &RunTask) -> Result<SimulationResult, String> {
         let xml = std::fs::read(task.folder.join("modelDescription.xml")).map_err(|error| error.to_string())?;
         let description = Description::parse(&xml).map_err(|error| error.to_string())?;
         let fmu = Fmu::in_folder(&task.folder, description).map_err(|error| error.to_string())?;
@@ -202,7 +208,7 @@ mod unix {
         // SAFETY: the option takes a signal number; the other call takes nothing.
         unsafe {
             libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL);
-            // The parent may have ended before that was said.
+            // The parent may have ended before the option was set.
             if libc::getppid() as u32 != order.parent {
                 libc::_exit(2);
             }

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::super::behaviour::probe::Learned;
-use super::super::simulate::{Column, Inputs, Options, Record};
+use super::super::simulate::{Column, Inputs, Options, SimulationResult};
 use super::Fence;
 
 /// Longest JSON that either side reads, in bytes.
 const LONGEST: u64 = 256 << 20;
 
-/// The number that goes with an answer.
+/// The number that goes with a reply.
 pub(super) type Nonce = [u8; 16];
 
 /// A behavioural rule to test.
@@ -60,7 +60,7 @@ pub(crate) struct Order {
 
 /// What a child found.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(crate) struct Answer {
+pub(crate) struct Reply {
     /// Findings, each with the call at fault.
     pub findings: Vec<(String, Option<String>)>,
     pub not_tested: Option<String>,
@@ -74,7 +74,7 @@ pub(crate) struct Answer {
     pub fault: Option<String>,
 }
 
-impl Answer {
+impl Reply {
     /// The fault as a sentence; `None` where the child's own code did what it should.
     pub fn internal_error(&self) -> Option<String> {
         let fault = self.fault.as_ref()?;
@@ -93,13 +93,13 @@ pub(crate) struct Head {
 }
 
 impl Head {
-    pub fn of(record: &Record) -> Self {
+    pub fn of(record: &SimulationResult) -> Self {
         let columns = record.columns.iter().map(|c| (c.name.clone(), c.unit.clone(), c.input)).collect();
         Self { step: record.step, notes: record.notes.clone(), columns, rows: record.time.len() }
     }
 
     /// The record, from the numbers of [`numbers`].
-    pub fn record(self, mut bytes: &[u8]) -> Option<Record> {
+    pub fn record(self, mut bytes: &[u8]) -> Option<SimulationResult> {
         let rows = self.rows;
         if bytes.len() as u64 != (self.columns.len() as u64 + 1) * rows as u64 * 8 {
             return None;
@@ -112,7 +112,7 @@ impl Head {
         let time = next();
         let columns = self.columns.into_iter().map(|(name, unit, input)| Column { name, unit, values: next(), input });
         let columns = columns.collect();
-        Some(Record { time, step: self.step, columns, notes: self.notes })
+        Some(SimulationResult { time, step: self.step, columns, notes: self.notes })
     }
 }
 
@@ -169,8 +169,8 @@ impl Order {
     }
 }
 
-impl Answer {
-    /// The answer's head: the number, and the lengths of JSON and numbers.
+impl Reply {
+    /// The reply's head: the number, and the lengths of JSON and numbers.
     pub fn encode(&self, nonce: &Nonce, numbers: u64) -> io::Result<Vec<u8>> {
         let json = serde_json::to_vec(self)?;
         let mut out = nonce.to_vec();
@@ -180,7 +180,7 @@ impl Answer {
         Ok(out)
     }
 
-    /// Reads an answer, and the numbers behind it; `None` when it is not whole.
+    /// Reads a reply, and the numbers behind it; `None` when it is not complete.
     pub fn decode(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (lengths, rest) = bytes.get(size_of::<Nonce>()..)?.split_at_checked(16)?;
         let json = u64::from_ne_bytes(lengths[..8].try_into().ok()?);
@@ -189,48 +189,48 @@ impl Answer {
     }
 }
 
-/// What has come so far.
+/// The state of a reply of which some bytes have been received.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Received {
     /// More is to come.
-    Part,
-    /// A whole answer.
-    Whole,
-    /// No answer to this order.
+    Partial,
+    /// A complete reply.
+    Complete,
+    /// No reply to this order.
     Forged,
 }
 
-/// How many bytes are still to come of a whole answer; 0 where that is not known yet.
+/// How many bytes are still to come of a complete reply; 0 where that is not known yet.
 pub(super) fn rest(bytes: &[u8], nonce: &Nonce) -> u64 {
     let length = |at: usize| bytes.get(at..at + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_ne_bytes);
     match classify(bytes, nonce) {
-        Received::Part if bytes.len() >= 32 => {
+        Received::Partial if bytes.len() >= 32 => {
             length(16).saturating_add(length(24)).saturating_add(32).saturating_sub(bytes.len() as u64)
         }
         _ => 0,
     }
 }
 
-/// Judges what has come.
+/// Classifies the bytes received so far.
 pub(super) fn classify(bytes: &[u8], nonce: &Nonce) -> Received {
     let head = bytes.len().min(nonce.len());
     if bytes[..head] != nonce[..head] {
         return Received::Forged;
     }
     let length = |at: usize| bytes.get(at..at + 8).and_then(|b| b.try_into().ok()).map(u64::from_ne_bytes);
-    let (Some(json), Some(numbers)) = (length(16), length(24)) else { return Received::Part };
+    let (Some(json), Some(numbers)) = (length(16), length(24)) else { return Received::Partial };
     if json > LONGEST {
         return Received::Forged;
     }
     match (bytes.len() as u64).cmp(&json.saturating_add(numbers).saturating_add(32)) {
-        std::cmp::Ordering::Less => Received::Part,
-        std::cmp::Ordering::Equal => Received::Whole,
+        std::cmp::Ordering::Less => Received::Partial,
+        std::cmp::Ordering::Equal => Received::Complete,
         std::cmp::Ordering::Greater => Received::Forged,
     }
 }
 
 /// Writes the numbers of a record: the time, then each column.
-pub(super) fn send_numbers(record: &Record, out: &mut impl Write) -> io::Result<()> {
+pub(super) fn send_numbers(record: &SimulationResult, out: &mut impl Write) -> io::Result<()> {
     let columns = std::iter::once(&record.time).chain(record.columns.iter().map(|c| &c.values));
     for column in columns {
         for part in column.chunks(1 << 14) {
@@ -241,7 +241,7 @@ pub(super) fn send_numbers(record: &Record, out: &mut impl Write) -> io::Result<
 }
 
 /// How many bytes [`send_numbers`] writes.
-pub(super) fn numbers(record: &Record) -> u64 {
+pub(super) fn numbers(record: &SimulationResult) -> u64 {
     (record.columns.len() as u64 + 1) * record.time.len() as u64 * 8
 }
 
@@ -268,14 +268,14 @@ mod tests {
 
         let column =
             Column { name: "y".into(), unit: Some("m".into()), values: vec![3.0, f64::INFINITY], input: false };
-        let record = Record { time: vec![0.0, 1.0], step: 1.0, columns: vec![column], notes: vec![] };
-        let answer = Answer { record: Some(Head::of(&record)), ..Answer::default() };
-        let mut bytes = answer.encode(&order.nonce, numbers(&record)).unwrap();
-        assert_eq!(classify(&bytes, &order.nonce), Received::Part);
+        let record = SimulationResult { time: vec![0.0, 1.0], step: 1.0, columns: vec![column], notes: vec![] };
+        let reply = Reply { record: Some(Head::of(&record)), ..Reply::default() };
+        let mut bytes = reply.encode(&order.nonce, numbers(&record)).unwrap();
+        assert_eq!(classify(&bytes, &order.nonce), Received::Partial);
         send_numbers(&record, &mut bytes).unwrap();
-        assert_eq!(classify(&bytes, &order.nonce), Received::Whole);
-        let (answer, rest) = Answer::decode(&bytes).unwrap();
-        assert_eq!(answer.record.unwrap().record(rest).unwrap(), record);
+        assert_eq!(classify(&bytes, &order.nonce), Received::Complete);
+        let (reply, rest) = Reply::decode(&bytes).unwrap();
+        assert_eq!(reply.record.unwrap().record(rest).unwrap(), record);
         bytes.push(0);
         assert_eq!(classify(&bytes, &order.nonce), Received::Forged);
         assert_eq!(classify(b"{}", &order.nonce), Received::Forged);

@@ -3,7 +3,7 @@
 //! The program starts itself again and hands the child a job through a socket that the child inherits as its standard
 //! input and moves out of the way before the FMU's library is loaded. The child leaves the terminal, limits its own
 //! memory and files, raises the fence of [`sandbox`] where asked, notes in a page of shared memory which FMI function it
-//! is calling ([`page`]), and answers through the socket with a number that it was told once, so that nothing an FMU
+//! is calling ([`page`]), and replies through the socket with a number that it received once, so that nothing an FMU
 //! prints, writes or sends is taken for a result by mistake. (Code in the child's own memory can find that number: what
 //! stays possible inside one process is written in the README.) The parent reads, watches over time and disk ([`watch`]),
 //! and afterwards kills the child's whole session.
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 pub use child::child;
-pub(crate) use job::{Answer, Job, RunTask, Task};
+pub(crate) use job::{Job, Reply, RunTask, Task};
 pub use orphans::{adopt_orphans, end_orphans};
 pub(crate) use page::Page;
 pub use sandbox::{Fence, Strength};
@@ -44,7 +44,7 @@ pub(crate) enum Ended {
     Slow(Duration),
     /// Wrote more to the disk than allowed, in bytes.
     Disk(u64),
-    /// Wrote to the socket on which the answer is expected.
+    /// Wrote to the socket on which the reply is expected.
     Forges,
 }
 
@@ -55,12 +55,12 @@ impl Ended {
     }
 }
 
-/// What became of a child.
+/// How a child ended, and what it left.
 #[derive(Debug)]
 pub(crate) struct Outcome {
     pub ended: Ended,
-    /// What it answered: as [`Answer`] is encoded.
-    pub answer: Option<Vec<u8>>,
+    /// What it replied: as [`Reply`] is encoded.
+    pub reply: Option<Vec<u8>>,
     /// The FMI function under way at the end.
     pub call: &'static str,
     /// The FMI function called last.
@@ -71,7 +71,7 @@ pub(crate) struct Outcome {
     pub longest: Duration,
     /// What the sandbox refused first.
     pub refused: Option<&'static str>,
-    /// How much of the sandbox stood.
+    /// How much of the sandbox was in force.
     pub strength: Strength,
     /// The beginning of what it printed.
     pub stdout: String,
@@ -99,14 +99,14 @@ impl Default for Bounds {
 
 /// Where and how a child runs.
 pub(crate) struct Place<'a> {
-    /// This program, which answers to [`child()`].
+    /// This program, which calls [`child()`].
     pub program: &'a Path,
     /// A folder for this child alone, which the FMU cannot write to.
     pub scratch: PathBuf,
     /// What the FMU may touch; the child runs without a fence where `None`.
     pub fence: Option<Fence>,
     pub bounds: Bounds,
-    /// Whether the C library is to tell exactly how much memory is in use.
+    /// Whether the C library must count exactly how much memory is in use.
     pub exact_heap: bool,
 }
 

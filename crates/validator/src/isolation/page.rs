@@ -1,4 +1,4 @@
-//! A page of memory that parent and child share: which FMI function is under way, and an answer where the pipe is gone.
+//! A page of memory that parent and child share: which FMI function is under way, and a reply where the pipe is gone.
 
 #![allow(unsafe_code)]
 
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use super::super::host::CALL_SLOT;
 use super::super::host::abi::CALLS;
 
-/// Longest answer that fits, in bytes.
+/// Longest reply that fits, in bytes.
 pub(super) const ROOM: usize = 1 << 18;
 
 /// What is shared. Every field may hold anything: an FMU can write here too.
@@ -26,11 +26,11 @@ pub(crate) struct Page {
     pub refused: AtomicU32,
     /// Whether values are in use that the validator chose: an FMU may not bear them.
     pub venture: AtomicU32,
-    /// How much of the sandbox stands: see [`super::sandbox::Strength`].
+    /// How much of the sandbox is in force: see [`super::sandbox::Strength`].
     pub strength: AtomicU32,
-    /// Length of the answer.
+    /// Length of the reply.
     length: AtomicU64,
-    answer: [AtomicU64; ROOM / 8],
+    reply: [AtomicU64; ROOM / 8],
 }
 
 impl Page {
@@ -40,12 +40,12 @@ impl Page {
         (name(self.call.load(Ordering::Relaxed)), name(self.last.load(Ordering::Relaxed)))
     }
 
-    /// Leaves an answer here.
+    /// Leaves a reply here.
     pub fn put(&self, bytes: &[u8]) -> bool {
         if bytes.len() > ROOM {
             return false;
         }
-        for (word, chunk) in self.answer.iter().zip(bytes.chunks(8)) {
+        for (word, chunk) in self.reply.iter().zip(bytes.chunks(8)) {
             let mut eight = [0; 8];
             eight[..chunk.len()].copy_from_slice(chunk);
             word.store(u64::from_ne_bytes(eight), Ordering::Relaxed);
@@ -54,10 +54,10 @@ impl Page {
         true
     }
 
-    /// The answer left here.
+    /// The reply left here.
     pub fn take(&self) -> Vec<u8> {
         let length = (self.length.load(Ordering::Acquire) as usize).min(ROOM);
-        let words = self.answer.iter().take(length.div_ceil(8)).flat_map(|w| w.load(Ordering::Relaxed).to_ne_bytes());
+        let words = self.reply.iter().take(length.div_ceil(8)).flat_map(|w| w.load(Ordering::Relaxed).to_ne_bytes());
         words.take(length).collect()
     }
 }

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// What an FMU may touch beside the system's libraries.
+/// What an FMU may access in addition to the system's libraries.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Fence {
     /// Files and folders it may read.
@@ -23,7 +23,7 @@ pub struct Fence {
     pub write: Vec<PathBuf>,
 }
 
-/// How much of the fence stands.
+/// How much of the fence is in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strength {
     /// None was asked for.
@@ -46,7 +46,7 @@ impl Strength {
             .unwrap_or(Self::None)
     }
 
-    /// What a user must know, where the fence is not whole.
+    /// What a user must know, where the fence is not complete.
     #[must_use]
     pub fn gap(self) -> Option<&'static str> {
         match self {
@@ -76,7 +76,7 @@ pub(crate) fn configured() -> Vec<PathBuf> {
     if let Some(value) = std::env::var_os("LD_PRELOAD") {
         let text = value.to_string_lossy().into_owned();
         let files = text.split([':', ' ']).filter(|f| !f.is_empty()).map(PathBuf::from);
-        // A library's companions lie beside it.
+        // A library's companions lie in its folder.
         found.extend(files.filter_map(|f| Some(f.canonicalize().ok()?.parent()?.to_owned())));
     }
     let home = std::env::var_os("HOME").map(PathBuf::from);
@@ -84,7 +84,7 @@ pub(crate) fn configured() -> Vec<PathBuf> {
     found
 }
 
-/// A system call in words, for the one that was refused.
+/// A description of a system call, for the one that was refused.
 pub(crate) fn wanted(call: u32) -> &'static str {
     #[cfg(target_os = "linux")]
     {
@@ -131,7 +131,7 @@ mod linux {
 
     use super::{Fence, Strength};
 
-    /// What every program needs to run, and nothing that says who uses the machine.
+    /// What every program needs to run, and nothing that identifies the user of the machine.
     const SYSTEM: [&str; 27] = [
         "/usr",
         "/lib",
@@ -165,7 +165,7 @@ mod linux {
     /// Devices that take and give nothing.
     const DEVICES: [&str; 3] = ["/dev/null", "/dev/zero", "/dev/full"];
 
-    /// Raises the fence around this process; `refused` is told of the first call that it stops.
+    /// Raises the fence around this process; `refused` receives the first call that it stops.
     pub(crate) fn raise(fence: &Fence, refused: &'static AtomicU32) -> Strength {
         match (files(fence).is_ok_and(|whole| whole), calls(refused)) {
             (true, true) => Strength::Full,
@@ -197,7 +197,7 @@ mod linux {
     fn calls(refused: &'static AtomicU32) -> bool {
         let Ok(arch) = std::env::consts::ARCH.try_into() else { return false };
         let (Ok(trapped), Ok(quiet)) = (trapped(), quiet()) else { return false };
-        // What an FMU asked for in vain is told, where the registers of a signal frame are known.
+        // The refused call is reported, where the registers of a signal frame are known.
         let action = if watch(refused) { SeccompAction::Trap } else { SeccompAction::Errno(libc::EPERM as u32) };
         let filter = |rules, action| {
             let filter = SeccompFilter::new(rules, SeccompAction::Allow, action, arch).ok()?;
@@ -220,7 +220,7 @@ mod linux {
     /// Types into the terminal.
     const TIOCSTI: u64 = 0x5412;
 
-    /// Calls that look as if the kernel had not got them; the C library has another way.
+    /// Calls that return ENOSYS, as on a kernel without them; the C library falls back to others.
     fn absent() -> Rules {
         always(&[libc::SYS_clone3, libc::SYS_memfd_create, libc::SYS_io_uring_setup])
     }
@@ -273,7 +273,7 @@ mod linux {
 
     /// Calls that change rights, look at or leave things behind in the kernel, or slow others down; libraries make them in
     /// passing and live with a no. Which processors a younger process runs on stays open: a thread of this one is bound by the
-    /// same call, under a number that cannot be told from others'.
+    /// same call, under a number that cannot be distinguished from those of others.
     fn quiet() -> seccompiler::Result<Rules> {
         let mut all = vec![
             libc::SYS_fchmod,
@@ -300,7 +300,7 @@ mod linux {
             libc::SYS_msgrcv,
             libc::SYS_mq_open,
             libc::SYS_mq_unlink,
-            // What happens in a folder is told without a right to read it.
+            // Changes in a folder are reported without a right to read it.
             libc::SYS_inotify_add_watch,
             libc::SYS_fanotify_init,
             // fchmodat2, which the C library's bindings do not name everywhere.
@@ -329,7 +329,7 @@ mod linux {
         Ok(rules)
     }
 
-    /// Calls that are refused, and told.
+    /// Calls that are refused and reported.
     fn trapped() -> seccompiler::Result<Rules> {
         let mut rules = always(&[
             libc::SYS_socket,

@@ -6,7 +6,7 @@ use std::sync::{Once, OnceLock};
 
 use tempfile::TempDir;
 
-/// What begins the name of every temporary folder; whose process numbers are meant and the process' number follow.
+/// Beginning of the name of every temporary folder; the system that the process numbers are of and the process' number follow.
 const PREFIX: &str = "eixo-fmu-";
 /// A folder this old belongs to nobody, whatever process has its number now, s.
 const ABANDONED: u64 = 24 * 3600;
@@ -72,9 +72,9 @@ pub(super) fn size(folder: &Path) -> u64 {
     below(folder, 0)
 }
 
-/// As [`size`], of a folder that was come to by so many handles.
+/// As [`size`], of a folder that `depth` open handles lead to.
 fn below(folder: &Path, handles: usize) -> u64 {
-    /// What a name and what is known of a file take beside its content, about.
+    /// Bytes that the name and the metadata of a file take, about.
     const ENTRY: u64 = 512;
     /// Handles that are open at once.
     const MOST: usize = 200;

@@ -1,4 +1,4 @@
-//! The parent's side: starts a child, reads its answer and what it prints, watches over time and disk, and ends it.
+//! The parent's side: starts a child, reads its reply and what it prints, watches over time and disk, and ends it.
 
 #![allow(unsafe_code)]
 #![cfg(unix)]
@@ -17,10 +17,10 @@ use super::{Ended, Outcome, Place, removal, temporary};
 
 /// Most that is kept of what a child prints, in bytes.
 const MOST_OUTPUT: usize = 4096;
-/// Most that is read of an answer, in bytes: the largest record.
-const MOST_ANSWER: usize = 1 << 40;
-/// Most room that is made ahead for an answer, in bytes.
-const MOST_ROOM: u64 = 1 << 30;
+/// Most that is read of a reply, in bytes: the largest record.
+const MAX_REPLY: usize = 1 << 40;
+/// Most room that is made ahead for a reply, in bytes.
+const MAX_RESERVED: u64 = 1 << 30;
 /// How often time is looked at, ms, and the disk.
 const TICK: i32 = 20;
 const DISK_EVERY: Duration = Duration::from_millis(60);
@@ -46,7 +46,7 @@ pub(super) fn run(place: &Place<'_>, job: Job) -> io::Result<Outcome> {
         command.env("TMPDIR", &private);
     }
     if place.exact_heap {
-        // Without its caches the C library tells exactly how much memory is in use.
+        // Without its caches the C library counts exactly how much memory is in use.
         command.env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0");
     }
     let mut child = command.spawn()?;
@@ -89,15 +89,15 @@ pub(super) fn run(place: &Place<'_>, job: Job) -> io::Result<Outcome> {
 
 fn outcome(streams: Streams, ended: Ended, longest: Duration, page: &Page, nonce: &Nonce) -> Outcome {
     let mut ended = ended;
-    let mut answer = None;
-    match classify(&streams.answer, nonce) {
-        Received::Whole => answer = Some(streams.answer),
+    let mut reply = None;
+    match classify(&streams.reply, nonce) {
+        Received::Complete => reply = Some(streams.reply),
         Received::Forged if ended == Ended::Well => ended = Ended::Forges,
-        Received::Part | Received::Forged => {}
+        Received::Partial | Received::Forged => {}
     }
     let left = page.take();
-    if answer.is_none() && classify(&left, nonce) == Received::Whole {
-        answer = Some(left);
+    if reply.is_none() && classify(&left, nonce) == Received::Complete {
+        reply = Some(left);
     }
     let (call, last) = page.call();
     let ventured = page.venture.load(std::sync::atomic::Ordering::Relaxed) != 0;
@@ -105,7 +105,7 @@ fn outcome(streams: Streams, ended: Ended, longest: Duration, page: &Page, nonce
     let strength = Strength::from_number(page.strength.load(std::sync::atomic::Ordering::Relaxed));
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (stdout, stderr) = (text(&streams.printed[0].kept), text(&streams.printed[1].kept));
-    Outcome { ended, answer, call, last, ventured, longest, refused, strength, stdout, stderr }
+    Outcome { ended, reply, call, last, ventured, longest, refused, strength, stdout, stderr }
 }
 
 /// What a child printed: the beginning is kept, the rest read and dropped.
@@ -117,7 +117,7 @@ struct Printed {
 /// All that comes from a child.
 struct Streams {
     socket: Option<UnixStream>,
-    answer: Vec<u8>,
+    reply: Vec<u8>,
     printed: [Printed; 2],
     /// Readable once the child has ended, where the system has such a thing.
     end: Option<OwnedFd>,
@@ -142,7 +142,7 @@ impl Streams {
         for file in printed.iter().filter_map(|p| p.from.as_ref()) {
             unblocked(file.as_raw_fd())?;
         }
-        Ok(Self { socket: Some(socket), answer: Vec::new(), printed, end: end_of(child), buffer: vec![0; 1 << 17] })
+        Ok(Self { socket: Some(socket), reply: Vec::new(), printed, end: end_of(child), buffer: vec![0; 1 << 17] })
     }
 
     /// Reads all there is now, but not for ever.
@@ -156,7 +156,7 @@ impl Streams {
                         self.socket = None;
                         break;
                     }
-                    Ok(n) if self.answer.len() + n <= MOST_ANSWER => self.answer.extend_from_slice(&self.buffer[..n]),
+                    Ok(n) if self.reply.len() + n <= MAX_REPLY => self.reply.extend_from_slice(&self.buffer[..n]),
                     Ok(_) => break,
                     Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                     Err(error) => {
@@ -205,7 +205,7 @@ impl Streams {
             fds.into_iter().flatten().map(|fd| libc::pollfd { fd, events: libc::POLLIN, revents: 0 }).collect();
         // Without a descriptor for the end, it is asked for more often.
         let tick = if self.end.is_some() { TICK } else { 2 };
-        // SAFETY: the array is as long as said.
+        // SAFETY: the array is as long as the length passed.
         unsafe { libc::poll(polled.as_mut_ptr(), polled.len() as libc::nfds_t, tick) };
     }
 
@@ -225,11 +225,11 @@ impl Streams {
         loop {
             self.wait();
             self.drain();
-            if classify(&self.answer, nonce) == Received::Forged {
+            if classify(&self.reply, nonce) == Received::Forged {
                 return (Some(Ended::Forges), longest);
             }
             // Room for all of it at once, within reason: growing by and by copies it again and again.
-            self.answer.reserve(rest(&self.answer, nonce).min(MOST_ROOM) as usize);
+            self.reply.reserve(rest(&self.reply, nonce).min(MAX_RESERVED) as usize);
             if !matches!(child.try_wait(), Ok(None)) {
                 return (None, longest);
             }
@@ -238,10 +238,10 @@ impl Streams {
             if page.call.load(Relaxed) != 0 {
                 longest = longest.max(now - since);
             }
-            if calls != count || page.call.load(Relaxed) == 0 && classify(&self.answer, nonce) == Received::Part {
+            if calls != count || page.call.load(Relaxed) == 0 && classify(&self.reply, nonce) == Received::Partial {
                 (count, since) = (calls, now);
             }
-            // The answer is on its way, or there is none: what hangs then is the process' end.
+            // The reply is on its way, or there is none: then the process' end is late.
             if let Some(limit) = place.bounds.call
                 && now - since > limit
             {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::rules::{Outcome, Report, Severity, Verdict, rule};
+use super::super::rules::{Outcome, Report, RuleStatus, Severity, rule};
 
 /// The report as JSON, `eixo.validation/1`.
 #[must_use]
@@ -36,9 +36,9 @@ pub fn json(report: &Report, strict: bool) -> Value {
     let rules: Vec<Value> = report
         .rules
         .iter()
-        .map(|(rule, verdict)| {
-            let (word, why) = words(verdict);
-            let mut value = json!({ "id": rule.id, "verdict": word });
+        .map(|(rule, status)| {
+            let (name, why) = status_text(status);
+            let mut value = json!({ "id": rule.id, "verdict": name });
             if let Some(why) = why {
                 value["why"] = json!(why);
             }
@@ -69,13 +69,13 @@ pub fn json(report: &Report, strict: bool) -> Value {
     })
 }
 
-/// A verdict as a word, with its reason.
-pub(super) fn words(verdict: &Verdict) -> (&'static str, Option<&str>) {
-    match verdict {
-        Verdict::Passed => ("passed", None),
-        Verdict::Failed => ("failed", None),
-        Verdict::NotTested(why) => ("not_tested", Some(why)),
-        Verdict::NotApplicable(why) => ("not_applicable", Some(why)),
-        Verdict::Skipped => ("skipped", None),
+/// The name of a status in JSON, with its reason.
+pub(super) fn status_text(status: &RuleStatus) -> (&'static str, Option<&str>) {
+    match status {
+        RuleStatus::Passed => ("passed", None),
+        RuleStatus::Failed => ("failed", None),
+        RuleStatus::NotTested(why) => ("not_tested", Some(why)),
+        RuleStatus::NotApplicable(why) => ("not_applicable", Some(why)),
+        RuleStatus::Skipped => ("skipped", None),
     }
 }

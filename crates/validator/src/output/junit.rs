@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use quick_xml::escape::escape;
 
-use super::super::rules::{Finding, Report, Severity, Verdict};
-use super::json::words;
+use super::super::rules::{Finding, Report, RuleStatus, Severity};
+use super::json::status_text;
 
 /// The report as JUnit XML. Warnings fail a test case only when `strict`, notes never.
 #[must_use]
@@ -13,7 +13,7 @@ pub fn junit(report: &Report, strict: bool) -> String {
     let fails = |severity: Severity| severity == Severity::Error || strict && severity == Severity::Warning;
     let mut cases = String::new();
     let (mut failures, mut skipped) = (0, 0);
-    for (rule, verdict) in &report.rules {
+    for (rule, status) in &report.rules {
         let name = clean(&format!("{}: {}", rule.id, rule.title));
         let _ = write!(cases, "    <testcase classname=\"eixo.validate.{}\" name=\"{name}\"", rule.kind);
         let found: Vec<&Finding> = report.findings.iter().filter(|f| f.rule == rule.id).collect();
@@ -30,12 +30,12 @@ pub fn junit(report: &Report, strict: bool) -> String {
                 _ => String::new(),
             };
             let _ = writeln!(cases, ">\n      <{tag}{attributes}>{body}</{tag}>\n    </testcase>");
-        } else if *verdict == Verdict::Passed {
+        } else if *status == RuleStatus::Passed {
             cases.push_str("/>\n");
         } else {
             skipped += 1;
-            let (word, why) = words(verdict);
-            let message = clean(&why.map_or(word.to_owned(), |why| format!("{word}: {why}")));
+            let (name, why) = status_text(status);
+            let message = clean(&why.map_or(name.to_owned(), |why| format!("{name}: {why}")));
             let _ = writeln!(cases, ">\n      <skipped message=\"{message}\"/>\n    </testcase>");
         }
     }

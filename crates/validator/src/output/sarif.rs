@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::rules::{self, Report, Severity, Verdict, rule};
+use super::super::rules::{self, Report, RuleStatus, Severity, rule};
 
 fn level(severity: Severity) -> &'static str {
     match severity {
@@ -55,8 +55,8 @@ pub fn sarif(report: &Report) -> Value {
     let notices: Vec<Value> = report
         .rules
         .iter()
-        .filter_map(|(rule, verdict)| match verdict {
-            Verdict::NotTested(why) => Some(json!({
+        .filter_map(|(rule, status)| match status {
+            RuleStatus::NotTested(why) => Some(json!({
                 "level": "note",
                 "message": { "text": format!("not tested: {why}") },
                 "associatedRule": { "id": rule.id },

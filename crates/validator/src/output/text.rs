@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::super::description::Fmi;
-use super::super::rules::{Finding, Outcome, RULES, Report, Rule, Severity, Verdict, rule};
+use super::super::rules::{Finding, Outcome, RULES, Report, Rule, RuleStatus, Severity, rule};
 
 /// Longest part of a source line that is quoted, in characters.
 const QUOTE: usize = 120;
@@ -25,7 +25,7 @@ impl Paint {
     }
 }
 
-/// The report as text; `color` with ANSI colours. Findings of one rule and one cause are told once, with how many there
+/// The report as text; `color` with ANSI colours. Findings of one rule and one cause are written once, with how many there
 /// are; with `all`, each.
 #[must_use]
 pub fn text(report: &Report, strict: bool, color: bool, all: bool) -> String {
@@ -95,7 +95,7 @@ const SHOWN: usize = 8;
 const NAMES: usize = 5;
 
 /// Control characters of an FMU's texts shown as what they are, so that they cannot steer the terminal; a tab is a blank.
-fn plain(text: &str) -> String {
+fn printable(text: &str) -> String {
     let shown = |c: char| match c {
         '\t' => ' ',
         c if c.is_control() && c != '\n' => '\u{FFFD}',
@@ -106,11 +106,11 @@ fn plain(text: &str) -> String {
 
 fn write_cause(out: &mut String, report: &Report, cause: &[&Finding], rule: &Rule, paint: &Paint) {
     let finding = cause[0];
-    let message = plain(&finding.message);
+    let message = printable(&finding.message);
     let _ = writeln!(out, "{} {}: {message}", paint.severity(rule.severity), paint.with("1", format!("[{}]", rule.id)));
     if let Some(place) = &finding.place {
         let position = place.position.map_or(String::new(), |p| format!(":{p}"));
-        let _ = writeln!(out, "  {} {}{position}", paint.with("34", "-->"), plain(&place.file));
+        let _ = writeln!(out, "  {} {}{position}", paint.with("34", "-->"), printable(&place.file));
         if let Some(position) = place.position
             && let Some(line) = report.source.get(position.line as usize - 1)
         {
@@ -120,21 +120,21 @@ fn write_cause(out: &mut String, report: &Report, cause: &[&Finding], rule: &Rul
             let quote: String = line.chars().skip(from).take(QUOTE).collect();
             let number = position.line.to_string();
             let bar = paint.with("34", "|");
-            let _ = writeln!(out, " {} {bar} {}", paint.with("34", &number), plain(&quote));
+            let _ = writeln!(out, " {} {bar} {}", paint.with("34", &number), printable(&quote));
             let caret = paint.with("1", "^");
             let _ =
                 writeln!(out, " {} {bar} {}{caret}", " ".repeat(number.len()), " ".repeat(column.saturating_sub(from)));
         }
     }
     if let Some(call) = &finding.call {
-        let _ = writeln!(out, "  {} in {}", paint.with("34", "-->"), plain(call));
+        let _ = writeln!(out, "  {} in {}", paint.with("34", "-->"), printable(call));
     }
     if cause.len() > 1 {
         let names: Vec<String> = cause[1..]
             .iter()
             .filter_map(|f| named(&f.message))
             .take(NAMES)
-            .map(|n| format!("\"{}\"", plain(n)))
+            .map(|n| format!("\"{}\"", printable(n)))
             .collect();
         let more = if cause.len() - 1 > names.len() { ", ..." } else { "" };
         let names = if names.is_empty() { String::new() } else { format!(": {}{more}", names.join(", ")) };
@@ -154,8 +154,8 @@ fn write_cause(out: &mut String, report: &Report, cause: &[&Finding], rule: &Rul
 
 fn write_rest(out: &mut String, report: &Report, strict: bool, paint: &Paint) {
     let mut untested: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (rule, verdict) in &report.rules {
-        if let Verdict::NotTested(why) = verdict {
+    for (rule, status) in &report.rules {
+        if let RuleStatus::NotTested(why) = status {
             match untested.iter_mut().find(|(w, _)| w == why) {
                 Some((_, ids)) => ids.push(rule.id),
                 None => untested.push((why, vec![rule.id])),
@@ -166,14 +166,14 @@ fn write_rest(out: &mut String, report: &Report, strict: bool, paint: &Paint) {
         let _ = writeln!(out, "{}", paint.with("1", "Not tested (which is not passed):"));
         for (why, ids) in untested {
             let shown = if ids.len() > SHOWN { format!("{} rules", ids.len()) } else { ids.join(", ") };
-            let _ = writeln!(out, "  {}: {shown}", plain(why));
+            let _ = writeln!(out, "  {}: {shown}", printable(why));
         }
         out.push('\n');
     }
     for remark in &report.remarks {
-        let _ = writeln!(out, "{}\n", plain(remark));
+        let _ = writeln!(out, "{}\n", printable(remark));
     }
-    let count = |verdict: fn(&Verdict) -> bool| report.rules.iter().filter(|(_, v)| verdict(v)).count();
+    let count = |is_so: fn(&RuleStatus) -> bool| report.rules.iter().filter(|(_, v)| is_so(v)).count();
     let verdict = match report.outcome(strict) {
         Outcome::Passes if report.static_only => paint.with("1;32", "passes the static rules"),
         Outcome::Passes => paint.with("1;32", "passes"),
@@ -183,7 +183,7 @@ fn write_rest(out: &mut String, report: &Report, strict: bool, paint: &Paint) {
     let _ = writeln!(
         out,
         "{} {verdict}{}: {}, {}, {}; {} rules passed, {} not applicable, {} not tested",
-        plain(&report.file),
+        printable(&report.file),
         match (strict, report.static_only) {
             (true, true) => " (--strict, --static: nothing of it was run)",
             (true, false) => " (--strict)",
@@ -193,9 +193,9 @@ fn write_rest(out: &mut String, report: &Report, strict: bool, paint: &Paint) {
         plural(report.count(Severity::Error), "error"),
         plural(report.count(Severity::Warning), "warning"),
         plural(report.count(Severity::Note), "note"),
-        count(|v| *v == Verdict::Passed),
-        count(|v| matches!(v, Verdict::NotApplicable(_))),
-        count(|v| matches!(v, Verdict::NotTested(_))),
+        count(|v| *v == RuleStatus::Passed),
+        count(|v| matches!(v, RuleStatus::NotApplicable(_))),
+        count(|v| matches!(v, RuleStatus::NotTested(_))),
     );
 }
 

@@ -1,4 +1,4 @@
-//! Rules on the root element, the interfaces, the default experiment and the lists beside the variables.
+//! Rules on the root element, the interfaces, the default experiment and the lists other than that of the variables.
 
 use std::collections::HashSet;
 
@@ -41,7 +41,7 @@ pub(super) fn root(root: &Element, findings: &mut Findings) -> bool {
     }
 }
 
-/// Checks what the description says of itself.
+/// Checks the attributes of the root element.
 pub(super) fn check(d: &Description, root: &Element, findings: &mut Findings) {
     if d.guid.trim().is_empty() {
         let name = if d.fmi == Fmi::Three { "instantiationToken" } else { "guid" };

@@ -34,16 +34,16 @@ pub struct Finding {
     pub advice: Option<String>,
 }
 
-/// What became of a rule.
+/// The result of a rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Verdict {
+pub enum RuleStatus {
     /// Tested, nothing found.
     Passed,
     /// Tested, with findings.
     Failed,
     /// Not tested, and why. Not tested is not passed.
     NotTested(String),
-    /// Has nothing to say about this FMU, and why: it lacks what the rule is about.
+    /// Does not apply to this FMU, and why: it lacks what the rule is about.
     NotApplicable(String),
     /// Left out by `--only` or `--skip`.
     Skipped,
@@ -58,22 +58,22 @@ pub struct Report {
     pub model: Option<String>,
     /// The version of FMI whose rules were tested.
     pub fmi: Fmi,
-    /// Every rule of that version and what became of it, in the order of the list.
-    pub rules: Vec<(&'static Rule, Verdict)>,
+    /// Every rule of that version and its result, in the order of the list.
+    pub rules: Vec<(&'static Rule, RuleStatus)>,
     /// The findings, in the order of the rules.
     pub findings: Vec<Finding>,
-    /// Sentences about the whole, such as that a model exchange FMU's behaviour was not tested.
+    /// Sentences about the FMU as a whole, such as that a model exchange FMU's behaviour was not tested.
     pub remarks: Vec<String>,
     /// The lines of `modelDescription.xml`, for quoting.
     pub source: Vec<String>,
-    /// Whether it was asked that nothing of the FMU is run.
+    /// Whether it was selected that nothing of the FMU is run.
     pub static_only: bool,
 }
 
-/// What a report comes to.
+/// The overall result of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Nothing that counts was found; unless it was not asked for, the FMU's behaviour was tested.
+    /// Nothing that counts was found; unless it was not selected for, the FMU's behaviour was tested.
     Passes,
     /// Something was found that counts.
     Fails,
@@ -88,17 +88,17 @@ impl Report {
         self.findings.iter().filter(|f| super::rule(&f.rule).is_some_and(|r| r.severity == severity)).count()
     }
 
-    /// What the report comes to; `strict`, warnings count as errors do. Notes never do.
+    /// The overall result; with `strict`, warnings count as errors. Notes never count.
     #[must_use]
     pub fn outcome(&self, strict: bool) -> Outcome {
         if self.count(Severity::Error) > 0 || strict && self.count(Severity::Warning) > 0 {
             return Outcome::Fails;
         }
-        let asked = || self.rules.iter().filter(|(r, v)| !r.is_static() && *v != Verdict::Skipped);
-        let untested = |(_, verdict): &(&Rule, Verdict)| matches!(verdict, Verdict::NotTested(_));
+        let selected = || self.rules.iter().filter(|(r, v)| !r.is_static() && *v != RuleStatus::Skipped);
+        let untested = |(_, status): &(&Rule, RuleStatus)| matches!(status, RuleStatus::NotTested(_));
         // Without the default experiment nothing of the FMU has been seen at work.
-        let idle = asked().any(|rule| rule.0.is(id::SIMULATE) && untested(rule));
-        if !self.static_only && asked().next().is_some() && (idle || asked().all(untested)) {
+        let idle = selected().any(|rule| rule.0.is(id::SIMULATE) && untested(rule));
+        if !self.static_only && selected().next().is_some() && (idle || selected().all(untested)) {
             return Outcome::NotTested;
         }
         Outcome::Passes
@@ -128,7 +128,7 @@ impl Findings {
         self.push(rule, Some(Place { file: file.to_owned(), position: None }), message.into());
     }
 
-    /// A finding on the whole.
+    /// A finding on the FMU as a whole.
     pub fn whole(&mut self, rule: Id, message: impl Into<String>) {
         self.push(rule, None, message.into());
     }

@@ -1,4 +1,4 @@
-//! The readers of archives and descriptions on input that nobody meant: no panic, no hang, no place outside the file.
+//! The readers of archives and descriptions on malformed input: no panic, no hang, no position outside the file.
 //! The number of cases is proptest's default, or `PROPTEST_CASES`.
 
 use std::io::{Cursor, Write};

@@ -6,13 +6,13 @@
 //! a constant where something else speaks of them.
 //!
 //! The first section is that of FMI 2.0.4, the second that of FMI 3.0; `-` stands for none: the rule is not one of that
-//! version, or not tested for it. Titles and advice are in the words of 2.0; [`super::words`] has those of 3.0. What the standard
+//! version, or not tested for it. Titles and advice are in the terms of 2.0; [`super::wording`] has those of 3.0. What the standard
 //! leaves undefined is robustness, never conformance; and what only an importer that breaks the standard can bring out (a call out of order, an unknown reference) is a note.
 
 use super::super::behaviour::Behaviour::{Indirect, Learning, Loaded, Raw};
 use super::super::behaviour::{
-    delay, dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, partial, references, rounded,
-    settings, slope, start, state, steps, surroundings, three, values,
+    changes, delay, dependencies, effects, experiment, instances, interpolation, leaks, lifecycle, observed, partial,
+    references, reset, rounded, settings, slope, start, state, step_size, steps, surroundings, symbols, three, values,
 };
 use super::Kind::{Conformance, Quality, Robustness};
 use super::Severity::{Error, Note, Warning};
@@ -202,9 +202,9 @@ rules! { static {
 } behaviour {
     BINARY_LOAD = "binary-load" Error Robustness "2.3" "2.5.1" Raw(lifecycle::load);
         "The binary loads, with every symbol it needs", "Link what is missing statically or ship it beside the binary; build against an old C library; `ldd -r` shows the gaps.";
-    BINARY_SYMBOLS = "binary-symbols" Error Conformance "2.1" "2.2.1" Loaded(lifecycle::symbols);
+    BINARY_SYMBOLS = "binary-symbols" Error Conformance "2.1" "2.2.1" Loaded(symbols::symbols);
         "The functions that hosts and the capability flags need are exported", "Export the function with C linkage and default visibility, or clear the capability flag.";
-    "binary-all-symbols" Warning Conformance "2.1" "2.2.1" Loaded(lifecycle::all_symbols);
+    "binary-all-symbols" Warning Conformance "2.1" "2.2.1" Loaded(symbols::all_symbols);
         "All functions of co-simulation are exported", "Export the rest too, returning fmi2Error; many hosts look all of them up when they load an FMU.";
     "types-platform" Error Conformance "2.1.4" "-" Loaded(lifecycle::types_platform);
         "fmi2GetTypesPlatform gives \"default\"", "Return fmi2TypesPlatform of the standard header.";
@@ -274,7 +274,7 @@ rules! { static {
         "Parameters and inputs read as they were set", "Store each value under its own reference.";
     "set-get-other" Error Conformance "2.1.7" "-" Indirect(settings::others);
         "Integer, Boolean and String parameters read as they were set", "Store each value under its own reference, and keep it during initialisation; store a text whole, however long it is, or return fmi2Error.";
-    "set-together" Error Conformance "2.1.7" "-" Indirect(settings::together);
+    "set-together" Error Conformance "2.1.7" "-" Indirect(settings::joint);
         "Values set in one call, or in another order, are those set one by one", "Take value[i] for the reference vr[i], and let no setter change another variable; compute what follows in fmi2ExitInitializationMode.";
     "set-twice" Error Conformance "2.1.7" "-" Indirect(settings::twice);
         "Of two values set at one instant the second counts", "Store the value in each call.";
@@ -282,25 +282,25 @@ rules! { static {
         "Strings that are set are copied", "Copy the text in fmi2SetString; the importer may free or overwrite its own when the call has come back.";
     "set-get-rounded" Note Robustness "2.1.7" "2.2.6.2" Indirect(values::set_get_rounded);
         "Parameters and inputs are kept to the last digit", "Keep Reals as 64-bit numbers; what is cut to 32 bits comes back as another number.";
-    "get-consistent" Error Robustness "2.1.7" "2.2.6.2" Loaded(values::get_consistent);
+    "get-consistent" Error Robustness "2.1.7" "2.2.6.2" Loaded(observed::get_consistent);
         "Reading changes nothing, and values do not depend on how they are read", "Compute outputs without side effects on the state.";
-    BOOLEAN_VALUES = "boolean-values" Error Conformance "2.1.2" "2.2.6.2" Loaded(values::boolean_values);
+    BOOLEAN_VALUES = "boolean-values" Error Conformance "2.1.2" "2.2.6.2" Loaded(observed::boolean_values);
         "Booleans are fmi2False (0) or fmi2True (1)", "Normalise with !!value.";
     STRING_VALUES = "string-values" Error Conformance "2.1.7" "2.2.6.2" Learning(references::string_values);
         "Strings are not null, UTF-8, and there until the next call", "Return an empty string for no text, convert from other encodings, and keep the memory until fmi2GetString or fmi2FreeInstance is called next.";
     "string-buffers" Error Conformance "2.1.7" "2.2.6.2" Loaded(references::string_buffers);
         "Strings read together are those read one by one", "Give each String variable a buffer of its own.";
-    "unchanging" Error Conformance "2.2.7" "2.4.7" Loaded(values::unchanging);
+    "unchanging" Error Conformance "2.2.7" "2.4.7" Loaded(observed::unchanging);
         "Constant, fixed and parameter variables do not change by themselves", "Declare the variable discrete or continuous, or leave its value alone.";
-    "output-finite" Error Robustness "2.1.7" "2.2.6.2" Loaded(values::finite);
+    "output-finite" Error Robustness "2.1.7" "2.2.6.2" Loaded(observed::finite);
         "Outputs are finite", "Return fmi2Discard or fmi2Error instead of passing NaN or infinity on.";
-    "output-range" Warning Conformance "2.2.7" "2.2.6.3" Loaded(values::range);
+    "output-range" Warning Conformance "2.2.7" "2.2.6.3" Loaded(observed::range);
         "Calculated values keep within min and max, and to the items of their enumeration", "Correct the limits, or the model.";
-    "tunable-set" Error Conformance "4.2.4" "4.2.1" Loaded(values::tunable_set);
+    "tunable-set" Error Conformance "4.2.4" "4.2.1" Loaded(changes::tunable_set);
         "Tunable parameters can be set during a run", "Accept fmi2SetXXX between steps, or declare the parameter fixed.";
-    "tunable-effect" Warning Conformance "2.2.7" "4.2.1" Indirect(values::tunable_effect);
+    "tunable-effect" Warning Conformance "2.2.7" "4.2.1" Indirect(changes::tunable_effect);
         "Tunable parameters act when they are set during a run", "Use the present value in each step, or declare the parameter fixed.";
-    "fixed-set" Note Robustness "4.2.4" "4.2.1" Loaded(values::fixed_set);
+    "fixed-set" Note Robustness "4.2.4" "4.2.1" Loaded(changes::fixed_set);
         "Fixed and constant variables cannot be set during a run", "Return fmi2Error, or declare the parameter tunable when it takes effect.";
     "bad-reference-get" Note Robustness "2.1.7" "2.2.6.2" Loaded(references::bad_reference_get);
         "Reading an unknown value reference is refused", "Return fmi2Error in the default branch; a wrong connection goes unnoticed otherwise.";
@@ -312,7 +312,7 @@ rules! { static {
         "Reading and setting no variables at all succeeds", "Return fmi2OK when nvr is 0, before looking at the arrays.";
     "array-count" Note Robustness "-" "2.2.6.2" Loaded(three::array_count);
         "Too few values for an array are refused", "Compare nValues with the elements of the variables and return fmi3Error; memory beyond the importer's is read or written otherwise.";
-    "reset" Error Conformance "2.1.6" "2.3.1" Loaded(lifecycle::reset);
+    "reset" Error Conformance "2.1.6" "2.3.1" Loaded(reset::reset);
         "fmi2Reset restores a new instance", "Restore states, parameters, inputs and all internal memory to what fmi2Instantiate made them.";
     "reset-rounded" Note Robustness "2.1.6" "2.3.1" Indirect(rounded::reset);
         "A run after fmi2Reset is that of a new instance to the last digit", "Let fmi2Reset forget what the solver remembers, its step size, order and last derivative; a run after others cannot be reproduced otherwise.";
@@ -326,15 +326,15 @@ rules! { static {
         "A state serialised and read back is the same, in another instance too", "Serialise the whole state, and no pointers.";
     "state-leak" Warning Robustness "2.1.8" "2.2.6.4" Indirect(leaks::state_leak);
         "States that are freed leave no memory behind", "Free in fmi2FreeFMUstate all that fmi2GetFMUstate and fmi2DeSerializeFMUstate took.";
-    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(steps::honoured);
+    "step-size" Error Conformance "4.2.2" "4.2.1" Loaded(step_size::honoured);
         "communicationStepSize is honoured", "Integrate to currentCommunicationPoint + communicationStepSize.";
-    "step-convergence" Warning Robustness "4.2.2" "4.2.1" Loaded(steps::convergence);
+    "step-convergence" Warning Robustness "4.2.2" "4.2.1" Loaded(step_size::convergence);
         "Results converge as the step shrinks", "Scale whatever happens once a call with the step size, or sub-step internally.";
     "output-delay" Warning Robustness "4.2.2" "4.2.1" Indirect(delay::delay);
         "Outputs are those at the end of the step", "Compute outputs after the integration, from the new states.";
-    "step-variable" Error Conformance "4.3.1" "4.4" Loaded(steps::variable);
+    "step-variable" Error Conformance "4.3.1" "4.4" Loaded(step_size::variable);
         "Steps of varying size give the results of equal ones", "Use the size of the present step, or clear canHandleVariableCommunicationStepSize.";
-    "step-rounding" Warning Robustness "4.2.2" "4.2.1" Indirect(steps::rounding);
+    "step-rounding" Warning Robustness "4.2.2" "4.2.1" Indirect(step_size::rounding);
         "Communication points and the stop time need not be met to the last digit", "Compare times with a tolerance of some units in the last place; importers that add step after step are off by their rounding.";
     "step-negative" Note Robustness "4.2.2" "4.2.1" Loaded(steps::negative);
         "A step backwards is refused", "Return fmi2Error or fmi2Discard for communicationStepSize < 0.";

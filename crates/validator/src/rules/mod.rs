@@ -1,6 +1,7 @@
 //! Validation rules: what each is ([`list`]), the static ones, and running them.
 
 mod clocks;
+mod date;
 mod document;
 pub mod finding;
 #[cfg(test)]
@@ -9,12 +10,13 @@ pub mod list;
 mod names;
 mod package;
 mod schema;
+mod schema2;
 mod schema3;
 mod structure;
 mod three;
 mod units;
 mod variables;
-pub mod words;
+pub mod wording;
 
 use std::path::Path;
 
@@ -23,7 +25,7 @@ use super::behaviour::Behaviour;
 use super::description::{Description, Fmi};
 use super::xml::Document;
 use finding::Findings;
-pub use finding::{Finding, Outcome, Place, Report, Verdict};
+pub use finding::{Finding, Outcome, Place, Report, RuleStatus};
 pub use list::RULES;
 pub(crate) use list::{Id, id};
 
@@ -91,7 +93,7 @@ impl Rule {
         matches!(self.check, Check::Static)
     }
 
-    /// Whether it notes what is seen beside calls whose success is another rule's, an end of the process in them included.
+    /// Whether it only observes calls whose success is tested by another rule, an end of the process in them included.
     pub(crate) fn is_aside(&self) -> bool {
         self.severity == Severity::Note && matches!(self.check, Check::Behaviour(Behaviour::Indirect(_)))
     }
@@ -102,16 +104,16 @@ impl Rule {
         Some(self.sections[fmi as usize]).filter(|section| *section != "-")
     }
 
-    /// What holds when it passes, in the words of a version.
+    /// What holds when it passes, in the terms of a version.
     #[must_use]
     pub fn title(&self, fmi: Fmi) -> String {
-        words::title(self, fmi)
+        wording::title(self, fmi)
     }
 
-    /// What to do about a finding, in the words of a version.
+    /// What to do about a finding, in the terms of a version.
     #[must_use]
     pub fn advice(&self, fmi: Fmi) -> String {
-        words::advice(self, fmi)
+        wording::advice(self, fmi)
     }
 }
 
@@ -239,7 +241,7 @@ pub(crate) fn check_description(bytes: &[u8], result: &mut Static) -> Option<Des
         return None;
     }
     match result.fmi {
-        Fmi::Two => schema::check(&document.root, findings),
+        Fmi::Two => schema2::check(&document.root, findings),
         Fmi::Three => schema3::check(&document.root, findings),
     }
     // What the schema refuses reads as its default below; findings that follow from that would mislead.

@@ -121,7 +121,7 @@ pub(super) fn entries(archive: &mut Archive, findings: &mut Findings) -> bool {
     }
 }
 
-/// Finds the description, or says where it is instead.
+/// Finds the description, or reports where it is instead.
 pub(super) fn description(archive: &Archive, findings: &mut Findings) -> bool {
     if archive.contains("modelDescription.xml") {
         return true;

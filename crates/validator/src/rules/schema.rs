@@ -1,9 +1,10 @@
-//! The rules of the official XSD (`fmi2ModelDescription.xsd` and its parts) as a table, with places.
+//! The elements and attributes of an XSD as a table, and the check of a description against it, with positions.
 //!
-//! Where the XSD gives an element no type (`Boolean` and `String` of a `SimpleType`), anything goes, as there.
+//! The tables themselves are [`super::schema2`] and [`super::schema3`].
 
 use super::super::description::{parse_boolean, parse_integer, parse_real};
 use super::super::xml::Element;
+use super::date::is_date_time;
 use super::finding::Findings;
 use super::id;
 
@@ -17,16 +18,16 @@ pub(super) enum Type {
     Unsigned,
     Double,
     DateTime,
-    Word(&'static [&'static str]),
+    Keyword(&'static [&'static str]),
     UnsignedList,
-    WordList(&'static [&'static str]),
-    /// A whole number from one to another.
-    Whole(i128, i128),
+    KeywordList(&'static [&'static str]),
+    /// An integer from one to another, both included.
+    IntRange(i128, i128),
     /// `xs:unsignedLong`.
     UnsignedLong,
     /// Numbers, for the elements of an array.
     DoubleList,
-    WholeList(i128, i128),
+    IntRangeList(i128, i128),
     BoolList,
     /// `xs:hexBinary`.
     Hex,
@@ -59,10 +60,9 @@ pub(super) struct Node {
 }
 
 pub(super) const MANY: usize = usize::MAX;
-const KINDS: &[&str] = &["dependent", "constant", "fixed", "tunable", "discrete"];
 use Type::{
-    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, Text, Unsigned, UnsignedList, UnsignedLong, Whole,
-    WholeList, Word, WordList,
+    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, IntRange, IntRangeList, Keyword, KeywordList, Text,
+    Unsigned, UnsignedList, UnsignedLong,
 };
 
 pub(super) const fn leaf(name: &'static str, attributes: &'static [Attr]) -> Node {
@@ -77,39 +77,6 @@ pub(super) const fn parent(
     Node { name, attributes, choice: &[], children: Children::Sequence(children) }
 }
 
-static FILE: Node = leaf("File", &[("name", Text, true)]);
-static SOURCE_FILES: Node = parent("SourceFiles", &[], &[(&FILE, 1, MANY)]);
-static MODEL_EXCHANGE: Node = parent(
-    "ModelExchange",
-    &[
-        ("modelIdentifier", Text, true),
-        ("needsExecutionTool", Bool, false),
-        ("completedIntegratorStepNotNeeded", Bool, false),
-        ("canBeInstantiatedOnlyOncePerProcess", Bool, false),
-        ("canNotUseMemoryManagementFunctions", Bool, false),
-        ("canGetAndSetFMUstate", Bool, false),
-        ("canSerializeFMUstate", Bool, false),
-        ("providesDirectionalDerivative", Bool, false),
-    ],
-    &[(&SOURCE_FILES, 0, 1)],
-);
-static CO_SIMULATION: Node = parent(
-    "CoSimulation",
-    &[
-        ("modelIdentifier", Text, true),
-        ("needsExecutionTool", Bool, false),
-        ("canHandleVariableCommunicationStepSize", Bool, false),
-        ("canInterpolateInputs", Bool, false),
-        ("maxOutputDerivativeOrder", Unsigned, false),
-        ("canRunAsynchronuously", Bool, false),
-        ("canBeInstantiatedOnlyOncePerProcess", Bool, false),
-        ("canNotUseMemoryManagementFunctions", Bool, false),
-        ("canGetAndSetFMUstate", Bool, false),
-        ("canSerializeFMUstate", Bool, false),
-        ("providesDirectionalDerivative", Bool, false),
-    ],
-    &[(&SOURCE_FILES, 0, 1)],
-);
 pub(super) static BASE_UNIT: Node = leaf(
     "BaseUnit",
     &[
@@ -125,166 +92,7 @@ pub(super) static BASE_UNIT: Node = leaf(
         ("offset", Double, false),
     ],
 );
-static DISPLAY_UNIT: Node =
-    leaf("DisplayUnit", &[("name", Text, true), ("factor", Double, false), ("offset", Double, false)]);
-static UNIT: Node = parent("Unit", &[("name", Text, true)], &[(&BASE_UNIT, 0, 1), (&DISPLAY_UNIT, 0, MANY)]);
-static UNIT_DEFINITIONS: Node = parent("UnitDefinitions", &[], &[(&UNIT, 1, MANY)]);
-static ITEM: Node = leaf("Item", &[("name", Text, true), ("value", Int, true), ("description", Text, false)]);
-static TYPE_REAL: Node = leaf(
-    "Real",
-    &[
-        ("quantity", Text, false),
-        ("unit", Text, false),
-        ("displayUnit", Text, false),
-        ("relativeQuantity", Bool, false),
-        ("min", Double, false),
-        ("max", Double, false),
-        ("nominal", Double, false),
-        ("unbounded", Bool, false),
-    ],
-);
-static TYPE_INTEGER: Node = leaf("Integer", &[("quantity", Text, false), ("min", Int, false), ("max", Int, false)]);
-static TYPE_BOOLEAN: Node = Node { name: "Boolean", attributes: &[], choice: &[], children: Children::Any };
-static TYPE_STRING: Node = Node { name: "String", attributes: &[], choice: &[], children: Children::Any };
-static TYPE_ENUMERATION: Node = parent("Enumeration", &[("quantity", Text, false)], &[(&ITEM, 1, MANY)]);
-static SIMPLE_TYPE: Node = Node {
-    name: "SimpleType",
-    attributes: &[("name", Text, true), ("description", Text, false)],
-    choice: &[&TYPE_REAL, &TYPE_INTEGER, &TYPE_BOOLEAN, &TYPE_STRING, &TYPE_ENUMERATION],
-    children: Children::Sequence(&[]),
-};
-static TYPE_DEFINITIONS: Node = parent("TypeDefinitions", &[], &[(&SIMPLE_TYPE, 1, MANY)]);
-static CATEGORY: Node = leaf("Category", &[("name", Text, true), ("description", Text, false)]);
-static LOG_CATEGORIES: Node = parent("LogCategories", &[], &[(&CATEGORY, 1, MANY)]);
-static DEFAULT_EXPERIMENT: Node = leaf(
-    "DefaultExperiment",
-    &[
-        ("startTime", Double, false),
-        ("stopTime", Double, false),
-        ("tolerance", Double, false),
-        ("stepSize", Double, false),
-    ],
-);
-static TOOL: Node = Node { name: "Tool", attributes: &[("name", Text, true)], choice: &[], children: Children::Any };
-static VENDOR_ANNOTATIONS: Node = parent("VendorAnnotations", &[], &[(&TOOL, 1, MANY)]);
-static ANNOTATIONS: Node = parent("Annotations", &[], &[(&TOOL, 1, MANY)]);
-static REAL: Node = leaf(
-    "Real",
-    &[
-        ("declaredType", Text, false),
-        ("quantity", Text, false),
-        ("unit", Text, false),
-        ("displayUnit", Text, false),
-        ("relativeQuantity", Bool, false),
-        ("min", Double, false),
-        ("max", Double, false),
-        ("nominal", Double, false),
-        ("unbounded", Bool, false),
-        ("start", Double, false),
-        ("derivative", Unsigned, false),
-        ("reinit", Bool, false),
-    ],
-);
-static INTEGER: Node = leaf(
-    "Integer",
-    &[
-        ("declaredType", Text, false),
-        ("quantity", Text, false),
-        ("min", Int, false),
-        ("max", Int, false),
-        ("start", Int, false),
-    ],
-);
-static BOOLEAN: Node = leaf("Boolean", &[("declaredType", Text, false), ("start", Bool, false)]);
-static STRING: Node = leaf("String", &[("declaredType", Text, false), ("start", Text, false)]);
-static ENUMERATION: Node = leaf(
-    "Enumeration",
-    &[
-        ("declaredType", Text, true),
-        ("quantity", Text, false),
-        ("min", Int, false),
-        ("max", Int, false),
-        ("start", Int, false),
-    ],
-);
-static SCALAR_VARIABLE: Node = Node {
-    name: "ScalarVariable",
-    attributes: &[
-        ("name", Text, true),
-        ("valueReference", Unsigned, true),
-        ("description", Text, false),
-        ("causality", Word(&["parameter", "calculatedParameter", "input", "output", "local", "independent"]), false),
-        ("variability", Word(&["constant", "fixed", "tunable", "discrete", "continuous"]), false),
-        ("initial", Word(&["exact", "approx", "calculated"]), false),
-        ("canHandleMultipleSetPerTimeInstant", Bool, false),
-    ],
-    choice: &[&REAL, &INTEGER, &BOOLEAN, &STRING, &ENUMERATION],
-    children: Children::Sequence(&[(&ANNOTATIONS, 0, 1)]),
-};
-static MODEL_VARIABLES: Node = parent("ModelVariables", &[], &[(&SCALAR_VARIABLE, 1, MANY)]);
-static UNKNOWN: Node = leaf(
-    "Unknown",
-    &[("index", Unsigned, true), ("dependencies", UnsignedList, false), ("dependenciesKind", WordList(KINDS), false)],
-);
-static OUTPUTS: Node = parent("Outputs", &[], &[(&UNKNOWN, 1, MANY)]);
-static DERIVATIVES: Node = parent("Derivatives", &[], &[(&UNKNOWN, 1, MANY)]);
-static INITIAL_UNKNOWNS: Node = parent("InitialUnknowns", &[], &[(&UNKNOWN, 1, MANY)]);
-static MODEL_STRUCTURE: Node =
-    parent("ModelStructure", &[], &[(&OUTPUTS, 0, 1), (&DERIVATIVES, 0, 1), (&INITIAL_UNKNOWNS, 0, 1)]);
-
-/// `ModelExchange` and `CoSimulation` come in either order; their number is rule `interface-missing`'s.
-static ROOT: Node = parent(
-    "fmiModelDescription",
-    &[
-        ("fmiVersion", Text, false), // rule fmi-version
-        ("modelName", Text, true),
-        ("guid", Text, true),
-        ("description", Text, false),
-        ("author", Text, false),
-        ("version", Text, false),
-        ("copyright", Text, false),
-        ("license", Text, false),
-        ("generationTool", Text, false),
-        ("generationDateAndTime", DateTime, false),
-        ("variableNamingConvention", Word(&["flat", "structured"]), false),
-        ("numberOfEventIndicators", Unsigned, false),
-    ],
-    &[
-        (&UNIT_DEFINITIONS, 0, 1),
-        (&TYPE_DEFINITIONS, 0, 1),
-        (&LOG_CATEGORIES, 0, 1),
-        (&DEFAULT_EXPERIMENT, 0, 1),
-        (&VENDOR_ANNOTATIONS, 0, 1),
-        (&MODEL_VARIABLES, 1, 1),
-        (&MODEL_STRUCTURE, 1, 1),
-    ],
-);
-
-/// Checks the tree against the table.
-pub(super) fn check(root: &Element, findings: &mut Findings) {
-    attributes(root, &ROOT, findings);
-    let mut interfaces = 0;
-    for child in &root.children {
-        match child.name.as_str() {
-            "ModelExchange" => element(child, &MODEL_EXCHANGE, findings),
-            "CoSimulation" => element(child, &CO_SIMULATION, findings),
-            _ => break,
-        }
-        interfaces += 1;
-    }
-    if interfaces == 0 {
-        let message = "neither a ModelExchange nor a CoSimulation element comes first";
-        findings.at(id::INTERFACE_MISSING, root.position, message);
-    }
-    for name in ["ModelExchange", "CoSimulation"] {
-        if let Some(second) = root.children_named(name).nth(1) {
-            findings.at(id::SCHEMA_ELEMENT, second.position, format!("a second {name} element"));
-        }
-    }
-    sequence(root, &root.children[interfaces..], &ROOT, findings);
-}
-
-fn element(e: &Element, node: &Node, findings: &mut Findings) {
+pub(super) fn element(e: &Element, node: &Node, findings: &mut Findings) {
     if matches!(node.children, Children::Any) {
         // Required attributes still count; what else is there does not.
         required(e, node, findings);
@@ -418,15 +226,15 @@ fn fits(value: &str, kind: Type) -> Result<(), String> {
         Unsigned => (parse_integer::<u32>(value).is_some(), "an unsigned 32-bit integer".into()),
         Double => (parse_real(value).is_some(), "a number".into()),
         DateTime => (is_date_time(value), "a date and time such as 2009-12-08T14:33:22Z".into()),
-        Word(words) => (words.contains(&value), format!("one of {}", words.join(", "))),
+        Keyword(keywords) => (keywords.contains(&value), format!("one of {}", keywords.join(", "))),
         UnsignedList => {
             (value.split_whitespace().all(|v| v.parse::<u32>().is_ok()), "a list of unsigned integers".into())
         }
-        Whole(low, high) => (is_whole(value, low, high), format!("a whole number from {low} to {high}")),
+        IntRange(low, high) => (is_integer(value, low, high), format!("a whole number from {low} to {high}")),
         UnsignedLong => (value.trim().parse::<u64>().is_ok(), "an unsigned 64-bit integer".into()),
         DoubleList => (value.split_whitespace().all(|v| parse_real(v).is_some()), "a list of numbers".into()),
-        WholeList(low, high) => (
-            value.split_whitespace().all(|v| is_whole(v, low, high)),
+        IntRangeList(low, high) => (
+            value.split_whitespace().all(|v| is_integer(v, low, high)),
             format!("a list of whole numbers from {low} to {high}"),
         ),
         BoolList => (value.split_whitespace().all(|v| parse_boolean(v).is_some()), "a list of booleans".into()),
@@ -434,99 +242,13 @@ fn fits(value: &str, kind: Type) -> Result<(), String> {
             value.len().is_multiple_of(2) && value.bytes().all(|b| b.is_ascii_hexdigit()),
             "an even number of hexadecimal digits".into(),
         ),
-        WordList(words) => {
-            (value.split_whitespace().all(|v| words.contains(&v)), format!("a list of {}", words.join(", ")))
+        KeywordList(keywords) => {
+            (value.split_whitespace().all(|v| keywords.contains(&v)), format!("a list of {}", keywords.join(", ")))
         }
     };
     if good { Ok(()) } else { Err(expected) }
 }
 
-fn is_whole(text: &str, low: i128, high: i128) -> bool {
+fn is_integer(text: &str, low: i128, high: i128) -> bool {
     text.trim().parse::<i128>().is_ok_and(|value| (low..=high).contains(&value))
-}
-
-/// `xs:dateTime`: `-?YYYY-MM-DDThh:mm:ss(.s+)?(Z|[+-]hh:mm)?` with the ranges of the calendar.
-fn is_date_time(text: &str) -> bool {
-    fn parse(text: &str) -> Option<bool> {
-        let text = text.trim();
-        let (date, rest) = text.strip_prefix('-').unwrap_or(text).split_once('T')?;
-        let mut date = date.split('-');
-        let (year, month, day) = (date.next()?, date.next()?, date.next()?);
-        let zone = rest.find(['Z', '+', '-']).unwrap_or(rest.len());
-        let (time, zone) = rest.split_at(zone);
-        let (time, fraction) = time.split_once('.').unwrap_or((time, "0"));
-        let mut time = time.split(':');
-        let (hour, minute, second) = (time.next()?, time.next()?, time.next()?);
-        let two = |text: &str, most: u32| {
-            let value: u32 = text.parse().ok()?;
-            (text.len() == 2 && text.bytes().all(|b| b.is_ascii_digit()) && value <= most).then_some(value)
-        };
-        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-        let (hour, minute, second) = (two(hour, 24)?, two(minute, 59)?, two(second, 59)?);
-        let year_number: u64 = year.parse().ok()?;
-        let multiple = |of: u64| year_number.is_multiple_of(of);
-        let leap = multiple(4) && (!multiple(100) || multiple(400));
-        let month = two(month, 12)?;
-        let last = match month {
-            0 => return None,
-            2 if leap => 29,
-            2 => 28,
-            4 | 6 | 9 | 11 => 30,
-            _ => 31,
-        };
-        let zone_good = match zone.split_at_checked(1) {
-            None => true,
-            Some(("Z", rest)) => rest.is_empty(),
-            Some((_, rest)) => {
-                let (h, m) = rest.split_once(':')?;
-                two(h, 14)? < 14 && two(m, 59).is_some() || rest == "14:00"
-            }
-        };
-        Some(
-            year.len() >= 4
-                && digits(year)
-                && two(day, last)? > 0
-                && date.next().is_none()
-                && time.next().is_none()
-                && digits(fraction)
-                && (hour < 24 || minute == 0 && second == 0)
-                && zone_good,
-        )
-    }
-    parse(text).unwrap_or(false)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dates_follow_the_xml_schema() {
-        for good in [
-            "2009-12-08T14:33:22Z",
-            "2024-02-29T00:00:00",
-            "2009-12-08T14:33:22.125Z",
-            "2009-12-08T14:33:22+02:00",
-            "2009-12-08T24:00:00-14:00",
-            "12009-12-08T14:33:22Z",
-        ] {
-            assert!(is_date_time(good), "{good}");
-        }
-        for bad in [
-            "",
-            "2009-12-08",
-            "2009-12-08 14:33:22",
-            "2009-13-08T14:33:22Z",
-            "2023-02-29T00:00:00Z",
-            "2009-12-08T25:00:00Z",
-            "2009-12-08T14:33Z",
-            "09-12-08T14:33:22Z",
-            "2009-12-08T14:33:22.Z",
-            "2009-12-08T14:33:22+2:00",
-            "2009-12-00T14:33:22Z",
-            "2009-12-08T14:33:22Zulu",
-        ] {
-            assert!(!is_date_time(bad), "{bad}");
-        }
-    }
 }

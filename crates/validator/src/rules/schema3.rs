@@ -3,8 +3,8 @@
 use super::super::xml::Element;
 use super::finding::Findings;
 use super::schema::Type::{
-    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, Text, Unsigned, UnsignedList, UnsignedLong, Whole,
-    WholeList, Word, WordList,
+    Bool, BoolList, DateTime, Double, DoubleList, Hex, Int, IntRange, IntRangeList, Keyword, KeywordList, Text,
+    Unsigned, UnsignedList, UnsignedLong,
 };
 use super::schema::{Attr, BASE_UNIT, Children, MANY, Node, leaf, needs_interface, parent, sequence};
 
@@ -76,7 +76,7 @@ static DEFAULT_EXPERIMENT: Node = parent(
     ],
     &[(&ANNOTATIONS, 0, 1)],
 );
-const LONG: super::schema::Type = Whole(i64::MIN as i128, i64::MAX as i128);
+const LONG: super::schema::Type = IntRange(i64::MIN as i128, i64::MAX as i128);
 static ITEM: Node = parent(
     "Item",
     &[("name", Text, true), ("value", LONG, true), ("description", Text, false)],
@@ -112,8 +112,8 @@ macro_rules! typed {
                 ("name", Text, true),
                 ("valueReference", Unsigned, true),
                 ("description", Text, false),
-                ("causality", Word(CAUSALITIES), false),
-                ("variability", Word(VARIABILITIES), false),
+                ("causality", Keyword(CAUSALITIES), false),
+                ("variability", Keyword(VARIABILITIES), false),
                 ("canHandleMultipleSetPerTimeInstant", Bool, false),
                 ("clocks", UnsignedList, false),
                 ("declaredType", Text, $declared),
@@ -129,7 +129,7 @@ macro_rules! typed {
 /// The attributes of variables that may be arrays.
 const INTERMEDIATE: Attr = ("intermediateUpdate", Bool, false);
 const PREVIOUS: Attr = ("previous", Unsigned, false);
-const INITIAL: Attr = ("initial", Word(&["exact", "approx", "calculated"]), false);
+const INITIAL: Attr = ("initial", Keyword(&["exact", "approx", "calculated"]), false);
 const QUANTITY: Attr = ("quantity", Text, false);
 
 macro_rules! float {
@@ -160,32 +160,32 @@ macro_rules! float {
 float!(FLOAT32_TYPE "Float32Type", FLOAT32 "Float32");
 float!(FLOAT64_TYPE "Float64Type", FLOAT64 "Float64");
 
-macro_rules! whole {
+macro_rules! integer {
     ($type_node:ident $type_name:literal, $node:ident $name:literal, $native:ty) => {
         typed!($type_node $type_name, $node $name, declared false,
             both [
                 QUANTITY,
-                ("min", Whole(<$native>::MIN as i128, <$native>::MAX as i128), false),
-                ("max", Whole(<$native>::MIN as i128, <$native>::MAX as i128), false)
+                ("min", IntRange(<$native>::MIN as i128, <$native>::MAX as i128), false),
+                ("max", IntRange(<$native>::MIN as i128, <$native>::MAX as i128), false)
             ],
             own [
                 INTERMEDIATE,
                 PREVIOUS,
                 INITIAL,
-                ("start", WholeList(<$native>::MIN as i128, <$native>::MAX as i128), false)
+                ("start", IntRangeList(<$native>::MIN as i128, <$native>::MAX as i128), false)
             ],
             type_children [],
             children [(&DIMENSION, 0, MANY), (&ALIAS, 0, MANY)]);
     };
 }
-whole!(INT8_TYPE "Int8Type", INT8 "Int8", i8);
-whole!(UINT8_TYPE "UInt8Type", UINT8 "UInt8", u8);
-whole!(INT16_TYPE "Int16Type", INT16 "Int16", i16);
-whole!(UINT16_TYPE "UInt16Type", UINT16 "UInt16", u16);
-whole!(INT32_TYPE "Int32Type", INT32 "Int32", i32);
-whole!(UINT32_TYPE "UInt32Type", UINT32 "UInt32", u32);
-whole!(INT64_TYPE "Int64Type", INT64 "Int64", i64);
-whole!(UINT64_TYPE "UInt64Type", UINT64 "UInt64", u64);
+integer!(INT8_TYPE "Int8Type", INT8 "Int8", i8);
+integer!(UINT8_TYPE "UInt8Type", UINT8 "UInt8", u8);
+integer!(INT16_TYPE "Int16Type", INT16 "Int16", i16);
+integer!(UINT16_TYPE "UInt16Type", UINT16 "UInt16", u16);
+integer!(INT32_TYPE "Int32Type", INT32 "Int32", i32);
+integer!(UINT32_TYPE "UInt32Type", UINT32 "UInt32", u32);
+integer!(INT64_TYPE "Int64Type", INT64 "Int64", i64);
+integer!(UINT64_TYPE "UInt64Type", UINT64 "UInt64", u64);
 typed!(BOOLEAN_TYPE "BooleanType", BOOLEAN "Boolean", declared false,
     both [],
     own [INTERMEDIATE, PREVIOUS, INITIAL, ("start", BoolList, false)],
@@ -203,14 +203,14 @@ typed!(BINARY_TYPE "BinaryType", BINARY "Binary", declared false,
     children [(&DIMENSION, 0, MANY), (&START_BYTES, 0, MANY), (&ALIAS, 0, MANY)]);
 typed!(ENUMERATION_TYPE "EnumerationType", ENUMERATION "Enumeration", declared true,
     both [QUANTITY, ("min", LONG, false), ("max", LONG, false)],
-    own [INTERMEDIATE, PREVIOUS, INITIAL, ("start", WholeList(i64::MIN as i128, i64::MAX as i128), false)],
+    own [INTERMEDIATE, PREVIOUS, INITIAL, ("start", IntRangeList(i64::MIN as i128, i64::MAX as i128), false)],
     type_children [(&ITEM, 1, MANY)],
     children [(&DIMENSION, 0, MANY), (&ALIAS, 0, MANY)]);
 typed!(CLOCK_TYPE "ClockType", CLOCK "Clock", declared false,
     both [
         ("canBeDeactivated", Bool, false),
         ("priority", Unsigned, false),
-        ("intervalVariability", Word(INTERVALS), true),
+        ("intervalVariability", Keyword(INTERVALS), true),
         ("intervalDecimal", Double, false),
         ("shiftDecimal", Double, false),
         ("supportsFraction", Bool, false),
@@ -274,7 +274,7 @@ macro_rules! unknown {
             &[
                 ("valueReference", Unsigned, true),
                 ("dependencies", UnsignedList, false),
-                ("dependenciesKind", WordList(KINDS), false),
+                ("dependenciesKind", KeywordList(KINDS), false),
             ],
             &[(&ANNOTATIONS, 0, 1)],
         );
@@ -313,7 +313,7 @@ static ROOT: Node = parent(
         ("license", Text, false),
         ("generationTool", Text, false),
         ("generationDateAndTime", DateTime, false),
-        ("variableNamingConvention", Word(&["flat", "structured"]), false),
+        ("variableNamingConvention", Keyword(&["flat", "structured"]), false),
     ],
     &[
         (&MODEL_EXCHANGE, 0, 1),
@@ -348,8 +348,8 @@ mod tests {
             nodes.iter().map(|n| n.name).collect()
         };
         for kind in Kind::ALL {
-            assert!(names(&MODEL_VARIABLES).contains(&kind.word()), "{kind:?}");
-            assert!(names(&TYPE_DEFINITIONS).contains(&format!("{}Type", kind.word()).as_str()), "{kind:?}");
+            assert!(names(&MODEL_VARIABLES).contains(&kind.keyword()), "{kind:?}");
+            assert!(names(&TYPE_DEFINITIONS).contains(&format!("{}Type", kind.keyword()).as_str()), "{kind:?}");
         }
     }
 }

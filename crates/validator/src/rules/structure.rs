@@ -11,7 +11,7 @@ use super::{Id, id};
 /// Checks the model structure.
 pub(super) fn check(d: &Description, findings: &mut Findings) {
     let s = &d.structure;
-    let mut sound = true;
+    let mut valid = true;
     for (section, list) in
         [("Outputs", &s.outputs), ("Derivatives", &s.derivatives), ("InitialUnknowns", &s.initial_unknowns)]
     {
@@ -24,7 +24,7 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
                     Fmi::Three => format!("{section}: no variable has the value reference {}", unknown.reference),
                 };
                 findings.at(id::STRUCTURE_INDEX, unknown.position, message);
-                sound = false;
+                valid = false;
             } else if !seen.insert(unknown.index) {
                 let message = format!("{section}: \"{}\" is listed twice", name(d, unknown.index));
                 findings.at(id::STRUCTURE_DUPLICATE, unknown.position, message);
@@ -35,7 +35,7 @@ pub(super) fn check(d: &Description, findings: &mut Findings) {
             }
         }
     }
-    if sound {
+    if valid {
         outputs(d, findings);
         derivatives(d, findings);
         initial_unknowns(d, findings);
@@ -185,22 +185,22 @@ fn kind_of_type(
     }
 }
 
-/// Whether a variable may stand among the dependencies of a section.
+/// Whether a variable may be among the dependencies of a section.
 fn is_known(d: &Description, section: &str, known: &Variable) -> bool {
     match known.causality {
         Causality::Input | Causality::Independent => true,
         _ if known.variability == Variability::Constant => false,
         _ if section == "InitialUnknowns" => known.initial() == Some(Initial::Exact),
         Causality::Parameter | Causality::CalculatedParameter | Causality::StructuralParameter => false,
-        // States are known where they are exposed, and soundly so; else any variable may stand for one.
+        // States are known where they are exposed by valid entries; else any variable may be a state.
         _ => {
             let state = |u: &Unknown| d.by_index(d.by_index(u.index)?.derivative?);
             let states: Vec<Option<&Variable>> = d.structure.derivatives.iter().map(state).collect();
-            let sound = |x: &Option<&Variable>| {
+            let valid = |x: &Option<&Variable>| {
                 x.is_some_and(|x| x.base() == BaseType::Real && x.variability == Variability::Continuous)
             };
             let listed = |x: &&Variable| x.name == known.name || x.value_reference == known.value_reference;
-            states.is_empty() || !states.iter().all(sound) || states.iter().flatten().any(listed)
+            states.is_empty() || !states.iter().all(valid) || states.iter().flatten().any(listed)
         }
     }
 }

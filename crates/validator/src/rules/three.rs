@@ -31,7 +31,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
         declared_type(v, root, findings);
         derivative(v, &by_reference, findings);
     }
-    // That there is not more than one is said of both versions.
+    // That there is not more than one is tested for both versions.
     if !all.iter().any(|v| v.element.get("causality") == Some("independent")) {
         let message = "no variable is independent, as the time is; FMI 3.0 asks for exactly one";
         findings.at(
@@ -46,7 +46,7 @@ pub(super) fn check(root: &Element, findings: &mut Findings) {
 fn variables(root: &Element) -> Vec<Named<'_>> {
     let all = root.child("ModelVariables").into_iter().flat_map(|v| &v.children);
     all.filter_map(|element| {
-        let kind = Kind::parse(&element.name)?;
+        let kind = element.name.parse::<Kind>().ok()?;
         let name = element.get("name").unwrap_or("");
         Some(Named { element, kind, name, reference: element.get("valueReference").unwrap_or("").trim() })
     })
@@ -93,13 +93,13 @@ fn size_of(of: Option<&Named<'_>>, reference: &str) -> Result<u64, String> {
         .ok_or_else(|| format!("\"{}\" has no start value that is a size", of.name))
 }
 
-/// A declared type is of the variable's own type; that it exists is another rule's.
+/// A declared type is of the variable's own type; that it exists is tested by another rule.
 fn declared_type(v: &Named<'_>, root: &Element, findings: &mut Findings) {
     let Some(wanted) = v.element.get("declaredType") else { return };
     let mut types = root.child("TypeDefinitions").into_iter().flat_map(|t| &t.children);
     let Some(found) = types.find(|t| t.get("name") == Some(wanted)) else { return };
-    if found.name.strip_suffix("Type") != Some(v.kind.word()) {
-        let message = format!("\"{}\" is a {}, but its type \"{wanted}\" a {}", v.name, v.kind.word(), found.name);
+    if found.name.strip_suffix("Type") != Some(v.kind.keyword()) {
+        let message = format!("\"{}\" is a {}, but its type \"{wanted}\" a {}", v.name, v.kind.keyword(), found.name);
         findings.at(id::TYPE_MISMATCH, v.element.position, message);
     }
 }

@@ -132,7 +132,7 @@ fn types(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `own` is what stands there, `resolved` with the type definition's attributes filled in.
+/// `own` are the variable's attributes, `resolved` the same completed by those of its type definition.
 fn use_of_unit(
     units: &HashMap<&str, HashSet<&str>>,
     who: &str,

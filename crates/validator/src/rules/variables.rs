@@ -94,7 +94,7 @@ fn table(fmi: Fmi, v: &Variable, findings: &mut Findings) -> bool {
     }
     let may = match allowed {
         [] => "initial must not be given".to_owned(),
-        _ => format!("initial may be {}", allowed.iter().map(|i| i.word()).collect::<Vec<_>>().join(" or ")),
+        _ => format!("initial may be {}", allowed.iter().map(|i| i.keyword()).collect::<Vec<_>>().join(" or ")),
     };
     let message = format!("variable \"{}\": initial=\"{initial}\" with {causality} and {variability}: {may}", v.name);
     findings.at(id::INITIAL, v.position, message);
@@ -224,7 +224,7 @@ fn aliases(d: &Description, findings: &mut Findings) {
         if units.len() > 1 {
             let names: Vec<&str> = set.iter().map(|v| v.name.as_str()).collect();
             let names = names.join(", ");
-            // No unit beside one is untidy; two that cannot be converted make one number two quantities.
+            // One missing unit is only untidy; two units that cannot be converted contradict each other.
             if units.iter().flatten().count() > 1 {
                 findings.at(
                     id::ALIAS_UNIT,

@@ -144,7 +144,7 @@ impl Inputs {
     pub(super) fn at(&self, index: usize, time: f64, step: f64, hold: Hold) -> (f64, f64) {
         let values = &self.signals[index].1;
         let value = |t: f64| {
-            // A sample a rounding error ahead counts as reached.
+            // A sample that is a rounding error ahead counts.
             let after = self.time.partition_point(|s| *s <= t + 1e-6 * step);
             let Some(before) = after.checked_sub(1) else { return values[0] };
             match (hold, values.get(after)) {

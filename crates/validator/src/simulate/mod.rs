@@ -3,151 +3,23 @@
 //! Row `k` of the record is the communication point `start + k*step`, after the inputs of that instant have been set:
 //! input and acceleration of a row then belong together. ([`Rows::StepEnd`] records before, as other importers do.)
 
+mod error;
 mod inputs;
+mod result;
 mod values;
 
 use super::description::{BaseType, Causality, Description, Fmi};
 use super::host::{Fmu, HostError, Instance, InstanceOptions, Layout, Status, needs_event_mode};
-use crate::trace::{Hold, Motion, Signal, Trace, TraceError, number};
+use crate::trace::Hold;
 
+pub use error::SimulateError;
 pub use inputs::Inputs;
+pub use result::{Column, SimulationResult};
 use values::{Ports, Which, apply};
 pub use values::{Setting, parse_setting};
 
 /// Most rows that a run records.
 const MAX_ROWS: f64 = 1e9;
-
-/// Why a run could not be made, or ended early.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulateError {
-    /// The FMU cannot be used.
-    #[error(transparent)]
-    Host(#[from] HostError),
-    /// The input file cannot be used.
-    #[error(transparent)]
-    Trace(#[from] TraceError),
-    /// The input file has no time.
-    #[error("{file}: no column named time; the columns are: {present}")]
-    NoTime {
-        /// The file.
-        file: String,
-        /// Its columns.
-        present: String,
-    },
-    /// No column of the input file is an input of the FMU.
-    #[error("{file}: no column is an input of the FMU; the columns are: {present}; the inputs are: {wanted}{near}")]
-    NoInput {
-        /// The file.
-        file: String,
-        /// Its columns.
-        present: String,
-        /// The FMU's inputs.
-        wanted: String,
-        /// A near miss.
-        near: String,
-    },
-    /// A part of the inputs that is none.
-    #[error(
-        "{left:.0} samples of the input lie from {from} s to {to} s at the steps asked for; give other --from, --to or --resample"
-    )]
-    Part {
-        /// From when, s.
-        from: f64,
-        /// Until when, s.
-        to: f64,
-        /// Samples there.
-        left: f64,
-    },
-    /// No column of the reference results is a variable of the FMU.
-    #[error("{file}: no column is a variable of the FMU; the columns are: {present}; the outputs are: {wanted}")]
-    NoReference {
-        /// The file.
-        file: String,
-        /// Its columns.
-        present: String,
-        /// The FMU's outputs.
-        wanted: String,
-    },
-    /// A unit that is not the FMU's.
-    #[error("{file}: column {column} is in [{unit}], but the FMU takes it in {wanted}: convert the column")]
-    Unit {
-        /// The file.
-        file: String,
-        /// The column.
-        column: String,
-        /// Its unit.
-        unit: String,
-        /// The FMU's unit.
-        wanted: String,
-    },
-    /// No such variable.
-    #[error("the FMU has no {what} named {name:?}{near}")]
-    Unknown {
-        /// What was looked for.
-        what: &'static str,
-        /// The name given.
-        name: String,
-        /// A near miss.
-        near: String,
-    },
-    /// A value that its variable cannot take.
-    #[error("{name} = {value}: {why}")]
-    Value {
-        /// The variable.
-        name: String,
-        /// The value given.
-        value: String,
-        /// What it must be.
-        why: String,
-    },
-    /// No step size to be found.
-    #[error(
-        "neither the input nor the FMU's default experiment gives a step: the input's times are not uniform, or there is \
-         no input; give --step"
-    )]
-    NoStep,
-    /// No end to be found.
-    #[error("neither the input nor the FMU's default experiment gives an end: give --stop")]
-    NoStop,
-    /// An experiment that cannot be run.
-    #[error("from {} s to {} s in steps of {} s: {why}", number(*start), number(*stop), number(*step))]
-    Experiment {
-        /// Start, s.
-        start: f64,
-        /// End, s.
-        stop: f64,
-        /// Step, s.
-        step: f64,
-        /// What is wrong.
-        why: &'static str,
-    },
-    /// The FMU refused to go on.
-    #[error("the FMU stopped at {time} s: {what}{}", log_text(.log))]
-    Stopped {
-        /// Communication point, s.
-        time: f64,
-        /// What it said.
-        what: String,
-        /// Its last log messages.
-        log: Vec<String>,
-    },
-    /// Event mode or early return with an FMU that has none.
-    #[error("{option}: {why}")]
-    NotOffered {
-        /// What was asked for.
-        option: &'static str,
-        /// Why it cannot be.
-        why: &'static str,
-    },
-    /// What became of the child process that ran the FMU.
-    #[error("{0}")]
-    Child(String),
-}
-
-fn log_text(log: &[String]) -> String {
-    if log.is_empty() { String::new() } else { format!("; its log: {}", log.join("; ")) }
-}
 
 /// What a row of the record holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -198,77 +70,6 @@ mod hold {
     }
 }
 
-/// What was recorded: the inputs, then the outputs.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Record {
-    /// Communication points, s.
-    pub time: Vec<f64>,
-    /// Communication step, s.
-    pub step: f64,
-    /// Each column.
-    pub columns: Vec<Column>,
-    /// What the user should know, in sentences.
-    pub notes: Vec<String>,
-}
-
-/// A column of a record.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Column {
-    /// Name of the variable.
-    pub name: String,
-    /// Its unit, where it has one.
-    pub unit: Option<String>,
-    /// One value a row.
-    pub values: Vec<f64>,
-    /// Whether it is an input.
-    pub input: bool,
-}
-
-impl Record {
-    /// The values of a variable.
-    #[must_use]
-    pub fn get(&self, name: &str) -> Option<&[f64]> {
-        self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
-    }
-
-    /// The columns that are signals of the axis, as a trace.
-    ///
-    /// # Errors
-    /// Never, as long as all columns have one length.
-    pub fn trace(&self, hold: Hold) -> Result<Trace, TraceError> {
-        let start = self.time.first().copied().unwrap_or(0.0);
-        let mut trace = Trace::new(start, self.step, hold);
-        for column in &self.columns {
-            if let Some(signal) = Signal::from_name(&column.name) {
-                trace.set(signal, column.values.clone())?;
-            }
-        }
-        Ok(trace)
-    }
-
-    /// Whether the columns are those of a linear axis.
-    #[must_use]
-    pub fn motion(&self) -> Motion {
-        let linear = |c: &Column| c.name == "T" && c.unit.as_deref() == Some("N");
-        if self.columns.iter().any(linear) { Motion::Linear } else { Motion::Rotary }
-    }
-
-    /// Headers and values of all columns with the time, for a CSV file.
-    #[must_use]
-    pub fn table(&self) -> Vec<(String, &[f64])> {
-        let mut table = vec![("time [s]".to_owned(), self.time.as_slice())];
-        for c in &self.columns {
-            let name = inputs::column_name(&c.name);
-            let header = match &c.unit {
-                Some(unit) => format!("{name} [{unit}]"),
-                None => name,
-            };
-            table.push((header, &c.values));
-        }
-        table
-    }
-}
-
 /// Communication points of a run.
 struct Experiment {
     start: f64,
@@ -281,7 +82,7 @@ impl Experiment {
         let default = description.default_experiment.unwrap_or_default();
         let start = options.start.or(inputs.time.first().copied()).or(default.start_time).unwrap_or(0.0);
         let stop = options.stop.or(inputs.time.last().copied()).or(default.stop_time).ok_or(SimulateError::NoStop)?;
-        // An FMU of FMI 3.0 may say by which step it goes on inside.
+        // An FMU of FMI 3.0 may declare its internal step.
         let own = || default.step_size.or(description.co_simulation.as_ref().and_then(|i| i.fixed_step));
         let step = options.step.or(inputs.dt).or_else(|| own().filter(|_| inputs.time.is_empty()));
         let step = step.ok_or(SimulateError::NoStep)?;
@@ -296,7 +97,7 @@ impl Experiment {
         if steps > MAX_ROWS {
             return fail("that is more rows than a record can hold: give a longer --step or an earlier --stop");
         }
-        // The end is reached up to rounding; a last part of a step is left out.
+        // The end is end_time up to rounding; a last part of a step is left out.
         Ok(Self { start, step, count: (steps * (1.0 + 1e-12) + 1e-6).floor() as usize })
     }
 
@@ -329,7 +130,7 @@ pub(crate) fn check(description: &Description, inputs: &Inputs, options: &Option
 ///
 /// # Errors
 /// See [`SimulateError`].
-pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Record, SimulateError> {
+pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<SimulationResult, SimulateError> {
     let experiment = Experiment::new(&fmu.description, inputs, options)?;
     let ports = Ports::find(&fmu.description, inputs, &options.outputs)?;
     let instance_options = InstanceOptions {
@@ -347,15 +148,15 @@ pub fn simulate(fmu: &Fmu, inputs: &Inputs, options: &Options) -> Result<Record,
     done.map_err(|error| {
         let log = instance.take_log();
         let skip = log.len().saturating_sub(3);
-        let said = log.into_iter().skip(skip).map(|m| m.message).collect();
+        let messages = log.into_iter().skip(skip).map(|m| m.message).collect();
         match error {
-            SimulateError::Host(error) => SimulateError::Stopped { time: now, what: error.to_string(), log: said },
+            SimulateError::Host(error) => SimulateError::Stopped { time: now, what: error.to_string(), log: messages },
             other => other,
         }
     })
 }
 
-/// The run itself; `now` is left at the communication point reached.
+/// The run itself; `now` is left at the communication point end_time.
 fn run(
     fmu: &Fmu,
     instance: &mut Instance,
@@ -364,7 +165,7 @@ fn run(
     inputs: &Inputs,
     options: &Options,
     now: &mut f64,
-) -> Result<Record, SimulateError> {
+) -> Result<SimulationResult, SimulateError> {
     for setting in &options.settings {
         apply(instance, &fmu.description, setting)?;
     }
@@ -422,7 +223,7 @@ fn run(
             }
         }
     }
-    // What has been recorded stands, whatever the FMU says at the end.
+    // What has been recorded is kept, whatever status the FMU returns at the end.
     if let Err(error) = instance.terminate() {
         record.notes.push(format!("after the last step {error}"));
     }
@@ -441,18 +242,18 @@ fn step3(instance: &mut Instance, time: f64, step: f64, event_mode: bool) -> Res
         if !status.is_ok() {
             return Ok(status);
         }
-        let told = instance.told();
-        if told.event && event_mode {
+        let result = instance.step_result();
+        if result.event && event_mode {
             instance.handle_events(|_| Ok(()))?;
-            if instance.told().terminate {
+            if instance.step_result().terminate {
                 return Ok(Status::Discard);
             }
         }
         // What is left below rounding is nothing.
-        if !told.early || told.time.is_nan() || told.time >= end - 1e-9 * step {
+        if !result.early || result.time.is_nan() || result.time >= end - 1e-9 * step {
             return Ok(status);
         }
-        from = told.time;
+        from = result.time;
     }
     Err(HostError::Events(MOST_PARTS))
 }

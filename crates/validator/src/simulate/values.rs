@@ -1,6 +1,6 @@
 //! Values in and out of an instance by name, whatever their types.
 
-use super::{Column, Inputs, Record, SimulateError, is_output, numeric};
+use super::{Column, Inputs, SimulateError, SimulationResult, is_output, numeric};
 use crate::description::{BaseType, Causality, Description, Kind, Variability, Variable};
 use crate::host::{Fmu, HostError, Instance};
 use crate::trace::{Hold, nearest};
@@ -90,13 +90,13 @@ pub(super) fn apply(
         BaseType::String => instance.set_string(&reference, &[text]),
     };
     set.map_err(|error| {
-        let said: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
-        let said = if said.is_empty() { error.to_string() } else { said.join("; ") };
-        fail(format!("the FMU refuses it: {said}"))
+        let messages: Vec<String> = instance.take_log().into_iter().map(|m| m.message).collect();
+        let messages = if messages.is_empty() { error.to_string() } else { messages.join("; ") };
+        fail(format!("the FMU refuses it: {messages}"))
     })
 }
 
-/// A whole number as it is meant: of 64 bits without a sign, it comes by its bits.
+/// An integer of a variable as a number: an unsigned one of 64 bits is stored with the bits of a signed one.
 fn whole(v: &Variable, value: i64) -> f64 {
     number(v.cell.is_some_and(|c| c.kind == Kind::UInt64), value)
 }
@@ -167,7 +167,7 @@ impl Ports {
     }
 
     /// An empty record with room for `rows`.
-    pub fn record(&self, fmu: &Fmu, inputs: &Inputs, rows: usize) -> Record {
+    pub fn record(&self, fmu: &Fmu, inputs: &Inputs, rows: usize) -> SimulationResult {
         let description = &fmu.description;
         let unit = |name: &str| {
             let variable = description.variables.iter().find(|v| v.name == name)?;
@@ -181,7 +181,11 @@ impl Ports {
         };
         let ins = inputs.signals.iter().map(|(name, _)| column(name, true));
         let outs = self.names.iter().map(|name| column(name, false));
-        Record { time: Vec::with_capacity(rows), columns: ins.chain(outs).collect(), ..Record::default() }
+        SimulationResult {
+            time: Vec::with_capacity(rows),
+            columns: ins.chain(outs).collect(),
+            ..SimulationResult::default()
+        }
     }
 
     /// Sets the inputs of `time`.
@@ -223,14 +227,14 @@ impl Ports {
     }
 
     /// Writes the inputs of `time` into the record.
-    pub fn note_inputs(&self, inputs: &Inputs, time: f64, step: f64, hold: Hold, record: &mut Record) {
+    pub fn note_inputs(&self, inputs: &Inputs, time: f64, step: f64, hold: Hold, record: &mut SimulationResult) {
         for (index, column) in record.columns.iter_mut().take(self.inputs.len()).enumerate() {
             column.values.push(inputs.at(index, time, step, hold).0);
         }
     }
 
     /// Reads the outputs into the record.
-    pub fn read(&self, instance: &mut Instance, record: &mut Record) -> Result<(), HostError> {
+    pub fn read(&self, instance: &mut Instance, record: &mut SimulationResult) -> Result<(), HostError> {
         let columns = &mut record.columns[self.inputs.len()..];
         if let Some(references) = &self.reals {
             let mut buffer = [0.0; 64];

@@ -10,9 +10,9 @@ use super::super::behaviour::probe::Learned;
 use super::super::description::{BaseType, Description, Fmi};
 use super::super::host;
 use super::super::isolation::{
-    self, Answer, Bounds, Ended, Fence, Job, Outcome, Place, Strength, Task, sandbox, temporary,
+    self, Bounds, Ended, Fence, Job, Outcome, Place, Reply, Strength, Task, sandbox, temporary,
 };
-use super::super::rules::{self, Finding, Id, Rule, Verdict, id};
+use super::super::rules::{self, Finding, Id, Rule, RuleStatus, id};
 use super::{Options, ValidationError};
 
 /// Rules that must pass before the others make sense, in order.
@@ -49,7 +49,7 @@ fn is_one_of(rule: &Rule, ids: &[Id]) -> bool {
     ids.iter().any(|id| rule.is(*id))
 }
 
-pub(super) type Tested = (&'static Rule, Verdict, Vec<Finding>);
+pub(super) type Tested = (&'static Rule, RuleStatus, Vec<Finding>);
 
 pub(super) struct Bench<'a> {
     folder: &'a Path,
@@ -61,7 +61,7 @@ pub(super) struct Bench<'a> {
     total: usize,
     /// References of all Strings.
     strings: Vec<u32>,
-    /// Whether the FMU says that it needs its tool to run.
+    /// Whether the FMU declares that it needs its tool to run.
     needs_tool: bool,
     begin: Instant,
     /// Longest call so far, and whether the default experiment has been run.
@@ -103,7 +103,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// What is to be said of the sandbox.
+    /// What is to be printed of the sandbox.
     pub fn gap(&self) -> Option<&'static str> {
         self.strength.lock().unwrap_or_else(PoisonError::into_inner).filter(|_| self.options.sandbox)?.gap()
     }
@@ -120,38 +120,39 @@ impl<'a> Bench<'a> {
         let gates = GATES.iter().filter_map(|id| rules::rule(id.text())).filter(|r| r.section(self.fmi).is_some());
         for rule in gates {
             if let Some(why) = &blocked {
-                tested.push((rule, Verdict::NotTested(why.clone()), vec![]));
+                tested.push((rule, RuleStatus::NotTested(why.clone()), vec![]));
                 continue;
             }
             let (mut result, more) = self.test(rule, &learned)?;
             match more {
                 Some(more) => learned = more,
                 // The process ended over a text: which one is not known.
-                None if rule.is(id::STRING_VALUES) && result.1 == Verdict::Failed => {
+                None if rule.is(id::STRING_VALUES) && result.1 == RuleStatus::Failed => {
                     learned.no_texts.clone_from(&self.strings);
                 }
                 None => {}
             }
-            if self.needs_tool && result.1 == Verdict::Failed && is_one_of(rule, &[id::BINARY_LOAD, id::INSTANTIATE]) {
+            if self.needs_tool && result.1 == RuleStatus::Failed && is_one_of(rule, &[id::BINARY_LOAD, id::INSTANTIATE])
+            {
                 // The tool may not be here, which is no fault of the FMU.
                 let first = result.2.first().map_or(String::new(), |f| format!(": {}", f.message));
                 let why = format!("the FMU needs its tool to run (needsExecutionTool){first}");
-                result = (rule, Verdict::NotTested(why.clone()), vec![]);
+                result = (rule, RuleStatus::NotTested(why.clone()), vec![]);
             }
             match &result.1 {
                 _ if is_one_of(rule, &OPEN) => {}
-                Verdict::Failed => blocked = Some(format!("{} must pass first", rule.id)),
-                Verdict::NotTested(why) => blocked = Some(why.clone()),
+                RuleStatus::Failed => blocked = Some(format!("{} must pass first", rule.id)),
+                RuleStatus::NotTested(why) => blocked = Some(why.clone()),
                 _ => {}
             }
             tested.push(result);
         }
         let rest: Vec<&'static Rule> = rules::of(self.fmi)
             .filter(|r| !r.is_static() && !is_one_of(r, &GATES))
-            .filter(|r| self.options.wants(r))
+            .filter(|r| self.options.selects(r))
             .collect();
         if let Some(why) = blocked {
-            tested.extend(rest.into_iter().map(|rule| (rule, Verdict::NotTested(why.clone()), vec![])));
+            tested.extend(rest.into_iter().map(|rule| (rule, RuleStatus::NotTested(why.clone()), vec![])));
             return Ok(tested);
         }
         let next = AtomicUsize::new(0);
@@ -172,9 +173,9 @@ impl<'a> Bench<'a> {
         Ok(tested)
     }
 
-    fn out_of_budget(&self) -> Verdict {
+    fn out_of_budget(&self) -> RuleStatus {
         let budget = self.options.budget.as_secs_f64();
-        Verdict::NotTested(format!("the budget of {budget} s was used up; --budget gives more"))
+        RuleStatus::NotTested(format!("the budget of {budget} s was used up; --budget gives more"))
     }
 
     /// Tests one rule in a child process.
@@ -213,7 +214,7 @@ impl<'a> Bench<'a> {
         };
         let mut outcome = isolation::run(&place, job(learned))?;
         if outcome.ended.is_from_outside() {
-            // Someone ended the process, or the FMU does so itself: again, to tell.
+            // Someone ended the process, or the FMU does so itself: run again to distinguish them.
             outcome = isolation::run(&place, job(learned))?;
         }
         if rule.is(id::INSTANCES_REPEATED) && outcome.ventured && outcome.ended != Ended::Well {
@@ -233,13 +234,13 @@ impl<'a> Bench<'a> {
                 *strength = Some(outcome.strength);
             }
         }
-        let (verdict, findings, learned) = self.verdict_of(rule, outcome);
+        let (status, findings, learned) = self.status_of(rule, outcome);
         (self.progress)(rule.id, self.total);
-        Ok(((rule, verdict, findings), learned))
+        Ok(((rule, status, findings), learned))
     }
 
-    fn verdict_of(&self, rule: &'static Rule, outcome: Outcome) -> (Verdict, Vec<Finding>, Option<Learned>) {
-        // The temporary folder's name says nothing, and would differ from run to run.
+    fn status_of(&self, rule: &'static Rule, outcome: Outcome) -> (RuleStatus, Vec<Finding>, Option<Learned>) {
+        // The temporary folder's name is of no use, and would differ from run to run.
         let folders = [self.folder, self.scratch.path()].map(|folder| format!("{}/", folder.display()));
         let finding = |message: String, call: Option<String>| Finding {
             rule: rule.id.into(),
@@ -250,50 +251,50 @@ impl<'a> Bench<'a> {
         };
         let none = host::abi::CALLS[0];
         let within = Some(outcome.call).filter(|c| *c != none).map(str::to_owned);
-        let said = outcome.stderr.lines().rfind(|line| !line.trim().is_empty());
-        let said = said.map_or(String::new(), |line| format!("; it printed: {line}"));
+        let printed = outcome.stderr.lines().rfind(|line| !line.trim().is_empty());
+        let printed = printed.map_or(String::new(), |line| format!("; it printed: {line}"));
         let after = || match outcome.last {
             last if last == none || within.is_some() => String::new(),
             last => format!(", after {last}"),
         };
-        let answer = outcome.answer.as_deref().and_then(Answer::decode).map(|(answer, _)| answer);
-        if let Some(internal) = answer.as_ref().and_then(Answer::internal_error) {
+        let reply = outcome.reply.as_deref().and_then(Reply::decode).map(|(reply, _)| reply);
+        if let Some(internal) = reply.as_ref().and_then(Reply::internal_error) {
             self.faults.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{}: {internal}", rule.id));
-            return (Verdict::NotTested(internal), vec![], None);
+            return (RuleStatus::NotTested(internal), vec![], None);
         }
         // Before the library is loaded, nothing of the FMU has run.
-        let idle = outcome.last == none && outcome.answer.is_none();
+        let idle = outcome.last == none && outcome.reply.is_none();
         let died = match &outcome.ended {
             Ended::Exited(_) | Ended::Signal(_) if idle => {
                 let why = format!("no process could be had to test in: {}", outcome.stderr.trim());
-                return (Verdict::NotTested(why), vec![], None);
+                return (RuleStatus::NotTested(why), vec![], None);
             }
-            Ended::Slow(_) => return (self.out_of_budget(), vec![], answer.map(|a| a.learned)),
+            Ended::Slow(_) => return (self.out_of_budget(), vec![], reply.map(|a| a.learned)),
             Ended::Signal(signal) => {
-                Some(format!("the FMU crashed: {}{}{said}", isolation::signal_name(*signal), after()))
+                Some(format!("the FMU crashed: {}{}{printed}", isolation::signal_name(*signal), after()))
             }
             Ended::Hangs(limit) => Some(format!("the FMU hangs: no end after {} s", limit.as_secs_f64())),
             Ended::Exited(code) => {
-                Some(format!("the FMU ended its host's process with exit code {code}{}{said}", after()))
+                Some(format!("the FMU ended its host's process with exit code {code}{}{printed}", after()))
             }
             Ended::Disk(bytes) => Some(format!("the FMU wrote {} MB to the disk", bytes / 1_000_000)),
             Ended::Forges => Some(format!("the FMU wrote to its host's own descriptor{}", after())),
-            Ended::Well if answer.is_none() => {
+            Ended::Well if reply.is_none() => {
                 Some(format!("the FMU ended its host's process with exit code 0{}", after()))
             }
             Ended::Well => None,
         };
         if let Some(message) = died.as_ref().filter(|_| outcome.ventured) {
-            // No one says that the model bears these values.
+            // Nothing declares that the model allows these values.
             let why = format!("with other parameters and start values than its own, {message}");
-            return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
+            return (RuleStatus::NotTested(why), vec![], reply.map(|a| a.learned));
         }
         if let Some(message) = died.as_ref().filter(|_| rule.is_aside()) {
-            return (Verdict::NotTested(message.clone()), vec![], answer.map(|a| a.learned));
+            return (RuleStatus::NotTested(message.clone()), vec![], reply.map(|a| a.learned));
         }
         if died.is_some() && rule.is(id::REFERENCE_BITS) {
             let why = "reading an unknown value reference ends the process".to_owned();
-            return (Verdict::NotTested(why), vec![], answer.map(|a| a.learned));
+            return (RuleStatus::NotTested(why), vec![], reply.map(|a| a.learned));
         }
         if let Some(message) = died {
             let advice = Some(match &outcome.ended {
@@ -310,22 +311,22 @@ impl<'a> Bench<'a> {
             let finding = Finding { advice, ..finding(message, within) };
             return self.allowing_for_the_sandbox(rule, vec![finding], outcome.refused, None);
         }
-        let Some(answer) = answer else { return (Verdict::NotTested("no answer".into()), vec![], None) };
-        let mut findings: Vec<Finding> = answer.findings.into_iter().map(|(m, call)| finding(m, call)).collect();
+        let Some(reply) = reply else { return (RuleStatus::NotTested("no answer".into()), vec![], None) };
+        let mut findings: Vec<Finding> = reply.findings.into_iter().map(|(m, call)| finding(m, call)).collect();
         if rule.is(id::SIDE_STDOUT) && !outcome.stdout.is_empty() {
             let line = outcome.stdout.lines().next().unwrap_or("").chars().take(80).collect::<String>();
             findings.push(finding(format!("the FMU prints to standard output: {line:?}"), None));
         }
-        let learned = Some(answer.learned);
+        let learned = Some(reply.learned);
         if !findings.is_empty() {
             return self.allowing_for_the_sandbox(rule, findings, outcome.refused, learned);
         }
-        let verdict = match (answer.not_tested, answer.not_applicable) {
-            (Some(why), _) => Verdict::NotTested(why),
-            (_, Some(why)) => Verdict::NotApplicable(why),
-            _ => Verdict::Passed,
+        let status = match (reply.not_tested, reply.not_applicable) {
+            (Some(why), _) => RuleStatus::NotTested(why),
+            (_, Some(why)) => RuleStatus::NotApplicable(why),
+            _ => RuleStatus::Passed,
         };
-        (verdict, findings, learned)
+        (status, findings, learned)
     }
 
     /// An FMU that does not start because the sandbox refuses what it asks for has not been tested.
@@ -335,7 +336,7 @@ impl<'a> Bench<'a> {
         findings: Vec<Finding>,
         refused: Option<&'static str>,
         learned: Option<Learned>,
-    ) -> (Verdict, Vec<Finding>, Option<Learned>) {
+    ) -> (RuleStatus, Vec<Finding>, Option<Learned>) {
         let denied = || findings.iter().any(|f| f.message.contains("Permission denied"));
         let first = findings.first().map_or("", |f| f.message.as_str());
         let why = match refused {
@@ -347,9 +348,9 @@ impl<'a> Bench<'a> {
         match why {
             Some(why) => {
                 let why = format!("{why}; --allow FOLDER opens a folder, --no-sandbox runs the FMU with your rights");
-                (Verdict::NotTested(why), vec![], learned)
+                (RuleStatus::NotTested(why), vec![], learned)
             }
-            None => (Verdict::Failed, findings, learned),
+            None => (RuleStatus::Failed, findings, learned),
         }
     }
 }
@@ -399,9 +400,9 @@ mod tests {
         std::fs::write(workplace.join("validate"), script).unwrap();
 
         let rule = rules::rule(id::BINARY_SYMBOLS.text()).unwrap();
-        let ((_, verdict, findings), _) = bench.test(rule, &Learned::default()).unwrap();
+        let ((_, status, findings), _) = bench.test(rule, &Learned::default()).unwrap();
         assert!(findings.is_empty(), "{findings:?}");
-        let Verdict::NotTested(why) = verdict else { panic!("{verdict:?}") };
+        let RuleStatus::NotTested(why) = status else { panic!("{status:?}") };
         for part in ["internal error of eixo", "not of the FMU", "only co-simulation FMUs are probed", "probe.rs"] {
             assert!(why.contains(part), "{part}: {why}");
         }

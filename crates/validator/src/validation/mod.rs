@@ -1,4 +1,4 @@
-//! A whole validation: the static rules here, then each behavioural rule in a child process.
+//! A validation: the static rules here, then each behavioural rule in a child process.
 
 mod bench;
 
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::description::{Description, Fmi};
 use super::host;
-use super::rules::{self, Report, Rule, Verdict, words};
+use super::rules::{self, Report, Rule, RuleStatus, wording};
 use bench::Bench;
 
 /// What to validate and how.
@@ -25,13 +25,13 @@ pub struct Options {
     pub jobs: usize,
     /// Longest time that a call of an FMI function may take; an FMU that is slow by itself is given more.
     pub call: Duration,
-    /// Longest time of the whole; what it does not reach is not tested.
+    /// Longest time of the validation; rules left after it are not tested.
     pub budget: Duration,
     /// Address space of each behavioural rule, in bytes.
     pub memory: u64,
     /// Whether the FMU runs behind the fence of [`super::isolation::sandbox`].
     pub sandbox: bool,
-    /// Files and folders that the FMU may read beside the system's.
+    /// Files and folders that the FMU may read in addition to the system's.
     pub allow: Vec<PathBuf>,
     /// This program, which tests a rule when called as `program validate --child`.
     pub program: PathBuf,
@@ -77,13 +77,13 @@ impl Options {
         }
     }
 
-    fn wants(&self, rule: &Rule) -> bool {
+    fn selects(&self, rule: &Rule) -> bool {
         let named = |list: &[String]| list.iter().any(|id| id == rule.id);
         (self.only.is_empty() || named(&self.only)) && !named(&self.skip)
     }
 }
 
-/// Validates a file. `progress` is told of each behavioural rule that is done, and how many there are.
+/// Validates a file. `progress` is called after each behavioural rule with how many are done, and how many there are.
 ///
 /// # Errors
 /// When the file cannot be read, a rule does not exist, or no child process can be started.
@@ -99,31 +99,31 @@ pub fn validate(
     if let Some(version) = result.foreign.take() {
         return Err(ValidationError::Version { file: path.to_owned(), version });
     }
-    let mut verdicts: HashMap<&str, Verdict> = HashMap::new();
+    let mut statuses: HashMap<&str, RuleStatus> = HashMap::new();
     let mut remarks = Vec::new();
     let fmi = result.fmi;
     for rule in rules::of(fmi).filter(|r| r.is_static()) {
         let untested = result.untested.iter().find(|(id, _)| *id == rule.id);
-        let verdict = match untested {
-            _ if result.findings.list.iter().any(|f| f.rule == rule.id) => Verdict::Failed,
-            Some((_, why)) => Verdict::NotTested(why.clone()),
-            None => Verdict::Passed,
+        let status = match untested {
+            _ if result.findings.list.iter().any(|f| f.rule == rule.id) => RuleStatus::Failed,
+            Some((_, why)) => RuleStatus::NotTested(why.clone()),
+            None => RuleStatus::Passed,
         };
-        verdicts.insert(rule.id, verdict);
+        statuses.insert(rule.id, status);
     }
     let mut findings = std::mem::take(&mut result.findings.list);
     let model = result.description.as_ref().map(|d| d.model_name.clone());
     match prepare(&mut result, options) {
         Ok((description, folder)) => {
             let bench = Bench::new(&description, folder.path(), options, progress)?;
-            for (rule, verdict, found) in bench.run()? {
-                verdicts.insert(rule.id, verdict);
+            for (rule, status, found) in bench.run()? {
+                statuses.insert(rule.id, status);
                 findings.extend(found);
             }
             remarks.extend(bench.faults());
             remarks.extend(bench.gap().map(str::to_owned));
             remarks.extend(untested(&description));
-            if options.sandbox && bench::NEEDY.iter().any(|id| verdicts.get(id.text()) == Some(&Verdict::Failed)) {
+            if options.sandbox && bench::NEEDY.iter().any(|id| statuses.get(id.text()) == Some(&RuleStatus::Failed)) {
                 remarks.push("It failed in the sandbox; --no-sandbox, for an FMU that you trust, tells whether it does outside too.".into());
             }
         }
@@ -139,21 +139,21 @@ pub fn validate(
                 );
             }
             for rule in rules::of(fmi).filter(|r| !r.is_static()) {
-                verdicts.insert(rule.id, Verdict::NotTested(why.clone()));
+                statuses.insert(rule.id, RuleStatus::NotTested(why.clone()));
             }
         }
     }
     let rules: Vec<_> = rules::of(fmi)
         .map(|rule| {
-            let verdict = verdicts.remove(rule.id).unwrap_or(Verdict::Skipped);
-            (rule, if options.wants(rule) { verdict } else { Verdict::Skipped })
+            let status = statuses.remove(rule.id).unwrap_or(RuleStatus::Skipped);
+            (rule, if options.selects(rule) { status } else { RuleStatus::Skipped })
         })
         .collect();
-    findings.retain(|f| rules::rule(&f.rule).is_some_and(|r| options.wants(r)));
+    findings.retain(|f| rules::rule(&f.rule).is_some_and(|r| options.selects(r)));
     findings.sort_by_key(|f| rules::of(fmi).position(|r| r.id == f.rule));
     for finding in findings.iter_mut().filter(|_| fmi == Fmi::Three) {
-        finding.message = words::in_three(&finding.message);
-        finding.advice = finding.advice.as_deref().map(words::in_three);
+        finding.message = wording::in_fmi3(&finding.message);
+        finding.advice = finding.advice.as_deref().map(wording::in_fmi3);
     }
     Ok(Report {
         file: path.display().to_string(),
@@ -177,7 +177,7 @@ fn untested(d: &Description) -> Option<String> {
     (!what.is_empty()).then(|| format!("Offered by the FMU and not tested: {}.", what.join(", ")))
 }
 
-/// Extracts the FMU for the behavioural rules, or says why they are not tested.
+/// Extracts the FMU for the behavioural rules, or returns why they are not tested.
 fn prepare(result: &mut rules::Static, options: &Options) -> Result<(Description, tempfile::TempDir), String> {
     let description = result.description.take().ok_or("modelDescription.xml must be in order first")?;
     if options.static_only {

@@ -6,7 +6,9 @@ use std::panic::catch_unwind;
 use super::super::abi::{Callbacks, Component, LOG_CATEGORIES, Status, Text};
 use super::super::baked;
 use super::super::fault::Fault;
-use super::super::gate::{self, Body, Function, Log, Sink};
+use super::super::gate::{self, Body};
+use super::super::log::{Log, Sink};
+use super::super::sequence::Function;
 use super::{array, call, typed};
 use crate::variables::guid;
 

@@ -2,7 +2,7 @@
 //!
 //! # Safety
 //! All of them, as the standard asks of importers: an instance is a null pointer or one that `fmi2Instantiate` gave and
-//! that has not been freed, and is used by one thread at a time; an array holds as many entries as said.
+//! that has not been freed, and is used by one thread at a time; an array holds as many entries as its length states.
 
 #![allow(unsafe_code)]
 #![allow(non_snake_case, reason = "the names are the standard's")]

@@ -4,7 +4,8 @@ use std::ffi::{c_char, c_int};
 
 use super::super::abi::{Component, FmuState, Status};
 use super::super::fault::Fault;
-use super::super::gate::{self, Body, Function};
+use super::super::gate::{self, Body};
+use super::super::sequence::Function;
 use super::super::stored::{self, Snapshot};
 use super::{array, array_mut, call, typed};
 

@@ -4,8 +4,9 @@ use std::ffi::c_int;
 
 use super::super::abi::{Component, Status, Text};
 use super::super::fault::Fault;
-use super::super::gate::{self, Body, Function, Mode};
-use super::super::kernel::StepError;
+use super::super::gate::{self, Body};
+use super::super::sequence::{Function, Mode};
+use super::super::step_error::StepError;
 use super::{array_mut, call, typed};
 
 /// A communication point may differ from the end of the last step by this share of the step, for importers that

@@ -4,7 +4,8 @@ use std::ffi::{c_int, c_uint};
 
 use super::super::abi::{Component, Status, Text};
 use super::super::fault::Fault;
-use super::super::gate::{self, Body, Function, Mode};
+use super::super::gate::{self, Body};
+use super::super::sequence::{Function, Mode};
 use super::{array, array_mut, call, typed};
 use crate::variables::{Causality, Model, Named, Type, Variability};
 
@@ -13,7 +14,7 @@ use crate::variables::{Causality, Model, Named, Type, Variability};
 pub(crate) fn resolve(model: Model, reference: c_uint, real: bool) -> Result<usize, Fault> {
     let wanted = if real { "Real" } else { "Integer or Enumeration" };
     // The head of the table needs no look into it.
-    if real && (reference as usize) < model.plain() {
+    if real && (reference as usize) < model.leading_reals() {
         return Ok(reference as usize);
     }
     let fits = |&i: &usize| (model.at(i).kind == Type::Real) == real;

@@ -208,7 +208,7 @@ impl Instance {
             for (&place, &value) in run.places.iter().zip(&mut values) {
                 let fits = |(low, high): (i128, i128)| (low..=high).contains(&i128::from(value));
                 if run.kind != Kind::UInt64 && !run.kind.range().is_none_or(fits) {
-                    return Err(HostError::Range(value, run.kind.word()));
+                    return Err(HostError::Range(value, run.kind.keyword()));
                 }
                 all[place] = value;
             }
@@ -337,7 +337,7 @@ impl Instance {
         // Room for all, so that an FMU that does not look at the number does no harm.
         let mut values = vec![0.0; count + 8];
         note(Call::get3_float64);
-        // SAFETY: the component is alive; there is room for more values than said.
+        // SAFETY: the component is alive; there is room for more values than the length passed.
         let status = unsafe { function(self.component, &raw const reference, 1, values.as_mut_ptr(), count - 1) };
         note(Call::None);
         Ok(Some(!status_of(status).is_ok()))

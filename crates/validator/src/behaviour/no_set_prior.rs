@@ -1,24 +1,24 @@
-//! States under the promise of each step that none before it is set: "noSetFMUStatePriorToCurrentPoint is fmi2True if
+//! States where each step was done with the flag that none before it will be set: "noSetFMUStatePriorToCurrentPoint is fmi2True if
 //! fmi2SetFMUstate will no longer be called for time instants prior to currentCommunicationPoint in this simulation run"
-//! (FMI 2.0.4, section 4.2.2). The state at that point, from which the step is had again, is not prior to it.
+//! (FMI 2.0.4, section 4.2.2). The state at that point, from which the step is repeated, is not prior to it.
 
 use super::super::host::HostError;
 use super::probe::Probe;
 
-/// Times that a step is had again: masters that solve a loop over several FMUs do so until they converge.
+/// Times that a step is repeated: masters that solve a loop over several FMUs do so until they converge.
 const AGAIN: usize = 3;
 
-/// Whether states that may still be set are restored; what to say where not.
-pub(super) fn kept(p: &Probe) -> Result<Option<String>, HostError> {
+/// Whether states that may still be set are restored; the message where not.
+pub(super) fn check(p: &Probe) -> Result<Option<String>, HostError> {
     if p.interface().only_once {
         return Ok(None);
     }
-    let found = after_promises(p)?;
+    let found = after_flagged_steps(p)?;
     if found.is_some() { Ok(found) } else { at_the_point(p) }
 }
 
-/// Steps of which it was promised are behind; from the state at their end the run may be had again.
-fn after_promises(p: &Probe) -> Result<Option<String>, HostError> {
+/// After steps with the flag, the run may be repeated from the state at their end.
+fn after_flagged_steps(p: &Probe) -> Result<Option<String>, HostError> {
     let (n, cut) = (p.steps(), p.steps() / 3);
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, cut)?;
@@ -34,23 +34,23 @@ fn after_promises(p: &Probe) -> Result<Option<String>, HostError> {
     }))
 }
 
-/// Each step with the promise, and had again with it from the state at its beginning; then one with and some without, and all
-/// of them again.
+/// Each step with the flag, repeated from the state at its beginning; then a step with the flag and some without, repeated
+/// from the state at the beginning of the first.
 fn at_the_point(p: &Probe) -> Result<Option<String>, HostError> {
     let n = p.steps() / 2;
     let mut instance = p.ready()?;
-    // It is never set again, so that the FMU may throw it away; freed it is in any case.
+    // It is never set again, so that the FMU may discard its contents; it is freed all the same.
     let first = instance.get_state()?;
     for k in 0..n {
         let state = instance.get_state()?;
-        let promised = |instance: &mut super::Instance| -> Result<_, HostError> {
+        let flagged_step = |instance: &mut super::Instance| -> Result<_, HostError> {
             instance.may_go_back = false;
             p.run(instance, k, k + 1)
         };
-        let expected = promised(&mut instance)?;
+        let expected = flagged_step(&mut instance)?;
         for again in 1..=AGAIN {
             instance.set_state(&state)?;
-            let found = promised(&mut instance)?;
+            let found = flagged_step(&mut instance)?;
             if let Some(what) = p.difference_beyond_tolerance(&expected, &found, k) {
                 return Ok(Some(format!(
                     "a step with noSetFMUStatePriorToCurrentPoint = fmi2True, had again from the state at its beginning, is another one \

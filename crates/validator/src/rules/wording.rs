@@ -1,4 +1,4 @@
-//! The words of FMI 3.0 for what the list of rules and the rules' messages say in those of FMI 2.0.
+//! Titles, advice and messages of the rules in the terms of FMI 3.0; the list of rules has them in those of FMI 2.0.
 
 use super::{Id, Rule, id};
 use crate::description::Fmi;
@@ -34,13 +34,13 @@ const NAMES: [(&str, &str); 27] = [
     ("fmi2", "fmi3"),
 ];
 
-/// A message in the words of FMI 3.0.
+/// A message in the terms of FMI 3.0.
 #[must_use]
-pub fn in_three(text: &str) -> String {
+pub fn in_fmi3(text: &str) -> String {
     NAMES.iter().fold(text.to_owned(), |text, (two, three)| text.replace(two, three))
 }
 
-/// Rules that hold something else in FMI 3.0: title and advice; empty where the words of 2.0 do.
+/// Rules that require something else in FMI 3.0: title and advice; empty where the text of 2.0 holds.
 const OWN: [(Id, &str, &str); 27] = [
     (id::FMI_VERSION, "fmiVersion is 3.0", "Write fmiVersion=\"3.0\", for 3.0.1 and later too."),
     (
@@ -119,12 +119,12 @@ const OWN: [(Id, &str, &str); 27] = [
     (id::OUTPUT_DERIVATIVES, "", "Implement fmi3GetOutputDerivatives or set maxOutputDerivativeOrder to 0."),
 ];
 
-/// A text of a rule in the words of a version: its `own` in FMI 3.0, where there is one, else that of 2.0 put into words
-/// of 3.0.
-fn in_words(fmi: Fmi, two: &str, own: Option<&str>) -> String {
+/// A text of a rule in the terms of a version: in FMI 3.0 its `own`, where there is one, else that of 2.0 with the names of
+/// 3.0.
+fn for_version(fmi: Fmi, two: &str, own: Option<&str>) -> String {
     match fmi {
         Fmi::Two => two.to_owned(),
-        Fmi::Three => own.filter(|own| !own.is_empty()).map_or_else(|| in_three(two), str::to_owned),
+        Fmi::Three => own.filter(|own| !own.is_empty()).map_or_else(|| in_fmi3(two), str::to_owned),
     }
 }
 
@@ -133,11 +133,11 @@ fn own(rule: &Rule) -> Option<&'static (Id, &'static str, &'static str)> {
 }
 
 pub(super) fn title(rule: &Rule, fmi: Fmi) -> String {
-    in_words(fmi, rule.title, own(rule).map(|(_, title, _)| *title))
+    for_version(fmi, rule.title, own(rule).map(|(_, title, _)| *title))
 }
 
 pub(super) fn advice(rule: &Rule, fmi: Fmi) -> String {
-    in_words(fmi, rule.advice, own(rule).map(|(.., advice)| *advice))
+    for_version(fmi, rule.advice, own(rule).map(|(.., advice)| *advice))
 }
 
 #[cfg(test)]
@@ -163,8 +163,8 @@ mod tests {
     #[test]
     fn every_section_is_a_number() {
         for rule in super::super::RULES {
-            let sound = |s: &str| s == "-" || s.split('.').all(|n| n.parse::<u32>().is_ok());
-            assert!(rule.sections.iter().all(|s| sound(s)) && rule.sections != ["-", "-"], "{}", rule.id);
+            let valid = |s: &str| s == "-" || s.split('.').all(|n| n.parse::<u32>().is_ok());
+            assert!(rule.sections.iter().all(|s| valid(s)) && rule.sections != ["-", "-"], "{}", rule.id);
         }
     }
 }

@@ -1,18 +1,18 @@
-//! Dry friction at rest: torques over a segment of a step that keep what they hold from moving.
+//! Dry friction at rest: the torques that keep a sticking inertia from moving over a segment of a step.
 
 use super::parameters::Structure;
 use super::propagator::{Compliance, Propagator};
 use crate::scalar::Scalar;
 
-/// Dry friction that holds: the torques, constant over the step, that bring the held velocities to zero at its end.
-pub(super) struct Hold<S> {
+/// The torques of sticking friction, N.m: constant over the step, and such that the sticking velocities are zero at its end.
+pub(super) struct StickTorques<S> {
     sticks: [bool; 2],
-    /// Inverse of the velocity answers of the held inertias.
+    /// Inverse of the velocity compliance of the sticking inertias, N.m.s/rad.
     inverse: [[S; 2]; 2],
     c: Compliance,
 }
 
-impl<S: Scalar> Hold<S> {
+impl<S: Scalar> StickTorques<S> {
     pub fn new(sticks: [bool; 2], step: &Propagator<S>, c: Compliance, structure: Structure) -> Self {
         let zero = S::default();
         let mut inverse = [[zero; 2]; 2];
@@ -35,7 +35,7 @@ impl<S: Scalar> Hold<S> {
         Self { sticks, inverse, c }
     }
 
-    /// The end with the holding torques, and these.
+    /// The end of the step under the torques of sticking friction, and these torques, N.m.
     #[inline]
     pub fn apply(
         &self,
@@ -77,12 +77,12 @@ impl<S: Scalar> Hold<S> {
         (held, hold)
     }
 
-    /// Jacobian of `force - found(force)`: `1 + stiffness*X + damping*V`, with the compliance as held.
+    /// Jacobian of `force - found(force)`: `1 + stiffness*X + damping*V`, with the compliance of the axis as it sticks.
     pub fn jacobian(&self, tangent: &[[[f64; 2]; 2]; 2]) -> [[f64; 2]; 2] {
         let mut x = self.c.position;
         let mut v = self.c.velocity;
         if self.sticks != [false, false] {
-            // The holding torques answer too: they take back the held velocities.
+            // The torques of sticking friction change as well: they cancel the velocities of what sticks.
             let (cx, cv) = (&self.c.constant_position, &self.c.constant_velocity);
             let v0 = v;
             for column in 0..2 {

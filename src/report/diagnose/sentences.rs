@@ -41,12 +41,12 @@ pub fn sentence(d: &Diagnosis) -> String {
                 format!("{} ({}, at the {})", info.title, info.id, c.site.as_str())
             };
             let names = d.causes.iter().map(describe).collect::<Vec<_>>().join(", and ");
-            let told = if d.gap.closure < 0.0 {
+            let sentence = if d.gap.closure < 0.0 {
                 format!("{names}, by the fitted record; the held-out record contradicts it: the error grows there.")
             } else {
                 format!("{names}: {} of {gap} on held-out data closes with it.", percent(d.gap.closure))
             };
-            [told].into_iter().chain(undecided(d)).collect::<Vec<_>>().join(" ")
+            [sentence].into_iter().chain(undecided(d)).collect::<Vec<_>>().join(" ")
         }
         Verdict::Unexplained if is_rounding(d) => {
             "Unexplained: what is left is the rounding of the readings, which is not among the effects that may be named."
@@ -66,7 +66,7 @@ pub fn sentence(d: &Diagnosis) -> String {
     }
 }
 
-/// What acts beside the causes of a gap, where the record does not tell which of several effects it is.
+/// The cause in addition to those named, where the record does not distinguish which of several effects it is.
 pub fn undecided(d: &Diagnosis) -> Option<String> {
     let open = d.undecided.as_ref().filter(|_| d.verdict == Verdict::Effect)?;
     Some(format!(
@@ -86,11 +86,11 @@ pub fn either(d: &Diagnosis) -> Option<String> {
     if d.verdict != Verdict::Unexplained {
         return None;
     }
-    d.confusable.iter().find(|c| c.named.info().family != c.other.info().family).map(told_apart)
+    d.confusable.iter().find(|c| c.named.info().family != c.other.info().family).map(distinguished)
 }
 
-/// What is to be told from what.
-fn told_apart(c: &Confusable) -> String {
+/// Which effects could not be distinguished.
+fn distinguished(c: &Confusable) -> String {
     let name = |e: Effect| lower(short_title(e.info()));
     format!("{} from {}", name(c.named), name(c.other))
 }
@@ -146,7 +146,7 @@ pub fn next_experiment(d: &Diagnosis) -> &'static str {
     }
 }
 
-/// Why two effects cannot be told apart.
+/// Why two effects cannot be distinguished.
 pub fn alike(c: &Confusable) -> String {
     format!("their fits differ by {:.1} in BIC on this record", 2.0 * c.difference)
 }
@@ -236,9 +236,9 @@ pub const REMAINS: f64 = 1.5;
 /// What no cause explains, in a sentence; none where it is little.
 pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
     let r = Some(&d.remainder).filter(|r| r.noise_multiple > REMAINS)?;
-    let beside = if d.causes.is_empty() { "No cause explains" } else { "Beside that no cause explains" };
+    let opening = if d.causes.is_empty() { "No cause explains" } else { "Beside that no cause explains" };
     Some(format!(
-        "{beside} {} {} rms of torque at the {} ({} of the torque, {} times what the encoders' noise makes): {}.",
+        "{opening} {} {} rms of torque at the {} ({} of the torque, {} times what the encoders' noise makes): {}.",
         format::number(r.torque_rms, 3, Medium::Page),
         motion.unit("N.m"),
         r.site.as_str(),
@@ -252,7 +252,7 @@ pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
     ))
 }
 
-/// Why the figures of the gap are of what they are; none where the strictest way tells them.
+/// Why the gap is measured as it is; none where the strictest measure could be used.
 pub fn why_this_way(d: &Diagnosis) -> Option<String> {
     let off = |of: ClosureOf| percent(d.gap.ways.iter().find(|w| w.of == of).map_or(f64::NAN, |w| w.levels.after));
     match d.gap.closure_of {
@@ -274,8 +274,8 @@ pub fn why_this_way(d: &Diagnosis) -> Option<String> {
 
 /// What the effects close beyond new parameters; none where no effect is named.
 pub fn beyond_parameters(d: &Diagnosis) -> Option<String> {
-    let told = d.verdict == Verdict::Effect && d.gap.closure_of_effect.is_finite();
-    told.then(|| {
+    let measured = d.verdict == Verdict::Effect && d.gap.closure_of_effect.is_finite();
+    measured.then(|| {
         format!(
             "Counted from the model whose parameters alone were fitted again, {} {} of what was left.",
             if d.causes.len() > 1 { "the effects close" } else { "the effect closes" },
@@ -284,9 +284,9 @@ pub fn beyond_parameters(d: &Diagnosis) -> Option<String> {
     })
 }
 
-/// What two effects that are not told apart come to.
-pub fn not_told(c: &Confusable) -> String {
-    format!("These data do not tell {}: {}", told_apart(c), alike(c))
+/// The warning about two effects that are not distinguished.
+pub fn not_distinguished(c: &Confusable) -> String {
+    format!("These data do not tell {}: {}", distinguished(c), alike(c))
 }
 
 /// Whether the drive's loop agrees with the diagnosis.
@@ -327,11 +327,11 @@ pub fn steps(d: &Diagnosis) -> Vec<String> {
             "Look at the machine at the place marked; compare the pictures of the residual with what moves there."
         }
     }];
-    steps.into_iter().map(str::to_owned).chain(tell_apart(d)).chain([next_experiment(d).to_owned()]).collect()
+    steps.into_iter().map(str::to_owned).chain(how_to_distinguish(d)).chain([next_experiment(d).to_owned()]).collect()
 }
 
-/// Which causes the next experiment is to tell apart; none where all are told.
-fn tell_apart(d: &Diagnosis) -> Option<String> {
+/// Which causes the next experiment has to distinguish; none where all are distinguished.
+fn how_to_distinguish(d: &Diagnosis) -> Option<String> {
     let name = |e: Effect| lower(short_title(e.info()));
     let pairs: Vec<String> = d.confusable.iter().map(|c| format!("{} or {}", name(c.named), name(c.other))).collect();
     (!pairs.is_empty() && (d.verdict == Verdict::Effect || either(d).is_some())).then(|| {
