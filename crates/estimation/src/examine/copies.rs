@@ -14,13 +14,16 @@ use super::{Channel, Input};
 const ROUNDING: f64 = 1e-6;
 /// Samples that a copy may be late or early: a cycle or two of a slower task.
 const LATE: usize = 10;
-/// Samples that are compared first, all over the record: nearly every pair differs in those.
+/// Samples that are compared first, all over the record, and then: nearly every pair differs in those, and of two encoders on one shaft that
+/// went far the most that agree in the first.
 const FIRST: usize = 256;
+const THEN: usize = 64 * FIRST;
 
 /// How `y` is made of `x`: the factor, where it is a copy.
 fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
-    let some = (x.len() / FIRST).max(1);
-    slope(x, y, some, 100.0 * ROUNDING)?;
+    let every = |samples: usize| (x.len() / samples).max(1);
+    slope(x, y, every(FIRST), 100.0 * ROUNDING)?;
+    slope(x, y, every(THEN), 10.0 * ROUNDING)?;
     slope(x, y, 1, ROUNDING)
 }
 
