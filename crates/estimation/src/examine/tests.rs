@@ -524,6 +524,16 @@ fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_p
 }
 
 #[test]
+fn a_table_that_goes_five_times_as_far_as_its_motor_is_refused_and_one_that_goes_half_as_far_told() {
+    for (factor, severity) in [(5.0, Severity::Refuse), (0.5, Severity::Warn)] {
+        let mut c = plain();
+        c.v[3].iter_mut().for_each(|v| *v *= factor);
+        let found = examine(&Input { nominal: Some(NOMINAL), ..c.positions() });
+        assert_eq!(found.find("scale").map(|f| f.severity), Some(severity), "{factor}: {:#?}", found.findings);
+    }
+}
+
+#[test]
 fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
     let held = axis(Kind::Schroeder, 4096, 4, &effect("coulomb_table", &[("level", 0.05)]), 1e-5);
     let looked_at = |columns: &Columns| refused(&Input { nominal: Some(NOMINAL), ..columns.positions() });
