@@ -37,7 +37,7 @@ impl Log {
 type Case = (&'static str, &'static [usize], fn(&mut Log, &Log));
 
 /// Ways to break a record that its examination refuses. The second log is another one of the same axis.
-const CASES: [Case; 70] = [
+const CASES: [Case; 71] = [
     ("dead torque", ALL, |l, _| l.0[1].fill(0.0)),
     ("dead theta1", ALL, |l, _| l.0[2].fill(0.3)),
     ("dead omega1", ALL, |l, _| l.0[3].fill(0.0)),
@@ -120,18 +120,6 @@ const CASES: [Case; 70] = [
     }),
     ("theta1 at the end of its counter, positions alone", POSITIONS, |l, _| l.clamp(2, 0.4)),
     ("theta2 at the end of its counter, positions alone", POSITIONS, |l, _| l.clamp(4, 0.4)),
-];
-
-/// Ways that the examination may let through: nothing fits then, which is what is said.
-const DOUBTED: [Case; 3] = [
-    ("integral of the torque", ALL, |l, _| {
-        let mut sum = 0.0;
-        l.0[1].iter_mut().for_each(|v| {
-            sum += 1e-3 * *v;
-            *v = sum;
-        });
-    }),
-    ("rate of the torque", ALL, |l, _| l.0[1] = l.rate(1)),
     ("every other sample of theta1 is theta2's, positions alone", POSITIONS, |l, _| {
         let table = l.0[4].clone();
         l.0[2].iter_mut().zip(table).step_by(2).for_each(|(v, w)| *v = w);
@@ -175,33 +163,50 @@ fn no_broken_record_is_identified_or_given_a_cause() {
     assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), CASES.len());
 }
 
-#[test]
-fn what_the_examination_lets_through_is_not_identified_nor_given_a_cause_either() {
+/// That a record which its examination may let through is neither identified nor given a cause: nothing fits, which is what is said.
+fn doubted(keep: &[usize], change: fn(&mut Log)) {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("axis.toml"), AXIS).unwrap();
-    let (sound, other) = (Log::new(1), Log::new(2));
-    for (name, keep, change) in DOUBTED {
-        let mut log = sound.clone();
-        change(&mut log, &other);
-        log.write(&at("log.csv"), keep);
-        for command in [
-            &["identify", "log.csv", "--axis", "axis.toml", "--method", "ls"][..],
-            &["identify", "log.csv", "--axis", "axis.toml", "--stream", "--method", "ls"],
-        ] {
-            let done = run::eixo_in(folder.path(), command);
-            let said = String::from_utf8_lossy(&done.stdout).into_owned();
-            assert_eq!(done.status.code(), Some(1), "{name}: {said} {}", String::from_utf8_lossy(&done.stderr));
-            assert!(!said.contains("identifies the axis"), "{name}: {said}");
-        }
-        let done = run::eixo_in(folder.path(), &["diagnose", "log.csv", "--axis", "axis.toml", "--json", "seen.json"]);
-        assert!(matches!(done.status.code(), Some(0 | 1)), "{name}: {}", String::from_utf8_lossy(&done.stderr));
-        let json: serde_json::Value = serde_json::from_slice(&std::fs::read(at("seen.json")).unwrap()).unwrap();
-        // A refused record has an examination and no verdict.
-        if json["schema"] != "eixo.examination/1" {
-            assert_eq!(json["verdict"], "unexplained", "{name}");
-            let likely = json["causes"].as_array().unwrap().iter().filter(|c| c["probability"].as_f64() >= Some(0.5));
-            assert_eq!(likely.count(), 0, "{name}: {}", json["causes"]);
-        }
+    let mut log = Log::new(1);
+    change(&mut log);
+    log.write(&at("log.csv"), keep);
+    for command in [
+        &["identify", "log.csv", "--axis", "axis.toml", "--method", "ls"][..],
+        &["identify", "log.csv", "--axis", "axis.toml", "--stream", "--method", "ls"],
+    ] {
+        let done = run::eixo_in(folder.path(), command);
+        let said = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert_eq!(done.status.code(), Some(1), "{said} {}", String::from_utf8_lossy(&done.stderr));
+        assert!(!said.contains("identifies the axis"), "{said}");
     }
+    let done = run::eixo_in(folder.path(), &["diagnose", "log.csv", "--axis", "axis.toml", "--json", "seen.json"]);
+    assert!(matches!(done.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&done.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(at("seen.json")).unwrap()).unwrap();
+    // A refused record has an examination and no verdict.
+    if json["schema"] != "eixo.examination/1" {
+        assert_eq!(json["verdict"], "unexplained");
+        let likely = json["causes"].as_array().unwrap().iter().filter(|c| c["probability"].as_f64() >= Some(0.5));
+        assert_eq!(likely.count(), 0, "{}", json["causes"]);
+    }
+}
+
+#[test]
+fn the_integral_of_the_torque_identifies_nothing_and_has_no_cause() {
+    doubted(ALL, |l| {
+        let mut sum = 0.0;
+        l.0[1].iter_mut().for_each(|v| {
+            sum += 1e-3 * *v;
+            *v = sum;
+        });
+    });
+}
+
+#[test]
+fn the_rate_of_the_torque_identifies_nothing_and_has_no_cause() {
+    doubted(ALL, |l| {
+        // Where nothing fits, all is tried: a quarter of the record takes as long as a machine may.
+        l.0.iter_mut().for_each(|c| c.truncate(1500));
+        l.0[1] = l.rate(1);
+    });
 }

@@ -534,6 +534,18 @@ fn a_table_that_goes_five_times_as_far_as_its_motor_is_refused_and_one_that_goes
 }
 
 #[test]
+fn two_encoders_that_take_turns_in_one_column_are_found() {
+    for turns in [2, 5] {
+        let mut c = plain();
+        let table = c.v[3].clone();
+        c.v[1].iter_mut().zip(table).step_by(turns).for_each(|(v, w)| *v = w);
+        for nominal in [None, Some(NOMINAL)] {
+            assert_eq!(refused(&Input { nominal, ..c.positions() }), ["copy"], "{turns}");
+        }
+    }
+}
+
+#[test]
 fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
     let held = axis(Kind::Schroeder, 4096, 4, &effect("coulomb_table", &[("level", 0.05)]), 1e-5);
     let looked_at = |columns: &Columns| refused(&Input { nominal: Some(NOMINAL), ..columns.positions() });
