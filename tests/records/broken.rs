@@ -37,7 +37,7 @@ impl Log {
 type Case = (&'static str, &'static [usize], fn(&mut Log, &Log));
 
 /// Ways to break a record that its examination refuses. The second log is another one of the same axis.
-const CASES: [Case; 71] = [
+const CASES: [Case; 72] = [
     ("dead torque", ALL, |l, _| l.0[1].fill(0.0)),
     ("dead theta1", ALL, |l, _| l.0[2].fill(0.3)),
     ("dead omega1", ALL, |l, _| l.0[3].fill(0.0)),
@@ -123,6 +123,10 @@ const CASES: [Case; 71] = [
     ("every other sample of theta1 is theta2's, positions alone", POSITIONS, |l, _| {
         let table = l.0[4].clone();
         l.0[2].iter_mut().zip(table).step_by(2).for_each(|(v, w)| *v = w);
+    }),
+    ("the twist logged as theta2, positions alone", POSITIONS, |l, _| {
+        let motor = l.0[2].clone();
+        l.0[4].iter_mut().zip(motor).for_each(|(v, w)| *v = w - *v);
     }),
 ];
 
