@@ -90,7 +90,8 @@ class Identification(Result):
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """The recommended estimates; `std` is the standard error, `reference` the axis file's value."""
+        """The recommended estimates; `std` is the standard error, `reference` the axis file's value. One that the record does not determine
+        has no `value`."""
         best = self.data["recommended"]
         of = self.data["methods"][best["method"]]["parameters"] if best else []
         return table(of, ["name", "value", "std", "unit", "reference"])

@@ -1,4 +1,4 @@
-//! Samples that a log held, as notes on a record: `diagnose` bridges them, and who reads the log should know how many and when.
+//! Samples that a log held, as notes on a record: `identify` and `diagnose` bridge them, and who reads the log should know how many and when.
 
 use crate::examine::{Finding, Severity};
 use crate::trace::{Signal, Trace, held};
@@ -29,7 +29,7 @@ fn note(trace: &Trace, signal: Signal, at: &[usize]) -> Option<Finding> {
             signal.name(),
             seen,
             "The log held them: a cycle of the bus or of the logger was missed.",
-            "`eixo diagnose` bridges them; see to the logger where they are many.",
+            "`eixo identify` and `eixo diagnose` bridge them; see to the logger where they are many.",
         )
     })
 }

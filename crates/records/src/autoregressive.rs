@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Samples before one that it is told by.
 const ORDER: usize = 32;
@@ -33,20 +34,25 @@ pub struct Expected {
 
 /// What a signal is expected to be at samples, in rising order, whose own values say nothing. Where too few others are sound nothing is.
 pub fn expected(y: &[f64], lost: &[usize]) -> Vec<Expected> {
-    let mut all = Vec::new();
-    let mut from = 0;
-    while from < y.len() {
-        // The last stretch takes what is left of the record.
-        let end = if from + 2 * STRETCH > y.len() { y.len() } else { from + STRETCH };
-        let own: Vec<usize> = lost.iter().copied().filter(|k| (from..end).contains(k)).collect();
-        if !own.is_empty() {
-            // A model of its neighbours' samples, too: at the edge a sample has few to one side.
-            let whole = from.saturating_sub(ORDER)..(end + ORDER).min(y.len());
-            all.extend(of_stretch(y, lost, &own, whole));
+    let within = |range: &Range<usize>| {
+        let [from, to] = [range.start, range.end].map(|end| lost.partition_point(|k| *k < end));
+        &lost[from..to]
+    };
+    // The last stretch takes what is left of the record.
+    let stretches = (y.len() / STRETCH).max(1);
+    let of = |number: usize| -> Vec<Expected> {
+        let end = if number + 1 == stretches { y.len() } else { (number + 1) * STRETCH };
+        let stretch = number * STRETCH..end;
+        let own = within(&stretch);
+        if own.is_empty() {
+            return Vec::new();
         }
-        from = end;
-    }
-    all
+        // A model of its neighbours' samples, too: at the edge a sample has few to one side.
+        let whole = stretch.start.saturating_sub(ORDER)..(end + ORDER).min(y.len());
+        of_stretch(y, within(&whole), own, whole)
+    };
+    let all: Vec<Vec<Expected>> = (0..stretches).into_par_iter().map(of).collect();
+    all.into_iter().flatten().collect()
 }
 
 /// Standard deviation, a sample, of the noise under a signal: the level above which 95 % of its spectrum lie, as its model has it. A motion

@@ -7,6 +7,10 @@
 //! neighbours, which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry
 //! 36(8), 1964).
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use crate::autoregressive::expected;
 
 /// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
@@ -29,66 +33,139 @@ const BLOCK: usize = 256;
 /// Share of the samples that may be lost: more are the signal.
 const MOST: f64 = 0.02;
 
-/// The cubic through the neighbours of a sample `k` and of the one `span` intervals on: what it expects at the two, and the rms of its
-/// residual.
-fn cubic(y: &[f64], k: usize, (span, reach): (usize, usize)) -> ([f64; 2], f64) {
-    // Even powers about the middle tell the value there, odd ones belong to the slope.
-    let (mut s, mut s2, mut s4, mut s6) = (0.0, 0.0, 0.0, 0.0);
-    let (mut a, mut a2, mut b, mut b3) = (0.0, 0.0, 0.0, 0.0);
-    let middle = 0.5 * span as f64;
-    let mut squares = 0.0;
-    let mut pair = |before: usize, after: usize| {
-        let x = 0.5 * (after - before) as f64;
-        let (before, after) = (y[before] - y[k], y[after] - y[k]);
-        let (even, odd) = (before + after, after - before);
-        s += 2.0;
-        s2 += 2.0 * x * x;
-        s4 += 2.0 * x.powi(4);
-        s6 += 2.0 * x.powi(6);
-        a += even;
-        a2 += even * x * x;
-        b += odd * x;
-        b3 += odd * x.powi(3);
-        squares += before * before + after * after;
-    };
-    (1..=reach).for_each(|j| pair(k - j, k + span + j));
-    // Those between the two; of an odd number the one in the middle is left out, which has no other.
-    (1..).take_while(|j| 2 * j < span).for_each(|j| pair(k + j, k + span - j));
-    let even = s * s4 - s2 * s2;
-    let (c0, c2) = ((s4 * a - s2 * a2) / even, (s * a2 - s2 * a) / even);
-    let odd = s2 * s6 - s4 * s4;
-    let (c1, c3) = ((s6 * b - s4 * b3) / odd, (s2 * b3 - s4 * b) / odd);
-    let left = squares - c0 * a - c2 * a2 - c1 * b - c3 * b3;
-    let expected = [-middle, middle].map(|x| y[k] + c0 + x * (c1 + x * (c2 + x * c3)));
-    (expected, (left.max(0.0) / (s - 4.0)).sqrt())
+/// Samples that a cubic is laid through at a time: so the processor does several at once.
+const LANES: usize = 8;
+
+/// Two neighbours at one distance from the middle: where they stand, from the first neighbour on, and the distance in samples with its cube.
+struct Pair {
+    before: usize,
+    after: usize,
+    x: f64,
+    x3: f64,
 }
 
-/// Lost samples of a position whose noise has a standard deviation of `noise`: the first of each pass' two, with what the neighbours
-/// expect and the rms by which these disagree.
-fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f64)> {
+/// The cubic through the neighbours of a sample and of the one `span` intervals on: what of it is the same at every sample.
+struct Cubic {
+    span: usize,
+    reach: usize,
+    pairs: Vec<Pair>,
+    /// Sums over the neighbours: of one, of x^2, x^4 and x^6.
+    s: f64,
+    s2: f64,
+    s4: f64,
+    s6: f64,
+}
+
+/// A cubic at a sample: what it expects there and `span` intervals on, and the rms of its residual.
+#[derive(Clone, Copy)]
+struct Laid {
+    expected: [f64; 2],
+    residual: f64,
+}
+
+impl Cubic {
+    fn new((span, reach): (usize, usize)) -> Self {
+        let outside = (1..=reach).map(|j| (reach - j, reach + span + j));
+        // Those between the two; of an odd number the one in the middle is left out, which has no other.
+        let between = (1..).take_while(|j| 2 * j < span).map(|j| (reach + j, reach + span - j));
+        let (mut s, mut s2, mut s4, mut s6) = (0.0, 0.0, 0.0, 0.0);
+        let pairs = outside.chain(between).map(|(before, after)| {
+            let x = 0.5 * after.abs_diff(before) as f64;
+            s += 2.0;
+            s2 += 2.0 * x * x;
+            s4 += 2.0 * x.powi(4);
+            s6 += 2.0 * x.powi(6);
+            Pair { before, after, x, x3: x.powi(3) }
+        });
+        let pairs = pairs.collect();
+        Self { span, reach, pairs, s, s2, s4, s6 }
+    }
+
+    /// At `N` samples in a row from `k` on.
+    fn at<const N: usize>(&self, y: &[f64], k: usize) -> [Laid; N] {
+        let lanes = |at: usize| -> &[f64] { &y[k - self.reach + at..][..N] };
+        let own = lanes(self.reach);
+        // Even powers about the middle tell the value there, odd ones belong to the slope.
+        let ([mut a, mut a2], [mut b, mut b3], mut squares) = ([[0.0; N]; 2], [[0.0; N]; 2], [0.0; N]);
+        for pair in &self.pairs {
+            let (before, after) = (lanes(pair.before), lanes(pair.after));
+            for i in 0..N {
+                let (before, after) = (before[i] - own[i], after[i] - own[i]);
+                let (even, odd) = (before + after, after - before);
+                a[i] += even;
+                a2[i] += even * pair.x * pair.x;
+                b[i] += odd * pair.x;
+                b3[i] += odd * pair.x3;
+                squares[i] += before * before + after * after;
+            }
+        }
+        let &Self { s, s2, s4, s6, .. } = self;
+        let middle = 0.5 * self.span as f64;
+        let (even, odd) = (s * s4 - s2 * s2, s2 * s6 - s4 * s4);
+        std::array::from_fn(|i| {
+            let (c0, c2) = ((s4 * a[i] - s2 * a2[i]) / even, (s * a2[i] - s2 * a[i]) / even);
+            let (c1, c3) = ((s6 * b[i] - s4 * b3[i]) / odd, (s2 * b3[i] - s4 * b[i]) / odd);
+            let left = squares[i] - c0 * a[i] - c2 * a2[i] - c1 * b[i] - c3 * b3[i];
+            let expected = [-middle, middle].map(|x| own[i] + c0 + x * (c1 + x * (c2 + x * c3)));
+            Laid { expected, residual: (left.max(0.0) / (s - 4.0)).sqrt() }
+        })
+    }
+
+    /// At the samples of a range.
+    fn along(&self, y: &[f64], range: Range<usize>) -> Vec<Laid> {
+        let mut all = Vec::with_capacity(range.len());
+        let mut k = range.start;
+        while k + LANES <= range.end {
+            all.extend(self.at::<LANES>(y, k));
+            k += LANES;
+        }
+        all.extend((k..range.end).flat_map(|k| self.at::<1>(y, k)));
+        all
+    }
+}
+
+/// Whether a sample repeats the one before: a reading with noise in it does so only where it is held.
+fn repeats(y: &[f64], k: usize) -> bool {
+    y[k] == y[k - 1]
+}
+
+/// A lost sample, the first of a pass' two, with what the neighbours expect and the rms by which these disagree.
+type Lost = (usize, [f64; 2], f64);
+
+/// Lost samples of a position whose noise has a standard deviation of `noise`.
+fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<Lost> {
     let (span, reach) = pass;
     if y.len() < BLOCK {
         return Vec::new();
     }
-    let inside: Vec<usize> = (reach..y.len() - reach - span).collect();
-    let mut out: Vec<(usize, [f64; 2], f64)> = Vec::new();
-    for block in inside.chunks(BLOCK) {
-        let cubics: Vec<([f64; 2], f64)> = block.iter().map(|k| cubic(y, *k, pass)).collect();
-        let mut residuals: Vec<f64> = cubics.iter().map(|c| c.1).collect();
+    let cubic = Cubic::new(pass);
+    let end = y.len() - reach - span;
+    let of_block = |first: usize| {
+        let block = first..(first + BLOCK).min(end);
+        let held = |k: usize| repeats(y, k) && repeats(y, k + span);
+        // Two far from each other are lost only where both are held.
+        if span >= 2 && !block.clone().any(held) {
+            return Vec::new();
+        }
+        let cubics = cubic.along(y, block.clone());
+        let mut residuals: Vec<f64> = cubics.iter().map(|c| c.residual).collect();
         let usual = *residuals.select_nth_unstable_by(block.len() / 2, f64::total_cmp).1;
-        for (&k, (expected, residual)) in block.iter().zip(&cubics) {
+        let is_lost = |(k, c): &(usize, Laid)| {
             // A fast motion is no cubic: what it leaves now and then is measured by what it leaves as a rule.
-            let off = (y[k] - expected[0]).abs().max((y[k + span] - expected[1]).abs());
-            // A reading with noise in it repeats only where it is held.
-            let held = y[k] == y[k - 1] && y[k + span] == y[k + span - 1];
-            let clear = held && off > CLEAR * residual;
-            let agree = *residual <= AGREE * usual.max(noise);
-            if (clear || agree && span < 2)
-                && off > FAR * residual.max(usual).max(noise)
-                && out.last().is_none_or(|(last, ..)| last + span < k)
-            {
-                out.push((k, *expected, *residual));
-            }
+            let off = (y[*k] - c.expected[0]).abs().max((y[k + span] - c.expected[1]).abs());
+            let clear = off > CLEAR * c.residual && held(*k);
+            let agree = c.residual <= AGREE * usual.max(noise);
+            off > FAR * c.residual.max(usual).max(noise) && (clear || agree && span < 2)
+        };
+        let told = block.zip(cubics).filter(is_lost);
+        told.map(|(k, c)| (k, c.expected, c.residual)).collect::<Vec<Lost>>()
+    };
+    let blocks: Vec<usize> = (reach..end).step_by(BLOCK).collect();
+    let found: Vec<Vec<Lost>> = blocks.into_par_iter().map(of_block).collect();
+    let mut out: Vec<Lost> = Vec::new();
+    for one in found.into_iter().flatten() {
+        if out.last().is_none_or(|(last, ..)| last + span < one.0) {
+            out.push(one);
         }
     }
     out
@@ -96,7 +173,7 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<(usize, [f64; 2], f6
 
 /// Samples that repeat the one before and are expected to be something else, and what: as many as may be lost of a record at most.
 fn repeated(y: &[f64], noise: f64) -> Vec<(usize, f64)> {
-    let repeats: Vec<usize> = (1..y.len()).filter(|k| y[*k] == y[k - 1]).collect();
+    let repeats: Vec<usize> = (1..y.len()).filter(|k| repeats(y, *k)).collect();
     if repeats.len() as f64 > MOST * y.len() as f64 {
         return Vec::new();
     }
@@ -122,8 +199,15 @@ fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
         all.push(k);
         y[k] = expected;
     }
+    let mut last = None;
     for pass in PASSES {
+        // The same pass over the same samples finds nothing again.
+        if last == Some(pass) {
+            continue;
+        }
         let (span, found) = (pass.0, lost(y, noise, pass));
+        last = found.is_empty().then_some(pass);
+        let nearest = Cubic::new((span, NEAREST));
         let each = if span == 0 { 1 } else { 2 };
         if (all.len() + each * found.len()) as f64 > MOST * y.len() as f64 {
             break;
@@ -132,8 +216,8 @@ fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
             all.push(k);
             all.extend((span > 0).then_some(k + span));
             // The nearest neighbours tell a fast motion best, where they are sound.
-            let (nearer, left) = cubic(y, k, (span, NEAREST));
-            let expected = if left < residual { nearer } else { expected };
+            let [nearer] = nearest.at::<1>(y, k);
+            let expected = if nearer.residual < residual { nearer.expected } else { expected };
             (y[k], y[k + span]) = (expected[0], expected[1]);
         }
     }
@@ -146,14 +230,13 @@ const GOES_ON: f64 = 1.5;
 /// The samples among those that [`bridge`] bridges that repeat the one before, in order: the log held them while the axis went on.
 #[must_use]
 pub fn held(y: &[f64], noise: f64) -> Vec<usize> {
-    let repeats = |k: usize| y[k] == y[k - 1];
     // Most records have none: nothing is fitted there.
-    let step = (1..y.len()).filter(|k| !repeats(*k)).map(|k| (y[k] - y[k - 1]).abs()).fold(f64::INFINITY, f64::min);
-    if !(1..y.len().saturating_sub(1)).any(|k| repeats(k) && (y[k + 1] - y[k]).abs() >= GOES_ON * step) {
+    let step = (1..y.len()).filter(|k| !repeats(y, *k)).map(|k| (y[k] - y[k - 1]).abs()).fold(f64::INFINITY, f64::min);
+    if !(1..y.len().saturating_sub(1)).any(|k| repeats(y, k) && (y[k + 1] - y[k]).abs() >= GOES_ON * step) {
         return Vec::new();
     }
     let mut held = bridged(&mut y.to_vec(), noise);
-    held.retain(|k| *k > 0 && repeats(*k));
+    held.retain(|k| *k > 0 && repeats(y, *k));
     held.sort_unstable();
     held.dedup();
     held

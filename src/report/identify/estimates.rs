@@ -4,20 +4,9 @@ use super::{has_estimates, has_reference};
 use crate::identify::result::{Estimate, Identification, MethodResult};
 use crate::report::{Block, Cell, Table};
 
-/// Whether an estimate is one: finite, and larger than its standard error.
-pub fn is_shown(e: &Estimate) -> bool {
-    // What no axis has is not shown as a value of it.
-    let impossible = match e.name {
-        "I" | "I1" | "I2" | "K" | "wn" => e.value <= 0.0,
-        "B" | "zeta" => e.value < 0.0,
-        _ => false,
-    };
-    e.value.is_finite() && !impossible && e.std.is_none_or(|s| s.is_finite() && (s < e.value.abs() || e.value == 0.0))
-}
-
 /// The estimate with its standard error, in words where it is none.
 pub fn value(e: &Estimate, unit: &str) -> Cell {
-    if !is_shown(e) {
+    if !e.is_determined() {
         return Cell::text("not determined");
     }
     match e.std {
@@ -28,7 +17,7 @@ pub fn value(e: &Estimate, unit: &str) -> Cell {
 
 /// How far the estimate is from its reference: nothing where it is none.
 fn error(e: &Estimate) -> Cell {
-    e.error_percent.filter(|_| is_shown(e)).map_or(Cell::Empty, |p| Cell::Percent(p / 100.0))
+    e.error_percent.filter(|_| e.is_determined()).map_or(Cell::Empty, |p| Cell::Percent(p / 100.0))
 }
 
 /// Parameters and modal parameters of one method.
@@ -44,7 +33,9 @@ pub fn estimates(m: &MethodResult) -> Table {
         let mut cells = vec![
             Cell::text(e.name),
             value(e, e.unit),
-            e.std.filter(|_| is_shown(e) && e.value != 0.0).map_or(Cell::Empty, |s| Cell::Percent((s / e.value).abs())),
+            e.std
+                .filter(|_| e.is_determined() && e.value != 0.0)
+                .map_or(Cell::Empty, |s| Cell::Percent((s / e.value).abs())),
         ];
         if reference {
             cells.push(e.reference.map_or(Cell::Empty, |r| Cell::Number(r, 5, e.unit.to_owned())));

@@ -1,6 +1,6 @@
 //! The head of the page: whether the axis is identified, and by what.
 
-use super::estimates::{is_shown, value};
+use super::estimates::value;
 use super::recommended;
 use crate::identify::identifiability::LEAST_FIT;
 use crate::identify::result::Identification;
@@ -54,7 +54,7 @@ pub fn verdict(found: &Identification) -> Summary {
         ),
         None => format!("{} does not identify the axis from this record.", best.title),
     };
-    let known = best.modal.iter().chain(best.parameters.iter()).filter(|e| is_shown(e));
+    let known = best.modal.iter().chain(best.parameters.iter()).filter(|e| e.is_determined());
     let figures = if identifiability.identified {
         known.take(4).map(|e| (e.name.to_owned(), value(e, e.unit))).collect()
     } else {

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! y(k) = a*x(k - l) + b      but for rounding
+//! y(k) = x(k)                at one sample of m, and not at the others
 //! ```
 //!
 //! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: noise, steps and the twist of the coupling part them.
@@ -14,13 +15,32 @@ use super::{Channel, Input};
 const ROUNDING: f64 = 1e-6;
 /// Samples that a copy may be late or early: a cycle or two of a slower task.
 const LATE: usize = 10;
-/// Samples that are compared first, all over the record: nearly every pair differs in those.
+/// Samples that are compared first, all over the record, and then: nearly every pair differs in those, and of two encoders on one shaft that
+/// went far the most that agree in the first.
 const FIRST: usize = 256;
+const THEN: usize = 64 * FIRST;
+
+/// Most columns that a logger's task takes turns with.
+const TURNS: usize = 8;
+/// Samples of one turn from which two columns cannot agree in all of them by chance, coarse as they may be.
+const LEAST: usize = 64;
+
+/// How many columns took turns, where `x` and `y` are one at each sample of a turn and apart at half of the others or more.
+fn taking_turns(x: &[f64], y: &[f64]) -> Option<usize> {
+    let one = |k: &usize| x[*k] == y[*k];
+    (2..=TURNS.min(x.len() / LEAST)).find(|turns| {
+        (0..*turns).any(|own| {
+            let others = || (0..x.len()).filter(|k| k % turns != own);
+            (own..x.len()).step_by(*turns).all(|k| one(&k)) && 2 * others().filter(one).count() <= others().count()
+        })
+    })
+}
 
 /// How `y` is made of `x`: the factor, where it is a copy.
 fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
-    let some = (x.len() / FIRST).max(1);
-    slope(x, y, some, 100.0 * ROUNDING)?;
+    let every = |samples: usize| (x.len() / samples).max(1);
+    slope(x, y, every(FIRST), 100.0 * ROUNDING)?;
+    slope(x, y, every(THEN), 10.0 * ROUNDING)?;
     slope(x, y, 1, ROUNDING)
 }
 
@@ -38,7 +58,7 @@ fn speed(x: &[f64], dt: f64) -> Vec<f64> {
     x.windows(3).map(|w| (w[2] - w[0]) / (2.0 * dt)).collect()
 }
 
-/// Looks for a torque that is a copy of a motion, and a table's encoder that is one of the motor's.
+/// Looks for a torque that is a copy of a motion, and a table's encoder that is one of the motor's or takes turns with it.
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let channel = |name: &str| input.channels().find(|c| c.name == name);
     let late = |x: Channel<'_>, y: Channel<'_>| {
@@ -94,6 +114,16 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
                 lag,
                 "One sensor was logged twice: the coupling between the two does not show.",
                 "Map the column of the table's own encoder in [signals], or leave it out and describe the axis as structure = \"rigid\".",
+            ));
+        } else if let Some(turns) = taking_turns(x.values, y.values) {
+            let share = if turns == 2 { "Every other sample".to_owned() } else { format!("One sample of {turns}") };
+            findings.push(Finding::new(
+                "copy",
+                Severity::Refuse,
+                signal,
+                format!("{share} of {two} and of {one} is one value, and the others differ."),
+                "The logger took turns between two sensors and wrote one's samples into the other's column.",
+                "Log both columns at every sample, or cut the record to where they are (--from, --to).",
             ));
         }
     }

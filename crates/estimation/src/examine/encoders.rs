@@ -105,6 +105,9 @@ fn moves_along(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<
 const HELD: f64 = 0.02;
 /// Ratio of two motions up to which they are alike.
 const LIKE: f64 = 1.67;
+/// Table over motor, both of one body below half the nominal antiresonance, from which the two count different angles: the coupling makes
+/// 4/3 of it there, or 2 where its stiffness is half the nominal one.
+const GEARED: f64 = 3.0;
 
 /// That the table moves so many times as far as the motor because one of them is in another unit.
 fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
@@ -157,9 +160,11 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
         return;
     }
     if !(LIKE.recip()..LIKE).contains(&ratio.abs()) {
+        // Nothing that acts on a table makes it go so much further than the motor that moves it.
+        let geared = of_one_body(input).is_some_and(|r| r.abs() > GEARED) && ratio.abs() > GEARED;
         findings.push(Finding::new(
             "scale",
-            Severity::Warn,
+            if geared { Severity::Refuse } else { Severity::Warn },
             "theta2",
             format!("theta2 moves {ratio:.4} times as far as theta1 at the lowest frequencies."),
             "A gear lies between the encoders, or the record holds no motion slow enough to tell.",

@@ -29,6 +29,7 @@ mod slips;
 mod smoothing;
 mod spectra;
 mod stamps;
+mod twist;
 mod usable;
 
 #[cfg(test)]
@@ -283,6 +284,10 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let [one, two] = &mended;
         let part = Input { theta1: one.as_deref().or(part.theta1), theta2: two.as_deref().or(part.theta2), ..part };
         pairs::speeds(&part, &mut findings);
+        let twist = twist::logged(&part);
+        // In its place nothing is known of the table.
+        let part = if twist.is_some() { Input { theta2: None, omega2: None, ..part } } else { part };
+        findings.extend(twist);
         band = momentum::examine(&part, &mut inertia, &mut findings);
         // A guess is asked for where no nominal value is known.
         if part.nominal.is_none() {

@@ -22,13 +22,34 @@ pub(super) fn rather_as_logged(input: &Input<'_>, table: f64, torque: f64) -> bo
     of(1.0, 1.0).zip(of(table, torque)).is_some_and(|(logged, mended)| logged < BETTER * mended)
 }
 
-/// Share of the torque about its mean that the motor's side misses, by the smoothing that leaves the least, with so much of the coupling.
+/// What the motor's side makes of the table's column as the twist.
+pub(super) struct AsTwist {
+    /// As the table's motion it would need another torque by far.
+    pub(super) rather: bool,
+    /// Without it the torque is missed by more.
+    pub(super) felt: bool,
+}
+
+/// The table's column, times `sign`, as the twist; None where the motor's side cannot be asked.
+pub(super) fn as_twist(input: &Input<'_>, sign: f64) -> Option<AsTwist> {
+    let twist: Vec<f64> = input.theta2?.iter().map(|d| sign * d).collect();
+    let of = |coupling: f64| missed_with(input, &twist, coupling, 1.0);
+    let (logged, with, without) = (missed_by_the_motor(input, 1.0, 1.0, 1.0)?, of(1.0)?, of(0.0)?);
+    Some(AsTwist { rather: with < FELT * logged, felt: with < BETTER * without })
+}
+
+/// Share of the torque that the motor's side misses with the table's motion times `table` and so much of the coupling.
 fn missed_by_the_motor(input: &Input<'_>, coupling: f64, table: f64, torque: f64) -> Option<f64> {
+    let twist: Vec<f64> = input.theta1?.iter().zip(input.theta2?).map(|(a, b)| a - table * b).collect();
+    missed_with(input, &twist, coupling, torque)
+}
+
+/// Share of the torque about its mean that the motor's side misses with a twist, by the smoothing that leaves the least.
+fn missed_with(input: &Input<'_>, twist: &[f64], coupling: f64, torque: f64) -> Option<f64> {
     let Nominal { structure: Structure::TwoInertia, parameters: p } = input.nominal? else { return None };
-    let (t, x1, x2, dt) = (input.torque?, input.theta1?, input.theta2?, input.dt);
-    let twist: Vec<f64> = x1.iter().zip(x2).map(|(a, b)| a - table * b).collect();
+    let (t, x1, dt) = (input.torque?, input.theta1?, input.dt);
     let by = |width: usize| {
-        let [t, x, d] = [t, x1, &twist].map(|v| smoothed(v, width));
+        let [t, x, d] = [t, x1, twist].map(|v| smoothed(v, width));
         let missed = (1..t.len() - 1).map(|k| {
             let acceleration = (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt);
             let pull = p.b * (d[k + 1] - d[k - 1]) / (2.0 * dt) + p.k * d[k];

@@ -524,6 +524,47 @@ fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_p
 }
 
 #[test]
+fn a_table_that_goes_five_times_as_far_as_its_motor_is_refused_and_one_that_goes_half_as_far_told() {
+    for (factor, severity) in [(5.0, Severity::Refuse), (0.5, Severity::Warn)] {
+        let mut c = plain();
+        c.v[3].iter_mut().for_each(|v| *v *= factor);
+        let found = examine(&Input { nominal: Some(NOMINAL), ..c.positions() });
+        assert_eq!(found.find("scale").map(|f| f.severity), Some(severity), "{factor}: {:#?}", found.findings);
+    }
+}
+
+#[test]
+fn the_twist_in_the_tables_place_is_found_either_way_round_and_whatever_acts_on_the_table() {
+    for settings in [
+        Settings::default(),
+        effect("coulomb_table", &[("level", 0.002)]),
+        effect("coulomb_motor", &[("level", 0.002)]),
+    ] {
+        for sign in [1.0, -1.0] {
+            let mut c = axis(Kind::RandomPhase, 4096, 2, &settings, 1e-5);
+            c.v[3] = c.v[1].iter().zip(&c.v[3]).map(|(a, b)| sign * (a - b)).collect();
+            let found = examine(&Input { nominal: Some(NOMINAL), ..c.positions() });
+            let finding = found.find("twist").unwrap_or_else(|| panic!("{sign}: {:#?}", found.findings));
+            assert_eq!(finding.severity, Severity::Refuse);
+            let way_out = if sign > 0.0 { "theta1 less it" } else { "theta1 plus it" };
+            assert!(finding.remedy.contains(way_out), "{sign}: {finding:#?}");
+        }
+    }
+}
+
+#[test]
+fn two_encoders_that_take_turns_in_one_column_are_found() {
+    for turns in [2, 5] {
+        let mut c = plain();
+        let table = c.v[3].clone();
+        c.v[1].iter_mut().zip(table).step_by(turns).for_each(|(v, w)| *v = w);
+        for nominal in [None, Some(NOMINAL)] {
+            assert_eq!(refused(&Input { nominal, ..c.positions() }), ["copy"], "{turns}");
+        }
+    }
+}
+
+#[test]
 fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
     let held = axis(Kind::Schroeder, 4096, 4, &effect("coulomb_table", &[("level", 0.05)]), 1e-5);
     let looked_at = |columns: &Columns| refused(&Input { nominal: Some(NOMINAL), ..columns.positions() });

@@ -144,6 +144,18 @@ impl<'a> Joined<'a> {
         }
     }
 
+    /// Gives each piece of a signal to `mend`, which says how many samples it altered, and takes the signal as it left it; none where the
+    /// record does not have it. The record is copied only where there is something to mend.
+    pub(super) fn mend(&mut self, signal: Signal, mend: impl Fn(&mut [f64]) -> usize) -> usize {
+        let Some(mut values) = self.samples.get(signal).map(<[f64]>::to_vec) else { return 0 };
+        let altered = self.pieces.iter().map(|piece| mend(&mut values[piece.clone()])).sum();
+        if altered > 0 {
+            let set = self.samples.to_mut().set(signal, values);
+            debug_assert!(set.is_ok(), "a column as long as the one it stands for");
+        }
+        altered
+    }
+
     /// Another torque in place of the record's.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! From traces to parameters: excitation signals, regressions, estimators and their figures of merit.
 
 mod assessment;
+mod bridged;
 pub mod excitation;
 pub mod extended;
 pub mod frequency;
@@ -26,5 +27,7 @@ pub mod statistics;
 pub mod stream;
 pub mod tables;
 
+#[cfg(test)]
+mod coverage;
 #[cfg(test)]
 mod tests;

@@ -76,8 +76,9 @@ pub struct TraceSummary {
     pub pieces: usize,
 }
 
-/// A parameter as estimated.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A parameter as estimated. In JSON `value` and `error_percent` are null where [`Estimate::is_determined`] says that it is none, which
+/// `determined` repeats.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Its name: I1, I2, B, K, wn, wd, zeta, ...
     pub name: &'static str,
@@ -304,6 +305,39 @@ impl Estimate {
         let error_percent = reference.filter(|r| *r != 0.0).map(|r| 100.0 * (value - r) / r);
         Self { name, unit, value, std, reference, error_percent }
     }
+
+    /// Whether it is an estimate: one that an axis can have, and larger than its standard error.
+    #[must_use]
+    pub fn is_determined(&self) -> bool {
+        let impossible = match self.name {
+            "I" | "I1" | "I2" | "K" | "wn" => self.value <= 0.0,
+            "B" | "zeta" => self.value < 0.0,
+            _ => false,
+        };
+        let error = |std: f64| std.is_finite() && (std < self.value.abs() || self.value == 0.0);
+        self.value.is_finite() && !impossible && self.std.is_none_or(error)
+    }
+}
+
+impl Serialize for Estimate {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        /// The fields in their order.
+        #[derive(Serialize)]
+        struct Told {
+            name: &'static str,
+            unit: &'static str,
+            value: Option<f64>,
+            std: Option<f64>,
+            reference: Option<f64>,
+            error_percent: Option<f64>,
+            determined: bool,
+        }
+        let &Self { name, unit, value, std, reference, error_percent } = self;
+        let determined = self.is_determined();
+        let told = |v: Option<f64>| v.filter(|_| determined);
+        Told { name, unit, value: told(Some(value)), std, reference, error_percent: told(error_percent), determined }
+            .serialize(serializer)
+    }
 }
 
 /// Most points of a plotted curve.
@@ -400,6 +434,24 @@ mod tests {
         assert!(series.y.contains(&9.0) && series.y.contains(&-9.0));
         assert!(series.x.contains(&(54_321.0 * 0.5)));
         assert!(series.x.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn an_estimate_that_is_none_is_no_number_in_json() {
+        let json =
+            |name, value, std| serde_json::to_value(Estimate::new(name, "kg.m2", value, std, Some(2.0))).unwrap();
+        let sure = json("I2", 1.0, Some(0.5));
+        assert_eq!((sure["value"].as_f64(), sure["error_percent"].as_f64()), (Some(1.0), Some(-50.0)));
+        assert_eq!(sure["determined"].as_bool(), Some(true));
+        for (name, value, std) in
+            [("I2", 1.0, Some(1.5)), ("I1", -1.0, Some(0.1)), ("B", -0.1, None), ("K", 1.0, Some(f64::NAN))]
+        {
+            let none = json(name, value, std);
+            assert!(none["value"].is_null() && none["error_percent"].is_null(), "{none}");
+            assert_eq!((none["name"].as_str(), none["determined"].as_bool()), (Some(name), Some(false)));
+        }
+        // No friction at all is one.
+        assert_eq!(json("B", 0.0, Some(0.1))["value"].as_f64(), Some(0.0));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! One identification from start to finish: every method asked for, its fit, and which one to trust.
 
+use super::bridged;
 use super::frequency;
 use super::identifiability::{Evidence, Identifiability};
 use super::joined::{Joined, noise_in_pieces};
@@ -161,10 +162,12 @@ pub fn identify_joined(
     file: &str,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Identification, TraceError> {
+    let mut warnings = bridged::lost(&mut joined);
     if machine.structure == Structure::Rigid {
-        return rigid::identify(&joined, machine, request, file, progress);
+        let mut result = rigid::identify(&joined, machine, request, file, progress)?;
+        result.warnings.splice(0..0, warnings);
+        return Ok(result);
     }
-    let mut warnings = Vec::new();
     for (angle, speed) in [(Signal::Theta1, Signal::Omega1), (Signal::Theta2, Signal::Omega2)] {
         let off = speed_error(&joined, angle, speed);
         if off > DIFFERENT_SPEED {

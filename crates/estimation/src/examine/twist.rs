@@ -1,0 +1,75 @@
+//! The twist of the coupling, logged in the table's place.
+//!
+//! Below the antiresonance the table goes as far as the motor or a little further. The twist is far smaller there, takes its part in the
+//! motor's torque, and gives the table its acceleration:
+//!
+//! ```text
+//! I1*a1 + B*d' + K*d = T
+//! I2*(a1 - d'') = B*d' + K*d
+//! ```
+
+use super::finding::{Finding, Severity, told};
+use super::motor_side::as_twist;
+use super::rigid::{Slow, rigid_up_to};
+use super::{Input, NOMINAL_OFF};
+use crate::numerics::level::deviation;
+
+/// Share of the motor's way up to which a column may be the twist: at half the antiresonance it is a third.
+const SMALL: f64 = 0.5;
+/// Share of the table's acceleration that it must give over all lines of slow motion.
+const FOLLOWS: f64 = 0.8;
+/// Lines from which that is no chance.
+const LEAST: usize = 6;
+
+/// Finds that the table's column is the twist, either way round: on the motor's side the nominal axis has it as that and not as the table's
+/// motion, and either that side does not do without it or the table's has its acceleration of it.
+pub(super) fn logged(input: &Input<'_>) -> Option<Finding> {
+    let (x, y) = (input.theta1?, input.theta2?);
+    let share = deviation(y) / deviation(x);
+    if share.is_nan() || share > SMALL {
+        return None;
+    }
+    let is_twist = |sign: f64| {
+        as_twist(input, sign).is_some_and(|as_twist| as_twist.rather && (as_twist.felt || moves_the_table(input, sign)))
+    };
+    let sign = [1.0, -1.0].into_iter().find(|sign| is_twist(*sign))?;
+    let (difference, way_out) =
+        if sign > 0.0 { ("theta1 - theta2", "theta1 less it") } else { ("theta2 - theta1", "theta1 plus it") };
+    Some(Finding::new(
+        "twist",
+        Severity::Refuse,
+        "theta2",
+        format!(
+            "theta2 goes {} times as far as theta1, as the twist of the coupling does and no table: it is {difference}.",
+            told(share)
+        ),
+        "The column holds the difference of the two encoders and not the table's angle.",
+        format!(
+            "Log the table's own encoder, or make its column of this one: {way_out}. Or leave it out in [signals]."
+        ),
+    ))
+}
+
+/// Whether the table has its acceleration of the column, times `sign`, as the twist of about the nominal coupling.
+fn moves_the_table(input: &Input<'_>, sign: f64) -> bool {
+    let (Some(x), Some(y), Some(nominal)) = (input.theta1, input.theta2, input.nominal) else { return false };
+    let Some(Slow { spectra, lines }) = Slow::new(&[x, y], 0..2, input.dt, rigid_up_to(nominal)) else { return false };
+    if lines.len() < LEAST {
+        return false;
+    }
+    // Stiffness and damping over the table's inertia, which are least squares of their own: d and d' are a quarter turn apart.
+    let (mut accelerations, mut twists, mut rates, mut by_twist, mut by_rate) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for f in lines {
+        let (w, cross) = (spectra.omega(f), spectra.of(1, 0, f) * sign);
+        let (motor, twist) = (spectra.power(0, f), spectra.power(1, f));
+        accelerations += w.powi(4) * (motor + twist - 2.0 * cross.re);
+        twists += twist;
+        rates += w * w * twist;
+        by_twist -= w * w * (cross.re - twist);
+        by_rate -= w.powi(3) * cross.im;
+    }
+    let (k, b) = ((by_twist / twists).max(0.0), (by_rate / rates).max(0.0));
+    let stiffness = nominal.parameters.k / nominal.parameters.i2;
+    k * by_twist + b * by_rate > FOLLOWS * accelerations
+        && (NOMINAL_OFF.recip()..NOMINAL_OFF).contains(&(k / stiffness))
+}
