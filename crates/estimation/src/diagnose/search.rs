@@ -120,10 +120,18 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
             }
         }
     }
-    // Several at once follow any torque by some way: they are believed where they explain it.
-    let forward = search.forward(chosen.clone(), &mut pool);
-    if search.is_exact(&forward) && search.is_likelier(&forward, &chosen) {
-        chosen = search.stepwise(forward, &mut pool);
+    // Several at once follow any torque by some way: they are believed where they explain it. From the beginning by what a record of any
+    // length would find: a form that earns its price only beside the next cause was passed by on the way.
+    let evidence = |f: &Fit| search.evidence(f, 1.0);
+    let ways: [(&Fit, &dyn Fn(&Fit) -> f64); 2] = [(&chosen.clone(), &evidence), (&parameters, &akaike)];
+    for (from, by) in ways {
+        let forward = search.forward(from.clone(), by, &mut pool);
+        if search.is_exact(&forward) && search.is_likelier(&forward, &chosen) {
+            chosen = search.stepwise(forward, &mut pool);
+        }
+        if search.at_floor(&chosen) || search.is_enough(&chosen) {
+            break;
+        }
     }
     // What was fitted along the way, and is likelier than where the way led, is gone on from.
     for _ in 0..AGAIN {
@@ -302,16 +310,17 @@ impl Search<'_> {
         (self.evidence(next, share) > self.evidence(best, share)).then(|| next.clone())
     }
 
-    /// Effects added as if all that is left were independent, and dropped at the end where it is not: each of several large causes leaves
-    /// what the others do, beside which it earns next to nothing on its own.
-    fn forward(&self, from: Fit, pool: &mut Pool) -> Fit {
+    /// Effects added as long as a measure grows that takes all that is left as independent, and dropped at the end where it is not: each of
+    /// several large causes leaves what the others do, beside which it earns next to nothing on its own.
+    fn forward(&self, from: Fit, by: &dyn Fn(&Fit) -> f64, pool: &mut Pool) -> Fit {
         let mut at = from;
         let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_over_budget();
         while at.terms.len() < MOST && !ends(&at) {
             let mut all = self.extended(&at, at.terms.len(), pool);
             all.retain(|f| self.is_material(&at, f));
-            match self.best(&all, 1.0) {
-                Some(next) if self.evidence(next, 1.0) > self.evidence(&at, 1.0) => at = next.clone(),
+            let admitted = all.into_iter().filter(|f| !f.at_bound);
+            match admitted.max_by(|a, b| by(a).total_cmp(&by(b))) {
+                Some(next) if by(&next) > by(&at) => at = next,
                 _ => break,
             }
         }
@@ -379,7 +388,7 @@ impl Search<'_> {
             cut_short: AtomicBool::new(false),
             progress: self.progress,
         };
-        let fit = held.forward(given.clone(), &mut Pool::default());
+        let fit = held.forward(given.clone(), &|f| held.evidence(f, 1.0), &mut Pool::default());
         if fit.terms.is_empty() {
             return None;
         }
@@ -572,6 +581,11 @@ impl Search<'_> {
         }
         best
     }
+}
+
+/// Akaike's criterion, halved and turned: the likelihood expected on another record, with no price of an effect.
+fn akaike(fit: &Fit) -> f64 {
+    fit.log_likelihood - fit.coordinates.len() as f64
 }
 
 /// Whether a fit has all effects of another, and more.

@@ -8,7 +8,7 @@ use super::model::Model;
 use super::scales::Scales;
 
 use crate::axis::Structure;
-use crate::effects::{Place, Role, Scale, Settings, Start};
+use crate::effects::{Extent, Place, Role, Scale, Settings, Start};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -160,9 +160,6 @@ fn normalise(v: &mut [f64]) -> bool {
     true
 }
 
-/// Share of the rms speed below which an axis that reverses is seen often enough.
-const SLOW: f64 = 0.3;
-
 /// Frequencies (Hz) at which a side's residual stands out.
 fn frequencies(p: &Problem<'_>, reg: &Regression, side: usize) -> Vec<f64> {
     let per = 2 * p.band.equations();
@@ -219,7 +216,7 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
     let speed =
         (t.motion.iter().map(|m| m[2 * side + 1].powi(2)).sum::<f64>() / t.motion.len() as f64).sqrt().max(1e-12);
     let step = std::f64::consts::TAU / (4.0 * range);
-    let top = ((band.omega.last()? / (SLOW * speed) / step) as usize).min(BINS / 2);
+    let top = ((band.omega.last()? / (Extent::SLOW * speed) / step) as usize).min(BINS / 2);
     let power: Vec<f64> = (0..=top).map(|m| if m < 3 { 0.0 } else { bins[m].norm_sqr() }).collect();
     Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
 }

@@ -47,6 +47,9 @@ fn share_beyond(sorted: &[f64], lower: f64, upper: f64) -> f64 {
 }
 
 impl Extent<'_> {
+    /// Share of the rms speed below which an axis that reverses is seen often enough.
+    pub const SLOW: f64 = 0.3;
+
     /// Whether an amplitude, N.m, is one that a drive's torque can have: no more than the largest, and not below the accuracy of that.
     #[must_use]
     pub fn has_amplitude(&self, torque: f64) -> bool {
@@ -100,10 +103,11 @@ impl Extent<'_> {
         omega <= self.band && omega * self.length >= PERIODS * std::f64::consts::TAU
     }
 
-    /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band.
+    /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band where the axis
+    /// is slow.
     #[must_use]
     pub fn turns(&self, order: f64) -> bool {
-        order * self.travel() >= 0.75 * std::f64::consts::TAU && order * self.speed <= self.band
+        order * self.travel() >= 0.75 * std::f64::consts::TAU && order * Self::SLOW * self.speed <= self.band
     }
 }
 
@@ -180,7 +184,7 @@ mod tests {
             (Effect::LeadError.info().bounds)(&[scale, amplitude, order, 0.0], &resting())
         };
         assert!(admits(0.05, 0.0, 1.0) && !admits(0.2, 0.0, 1.0));
-        assert!(admits(0.0, 0.01, 6.0) && !admits(0.0, 0.01, 3.0) && !admits(0.0, 0.2, 6.0) && !admits(0.0, 0.01, 2e3));
+        assert!(admits(0.0, 0.01, 6.0) && !admits(0.0, 0.01, 3.0) && !admits(0.0, 0.2, 6.0) && !admits(0.0, 0.01, 4e3));
     }
 
     #[test]
@@ -197,6 +201,13 @@ mod tests {
     fn a_ripple_of_less_than_a_thousandth_of_the_torque_is_none() {
         let admits = |amplitude: f64| (Effect::TorqueRipple.info().bounds)(&[amplitude, 10.0, 0.0], &resting());
         assert!(admits(0.5) && admits(-0.01) && !admits(5e-4) && !admits(1.1));
+    }
+
+    #[test]
+    fn a_ripple_faster_than_the_band_at_the_rms_speed_is_seen_where_the_axis_is_slow() {
+        // At a radian a second, in a band of 1000 rad/s.
+        let admits = |order: f64| (Effect::TorqueRipple.info().bounds)(&[0.5, order, 0.0], &resting());
+        assert!(admits(900.0) && admits(2000.0) && !admits(4000.0));
     }
 
     #[test]
