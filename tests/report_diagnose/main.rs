@@ -93,6 +93,17 @@ fn one_of_several_effects_that_acts_beside_the_causes_is_told_with_its_share_and
 }
 
 #[test]
+fn a_single_effect_that_is_not_clear_enough_to_be_named_is_told_as_such() {
+    let open = Undecided { effects: vec![Effect::TorqueRipple], share_of_gap: 0.04 };
+    let d = Diagnosis { undecided: Some(open), ..friction("x-axis") };
+    let page = html::page(&made(&d));
+    let told =
+        "something acts that a torque that repeats with the motor's angle follows, not clearly enough to be named";
+    assert!(page.contains(told) && page.contains("Not told: torque periodic"), "{page}");
+    assert_eq!(json::value(&d, &[])["causes"].as_array().map(Vec::len), Some(1));
+}
+
+#[test]
 fn a_rigid_axis_is_drawn_as_one_place() {
     let mut d = friction("stage");
     let [input, axis, sensor] = [Site::At(Place::Input), Site::Axis, Site::At(Place::Sensor)];

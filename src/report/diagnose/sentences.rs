@@ -66,14 +66,20 @@ pub fn sentence(d: &Diagnosis) -> String {
     }
 }
 
-/// The cause in addition to those named, where the record does not distinguish which of several effects it is.
+/// What acts in addition to the causes named, where the record does not distinguish which of several effects it is, or whether it is one.
 pub fn undecided(d: &Diagnosis) -> Option<String> {
     let open = d.undecided.as_ref().filter(|_| d.verdict == Verdict::Effect)?;
-    Some(format!(
-        "Beside that acts one of these, and the record does not tell which: {}; {} of the gap.",
-        names_of(open),
-        percent(open.share_of_gap)
-    ))
+    let share = percent(open.share_of_gap);
+    Some(match open.effects[..] {
+        [_] => format!(
+            "Beside that something acts that {} follows, not clearly enough to be named; {share} of the gap.",
+            names_of(open)
+        ),
+        _ => format!(
+            "Beside that acts one of these, and the record does not tell which: {}; {share} of the gap.",
+            names_of(open)
+        ),
+    })
 }
 
 /// The effects of which one acts.

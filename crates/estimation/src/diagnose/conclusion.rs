@@ -97,6 +97,12 @@ impl Confusable {
 }
 
 impl Decision {
+    /// Causes that are named.
+    fn named(&self) -> usize {
+        let likely = self.probabilities.iter().filter(|p| **p >= LIKELY).count();
+        if self.verdict == Verdict::Effect { likely } else { 0 }
+    }
+
     /// True if the parameters all changed by one factor: a wrong torque constant.
     #[must_use]
     pub fn torque_gain(&self) -> Option<(f64, f64)> {
@@ -197,6 +203,8 @@ impl Search<'_> {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             return self.conclude(given, parameters, told, pool);
         }
+        let mut open = open;
+        let understood = left <= LEFT && (settled || explained >= EXPLAINED);
         if chosen.terms.len() > 1
             && open.is_none()
             && let Some(least) = least
@@ -205,7 +213,7 @@ impl Search<'_> {
         {
             // What is named without an effect has no rival that has another such effect in it.
             let pool: Vec<Fit> =
-                ranking.into_iter().map(|w| w.fit).filter(|f| f.terms.len() < chosen.terms.len()).collect();
+                ranking.iter().map(|w| &w.fit).filter(|f| f.terms.len() < chosen.terms.len()).cloned().collect();
             // The likeliest of the shorter: where one as good as it takes an effect's place it is another that is told, and no less explained.
             let known = nested_fit(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
             let plain = known.cloned().unwrap_or(refitted);
@@ -216,11 +224,17 @@ impl Search<'_> {
                 .filter(likelier)
                 .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)));
             let plain = other.cloned().unwrap_or(plain);
-            return self.conclude(given, parameters, plain, pool);
+            let without = self.conclude(given.clone(), parameters.clone(), plain, pool);
+            // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
+            let others = (0..probabilities.len()).filter(|i| likely(&probabilities[*i])).count();
+            if others + 1 < probabilities.len() || !understood || without.named() >= others {
+                return without;
+            }
+            open = Some(least);
         }
         let likely = (0..probabilities.len()).all(|i| open == Some(i) || likely(&probabilities[i]));
         let verdict = match chosen.terms.is_empty() {
-            false if likely && left <= LEFT && (settled || explained >= EXPLAINED) => Verdict::Effect,
+            false if likely && understood => Verdict::Effect,
             false => Verdict::Unexplained,
             true if is_run_off(&chosen, nominal) => Verdict::Unexplained,
             true if !self.needs_no_cause(&chosen) => Verdict::Unexplained,
@@ -473,6 +487,12 @@ mod tests {
         assert!(decision(scaled([1.25, 1.2, 1.3, 1.25])).torque_gain().is_some());
         assert!(decision(scaled([1.25, 1.0, 1.25, 1.25])).torque_gain().is_none());
         assert!(decision(scaled([1.01; 4])).torque_gain().is_none());
+    }
+
+    #[test]
+    fn causes_are_named_where_they_are_likely_and_the_verdict_is_theirs() {
+        let of = |verdict| Decision { verdict, probabilities: vec![0.9, 0.5, 0.7], ..decision(scaled([1.0; 4])) };
+        assert_eq!([Verdict::Effect, Verdict::Unexplained].map(|v| of(v).named()), [2, 0]);
     }
 
     #[test]

@@ -96,7 +96,8 @@ pub struct Diagnosis {
     pub closed_loop: Option<ClosedLoop>,
 }
 
-/// One of several effects, of which the record does not tell which.
+/// One of several effects, of which the record does not tell which; or a single one, where it is not likely enough to be named, and without
+/// it those that are named would be lost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undecided {
     /// The effects, the one in the improved model first.

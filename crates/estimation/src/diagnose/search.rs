@@ -45,6 +45,9 @@ const MOVED_BESIDE: f64 = 0.7;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
 
+/// What one fit is measured against another by: the larger, the better.
+type Measure<'m> = &'m dyn Fn(&Fit) -> f64;
+
 /// A search over hypotheses.
 pub struct Search<'a> {
     /// The record and how it is compared.
@@ -123,7 +126,7 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
     // Several at once follow any torque by some way: they are believed where they explain it. From the beginning by what a record of any
     // length would find: a form that earns its price only beside the next cause was passed by on the way.
     let evidence = |f: &Fit| search.evidence(f, 1.0);
-    let ways: [(&Fit, &dyn Fn(&Fit) -> f64); 2] = [(&chosen.clone(), &evidence), (&parameters, &akaike)];
+    let ways: [(&Fit, Measure<'_>); 2] = [(&chosen.clone(), &evidence), (&parameters, &akaike)];
     for (from, by) in ways {
         let forward = search.forward(from.clone(), by, &mut pool);
         if search.is_exact(&forward) && search.is_likelier(&forward, &chosen) {
@@ -312,7 +315,7 @@ impl Search<'_> {
 
     /// Effects added as long as a measure grows that takes all that is left as independent, and dropped at the end where it is not: each of
     /// several large causes leaves what the others do, beside which it earns next to nothing on its own.
-    fn forward(&self, from: Fit, by: &dyn Fn(&Fit) -> f64, pool: &mut Pool) -> Fit {
+    fn forward(&self, from: Fit, by: Measure<'_>, pool: &mut Pool) -> Fit {
         let mut at = from;
         let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_over_budget();
         while at.terms.len() < MOST && !ends(&at) {

@@ -21,6 +21,8 @@ pub struct Scales {
     pub length: f64,
     pub top: f64,
     pub fastest: [f64; 2],
+    /// Speeds of motor and table below which a fifth of the way is gone.
+    slow: [f64; 2],
     /// Positions of motor and table, sorted.
     positions: [Vec<f64>; 2],
     /// Twist as measured, sorted; empty where not both sides are.
@@ -43,6 +45,22 @@ const TURN: f64 = 6.0;
 /// Share of the travel by which the way is longer where the motion goes back at all: the hundredth from which the examination of a
 /// record counts a direction as one.
 const BACK: f64 = 0.01;
+
+/// Share of the way on which a torque that goes with the position must be in the band for it to be seen.
+const SEEN: f64 = 0.2;
+
+/// Speed below which that share of the way is gone, of speeds at equal intervals.
+pub fn slow(speeds: impl Iterator<Item = f64>) -> f64 {
+    let mut speeds: Vec<f64> = speeds.map(f64::abs).collect();
+    speeds.sort_by(f64::total_cmp);
+    let way: f64 = speeds.iter().sum();
+    let mut gone = 0.0;
+    let seen = speeds.into_iter().find(|v| {
+        gone += v;
+        gone >= SEEN * way
+    });
+    seen.unwrap_or(0.0)
+}
 
 /// The way of a motion, and its reversals, those below a threshold left out.
 fn way(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
@@ -143,6 +161,7 @@ impl Scales {
             dt: p.record.dt,
             length: n * p.record.dt,
             top: p.band.omega.last().copied().unwrap_or(1.0),
+            slow: [1, 3].map(|i: usize| slow(t.motion.iter().map(|m| m[i]))),
             fastest: [1, 3].map(|i| t.motion.iter().fold(0.0_f64, |m, s| m.max(s[i].abs()))),
             positions: [0, 2].map(|i: usize| sorted(t.motion.iter().map(|m| m[i]).collect())),
             twists: sorted(twists),
@@ -164,6 +183,7 @@ impl Scales {
                 positions: &self.positions[side],
                 speed: self.speed[side],
                 fastest: self.fastest[side],
+                slow: self.slow[side],
                 twist: self.twist,
                 twists: &self.twists,
                 dt: self.dt,
@@ -215,6 +235,15 @@ mod tests {
     use super::*;
     use crate::axis::{Hold, Parameters};
     use crate::effects::Settings;
+
+    #[test]
+    fn a_fifth_of_the_way_is_gone_below_a_speed() {
+        // A speed that grows evenly goes a fifth of its way below the root of a fifth of its end; one that is constant all of it at that.
+        let grows = slow((0..=1000).map(f64::from));
+        assert!((grows / (1000.0 * 0.2_f64.sqrt()) - 1.0).abs() < 2e-3, "{grows}");
+        assert_eq!(slow([2.0, -2.0, 2.0].into_iter()), 2.0);
+        assert_eq!(slow(std::iter::empty()), 0.0);
+    }
 
     #[test]
     fn a_torque_that_comes_late_works_as_much_as_its_phase_at_the_motion_says() {

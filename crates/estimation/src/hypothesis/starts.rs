@@ -5,10 +5,10 @@ use super::discrepancy::Discrepancy;
 use super::fit::{Fit, PROBE, Problem, Term};
 use super::likelihood::{C, Weight};
 use super::model::Model;
-use super::scales::Scales;
+use super::scales::{Scales, slow};
 
 use crate::axis::Structure;
-use crate::effects::{Extent, Place, Role, Scale, Settings, Start};
+use crate::effects::{Place, Role, Scale, Settings, Start};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -213,10 +213,9 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
     }
     FftPlanner::new().plan_fft_forward(4 * BINS).process(&mut bins);
     // Not faster than the band where the axis is slow, at least half a period over the range.
-    let speed =
-        (t.motion.iter().map(|m| m[2 * side + 1].powi(2)).sum::<f64>() / t.motion.len() as f64).sqrt().max(1e-12);
+    let speed = slow(t.motion.iter().map(|m| m[2 * side + 1])).max(1e-12);
     let step = std::f64::consts::TAU / (4.0 * range);
-    let top = ((band.omega.last()? / (Extent::SLOW * speed) / step) as usize).min(BINS / 2);
+    let top = ((band.omega.last()? / speed / step) as usize).min(BINS / 2);
     let power: Vec<f64> = (0..=top).map(|m| if m < 3 { 0.0 } else { bins[m].norm_sqr() }).collect();
     Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
 }

@@ -11,6 +11,8 @@ pub struct Extent<'a> {
     pub speed: f64,
     /// Largest speed of that side, rad/s.
     pub fastest: f64,
+    /// Speed of that side below which a fifth of its way is gone, rad/s.
+    pub slow: f64,
     /// Rms twist, rad.
     pub twist: f64,
     /// Twist as measured, rad, sorted; empty where not both sides are.
@@ -47,9 +49,6 @@ fn share_beyond(sorted: &[f64], lower: f64, upper: f64) -> f64 {
 }
 
 impl Extent<'_> {
-    /// Share of the rms speed below which an axis that reverses is seen often enough.
-    pub const SLOW: f64 = 0.3;
-
     /// Whether an amplitude, N.m, is one that a drive's torque can have: no more than the largest, and not below the accuracy of that.
     #[must_use]
     pub fn has_amplitude(&self, torque: f64) -> bool {
@@ -103,11 +102,14 @@ impl Extent<'_> {
         omega <= self.band && omega * self.length >= PERIODS * std::f64::consts::TAU
     }
 
-    /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band where the axis
-    /// is slow.
+    /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band on a fifth of the
+    /// way. An axis that never reverses is slow as it starts and stops alone, where friction has a shape of its own: there at its rms
+    /// speed.
     #[must_use]
     pub fn turns(&self, order: f64) -> bool {
-        order * self.travel() >= 0.75 * std::f64::consts::TAU && order * Self::SLOW * self.speed <= self.band
+        let (_, reversals) = self.way;
+        let speed = if reversals > 0.0 { self.slow } else { self.speed };
+        order * self.travel() >= 0.75 * std::f64::consts::TAU && order * speed <= self.band
     }
 }
 
@@ -122,6 +124,7 @@ mod tests {
             positions: &[0.0, 1.0],
             speed: 1.0,
             fastest: 1.0,
+            slow: 0.3,
             twist: 0.0,
             twists: &[],
             dt: 4e-4,
@@ -184,7 +187,7 @@ mod tests {
             (Effect::LeadError.info().bounds)(&[scale, amplitude, order, 0.0], &resting())
         };
         assert!(admits(0.05, 0.0, 1.0) && !admits(0.2, 0.0, 1.0));
-        assert!(admits(0.0, 0.01, 6.0) && !admits(0.0, 0.01, 3.0) && !admits(0.0, 0.2, 6.0) && !admits(0.0, 0.01, 4e3));
+        assert!(admits(0.0, 0.01, 6.0) && !admits(0.0, 0.01, 3.0) && !admits(0.0, 0.2, 6.0) && !admits(0.0, 0.01, 2e3));
     }
 
     #[test]
@@ -206,8 +209,12 @@ mod tests {
     #[test]
     fn a_ripple_faster_than_the_band_at_the_rms_speed_is_seen_where_the_axis_is_slow() {
         // At a radian a second, in a band of 1000 rad/s.
-        let admits = |order: f64| (Effect::TorqueRipple.info().bounds)(&[0.5, order, 0.0], &resting());
-        assert!(admits(900.0) && admits(2000.0) && !admits(4000.0));
+        let admits = |order: f64, reversals: f64| {
+            let extent = Extent { way: (10.0, reversals), ..resting() };
+            (Effect::TorqueRipple.info().bounds)(&[0.5, order, 0.0], &extent)
+        };
+        assert!(admits(900.0, 5.0) && admits(2000.0, 5.0) && !admits(4000.0, 5.0));
+        assert!(admits(900.0, 0.0) && !admits(2000.0, 0.0));
     }
 
     #[test]
