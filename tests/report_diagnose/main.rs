@@ -97,8 +97,7 @@ fn a_single_effect_that_is_not_clear_enough_to_be_named_is_told_as_such() {
     let open = Undecided { effects: vec![Effect::TorqueRipple], share_of_gap: 0.04 };
     let d = Diagnosis { undecided: Some(open), ..friction("x-axis") };
     let page = html::page(&made(&d));
-    let told =
-        "something acts that a torque that repeats with the motor's angle follows, not clearly enough to be named";
+    let told = "something acts that looks like torque periodic in the motor's angle, not clearly enough to be named";
     assert!(page.contains(told) && page.contains("Not told: torque periodic"), "{page}");
     assert_eq!(json::value(&d, &[])["causes"].as_array().map(Vec::len), Some(1));
 }

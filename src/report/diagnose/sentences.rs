@@ -72,7 +72,7 @@ pub fn undecided(d: &Diagnosis) -> Option<String> {
     let share = percent(open.share_of_gap);
     Some(match open.effects[..] {
         [_] => format!(
-            "Beside that something acts that {} follows, not clearly enough to be named; {share} of the gap.",
+            "Beside that something acts that looks like {}, not clearly enough to be named; {share} of the gap.",
             names_of(open)
         ),
         _ => format!(
