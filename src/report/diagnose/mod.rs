@@ -1,6 +1,6 @@
 //! The report of a diagnosis: verdict, place, shrinkage, evidence, what to do; read in a minute from the top.
 //!
-//! Everything here is a pure function of the typed result: [`words`] its sentences, [`json`] the file for programs.
+//! Everything here is a pure function of the typed result: [`sentences`] its sentences, [`json`] the file for programs.
 
 mod controlled;
 pub mod json;
