@@ -38,6 +38,9 @@ const COLOUR: f64 = 10.0;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 
+/// Change of the inertia, in its logarithm, up to which an account with an unsure cause is this axis': a factor of two.
+const OWN_INERTIA: f64 = 0.7;
+
 /// A hypothesis with its evidence.
 #[derive(Debug, Clone)]
 pub struct Weighed {
@@ -227,7 +230,8 @@ impl Search<'_> {
             let without = self.conclude(given.clone(), parameters.clone(), plain, pool);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
             let others = (0..probabilities.len()).filter(|i| likely(&probabilities[*i])).count();
-            if others + 1 < probabilities.len() || !understood || without.named() >= others {
+            let is_its_own = inertia_off(&chosen, nominal) < OWN_INERTIA;
+            if others + 1 < probabilities.len() || !understood || !is_its_own || without.named() >= others {
                 return without;
             }
             open = Some(least);
@@ -408,10 +412,15 @@ fn instead(ranking: &[Weighed], chosen: &Fit, i: usize, twin: Option<Confusable>
     effects
 }
 
-/// Whether the inertia that moves is so far from the nominal one that what is fitted beside it says nothing of this axis.
-fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
+/// How far the inertia that moves is from the nominal one, in its logarithm.
+fn inertia_off(fit: &Fit, nominal: &Model) -> f64 {
     let inertia = |m: &Model| m.parameters.i1 + m.parameters.i2;
-    (inertia(&fit.model) / inertia(nominal)).ln().abs() > NOMINAL_OFF.ln()
+    (inertia(&fit.model) / inertia(nominal)).ln().abs()
+}
+
+/// Whether that is so far that what is fitted beside it says nothing of this axis.
+fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
+    inertia_off(fit, nominal) > NOMINAL_OFF.ln()
 }
 
 /// The likeliest fit of all effects of another but one, each in its form: another form of one may do what the missing one does, and
