@@ -4,8 +4,7 @@ use super::conclusion::Decision;
 use super::diagnosis::Diagnosis;
 use super::overlay::Overlay;
 use crate::axis::Motion;
-use crate::conditioning::NoiseEstimate;
-use crate::conditioning::Record;
+use crate::conditioning::{NoiseEstimate, Record};
 use crate::effects::Effect;
 use crate::hypothesis::model::Model;
 

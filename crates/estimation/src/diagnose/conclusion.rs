@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::diagnosis::Undecided;
 use super::material::MINOR;
 use super::pool::likeliest_of;
-use super::search::{ALIKE, Search, is_extension};
+use super::search::{ALIKE, MOVED_BESIDE, Search, is_extension};
 use super::verdict::Verdict;
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
@@ -37,9 +37,6 @@ pub const UNCAUSED: f64 = 0.05;
 const COLOUR: f64 = 10.0;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
-
-/// Change of the inertia, in its logarithm, up to which an account with an unsure cause is this axis': a factor of two.
-const OWN_INERTIA: f64 = 0.7;
 
 /// A hypothesis with its evidence.
 #[derive(Debug, Clone)]
@@ -189,7 +186,7 @@ impl Search<'_> {
         }
         let least = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]));
         // One of several effects that do the same beside the others stays open, and the others are told.
-        let open = least.filter(|&i| {
+        let mut open = least.filter(|&i| {
             !likely(&probabilities[i])
                 && decisive[i] * doubt >= LIKELY
                 && chosen.terms.len() > 1
@@ -206,7 +203,6 @@ impl Search<'_> {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             return self.conclude(given, parameters, told, pool);
         }
-        let mut open = open;
         let understood = left <= LEFT && (settled || explained >= EXPLAINED);
         if chosen.terms.len() > 1
             && open.is_none()
@@ -229,8 +225,8 @@ impl Search<'_> {
             let plain = other.cloned().unwrap_or(plain);
             let without = self.conclude(given.clone(), parameters.clone(), plain, pool);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
-            let others = (0..probabilities.len()).filter(|i| likely(&probabilities[*i])).count();
-            let is_its_own = inertia_off(&chosen, nominal) < OWN_INERTIA;
+            let others = probabilities.iter().filter(|p| likely(p)).count();
+            let is_its_own = inertia_off(&chosen, nominal) < MOVED_BESIDE;
             if others + 1 < probabilities.len() || !understood || !is_its_own || without.named() >= others {
                 return without;
             }

@@ -121,9 +121,7 @@ impl Prepared {
         let torque_rms = deviation(&record.torque).max(self.torque_rms);
         Self { record, band, torque_rms, ..*self }
     }
-}
 
-impl Prepared {
     /// The torque that moved the axis and what each model needs for that motion, in the band, where the window is open.
     pub fn torque_overlay(&self, gap: &Gap) -> Overlay {
         let (record, taper) = (&self.record, &self.band.taper);

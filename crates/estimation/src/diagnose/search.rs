@@ -41,7 +41,7 @@ const BUDGET_BESIDE: u64 = 40_000_000;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
 /// The same beside effects, which let most parameters be what they are: a factor of two.
-const MOVED_BESIDE: f64 = 0.7;
+pub const MOVED_BESIDE: f64 = 0.7;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
 

@@ -14,8 +14,7 @@ pub use by_state::{Bin, Shape, StateCurve, StateVariable};
 pub use by_time::{Spread, TimeSlot};
 
 use crate::axis::{Parameters, Structure};
-use crate::conditioning::Record;
-use crate::conditioning::find_period;
+use crate::conditioning::{Record, find_period};
 use crate::diagnose::diagnosis::Site;
 use crate::effects::Place;
 use crate::numerics::level::rms;
