@@ -148,15 +148,17 @@ impl Search<'_> {
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
             return self.conclude(given, parameters, simple, pool);
         }
-        // What is below two of its standard errors, everything free, is no cause.
-        let decisive = |i: usize| match is_undetermined(&finished, chosen.terms[i].0, independent) {
-            true => 0.0,
-            false => {
-                let steady = steadiness(&finished, chosen.terms[i].0, independent);
-                steady * self.decisive(&chosen, i, &parameters, &pool)
-            }
-        };
-        let decisive: Vec<f64> = (0..chosen.terms.len()).map(decisive).collect();
+        let decisive: Vec<f64> = (0..chosen.terms.len())
+            .map(|i| {
+                let effect = chosen.terms[i].0;
+                // What is below two of its standard errors, everything free, is no cause.
+                if is_undetermined(&finished, effect, independent) {
+                    return 0.0;
+                }
+                let steady = steadiness(&finished, effect, independent);
+                beside_remainder(effect, steady * self.decisive(&chosen, i, &parameters, &pool))
+            })
+            .collect();
         let twins: Vec<Option<Confusable>> =
             (0..chosen.terms.len()).map(|i| self.constant_instead(&chosen, i, &pool, independent)).collect();
         let mut ranking = self.weighed(pool, independent);
@@ -222,8 +224,17 @@ impl Search<'_> {
                 .iter()
                 .filter(likelier)
                 .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)));
-            let plain = other.cloned().unwrap_or(plain);
-            let without = self.conclude(given.clone(), parameters.clone(), plain, pool);
+            let end = |fit: Fit, pool: Vec<Fit>| self.conclude(given.clone(), parameters.clone(), fit, pool);
+            let gone = chosen.terms[least].0;
+            let has_it = |f: &Fit| f.terms.iter().any(|t| t.0 == gone);
+            let mut without = end(other.unwrap_or(&plain).clone(), pool.clone());
+            if other.is_some_and(has_it) {
+                // The likeliest of the shorter keeps what was not likely: where it loses more by it, it goes itself.
+                let told = end(plain, pool.into_iter().filter(|f| !has_it(f)).collect());
+                if told.named() > without.named() {
+                    without = told;
+                }
+            }
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
             let others = probabilities.iter().filter(|p| likely(p)).count();
             let is_its_own = inertia_off(&chosen, nominal) < MOVED_BESIDE;
@@ -275,13 +286,13 @@ impl Search<'_> {
     /// without it: what no effect explains may be what explains this one, too. Less of it where the effect hardly stands out of a
     /// remainder of any colour.
     fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
-        let plain = if chosen.terms.len() == 1 { Some(parameters) } else { nested_fit(chosen, i, pool) };
-        let Some(plain) = plain else { return 1.0 };
+        let known = if chosen.terms.len() == 1 { Some(parameters) } else { nested_fit(chosen, i, pool) };
+        let Some(plain) = known.cloned().or_else(|| self.refitted(chosen, i)) else { return 1.0 };
         let share = |e: usize| {
             let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
             if without > with { (without - with) / without } else { 0.0 }
         };
-        (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, plain)
+        (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, &plain)
     }
 
     /// The constant torque that a friction may be as well, where the motion never goes back: there the law without any shape is one, and
@@ -372,6 +383,13 @@ impl Search<'_> {
     }
 }
 
+/// Probability that an effect is there, and what no cause explains does not do as it would: of what the record says for it, and of how
+/// often machines have it. Friction is named that explains half of what is left without it, a spring is not.
+fn beside_remainder(effect: Effect, decisive: f64) -> f64 {
+    let odds = effect.info().odds;
+    odds * decisive / (odds * decisive + 1.0 - decisive)
+}
+
 /// Whether a fit has an effect of the family of this one.
 fn has_one_like(fit: &Fit, effect: Effect) -> bool {
     fit.terms.iter().any(|(o, _)| o.info().family == effect.info().family)
@@ -458,6 +476,19 @@ mod tests {
     fn fit(effects: &[Effect], log_likelihood: f64) -> Fit {
         let terms: Vec<(Effect, usize)> = effects.iter().map(|e| (*e, 0)).collect();
         Fit::told(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), &terms, log_likelihood)
+    }
+
+    #[test]
+    fn friction_needs_less_beside_a_remainder_than_what_few_machines_have() {
+        // Odds of 3 and of one to one: 0.6 of it is 1.8/2.2.
+        assert!((beside_remainder(Effect::CoulombMotor, 0.6) - 1.8 / 2.2).abs() < 1e-12);
+        let spring = Effect::ExternalSpring.info().odds;
+        assert!((beside_remainder(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
+        assert!(
+            beside_remainder(Effect::ExternalSpring, 0.6) < LIKELY
+                && LIKELY < beside_remainder(Effect::ViscousTable, 0.5)
+        );
+        assert_eq!([0.0, 1.0].map(|p| beside_remainder(Effect::ExternalSpring, p)), [0.0, 1.0]);
     }
 
     fn decision(parameters: Fit) -> Decision {

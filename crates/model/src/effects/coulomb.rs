@@ -65,7 +65,7 @@ impl<I: Side> DryFriction for Coulomb<I> {
         memory: 0,
         named: true,
         textbook: [true, false][I::INDEX],
-        odds: 1.0,
+        odds: 3.0,
         bounds: |p, x| {
             p[0] <= x.torque && x.feeds_dry(p[0], 0.0) && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest)
         },

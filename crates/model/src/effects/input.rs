@@ -246,7 +246,7 @@ impl Input for Saturation {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 1.0,
+        odds: 0.1,
         bounds: |p, x| p[0] >= 0.3 * x.torque && p[0] < x.torque,
         example: &[0.02],
         variants: &[Variant { name: "", free: &[0] }],
