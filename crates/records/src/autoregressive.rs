@@ -17,6 +17,10 @@ const STRETCH: usize = 4096;
 const VALUES: usize = 8;
 /// Share of the signal, rms, below which what a model leaves is rounding.
 const ROUNDING: f64 = 1e-13;
+/// Share of a regressor's power that those before it must leave, and of the target's that all of them must, for the normal equations to be
+/// as good as an orthogonal factorisation: their rounding is 1e-15 of a regressor's power.
+const INDEPENDENT: f64 = 1e-12;
+const RESIDUAL: f64 = 1e-9;
 /// Samples that tell a noise: more hardly tell it better.
 const TELLING: usize = 4 * STRETCH;
 /// Frequencies at which a spectrum is looked at.
@@ -101,34 +105,21 @@ struct Model {
 }
 
 impl Model {
-    /// The model that leaves the least of a series, lost samples left out (the covariance method).
+    /// The model of least residual of a series, fitted by the covariance method to the rows that touch no sample of `lost` (rising order).
+    /// `None` of too few rows.
     fn of(y: &[f64], lost: &[usize]) -> Option<Self> {
-        let mut sound = vec![true; y.len()];
-        for &k in lost {
-            let end = (k + ORDER + 1).min(y.len());
-            sound[k..end].fill(false);
-        }
-        let rows: Vec<usize> = (ORDER..y.len()).filter(|k| sound[*k]).collect();
-        if rows.len() < VALUES * ORDER {
+        let runs = sound_runs(y.len(), lost);
+        let rows: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        if rows < VALUES * ORDER {
             return None;
         }
-        let power = rows.iter().map(|k| y[*k] * y[*k]).sum::<f64>();
-        // The last rows keep the coefficients small where fewer tell all there is.
+        let power = runs.iter().flat_map(Clone::clone).map(|k| y[k] * y[k]).sum::<f64>();
         let rounding = ROUNDING * power.sqrt();
-        let triangle = DMatrix::from_fn(rows.len() + ORDER, ORDER + 1, |r, i| match rows.get(r) {
-            // The samples before, the farthest first, and the sample that they tell.
-            Some(k) => y[k - ORDER + i],
-            None if r - rows.len() == i => rounding,
-            None => 0.0,
-        })
-        .qr()
-        .r();
-        let told = triangle.column(ORDER).rows(0, ORDER).into_owned();
-        let w = triangle.view((0, 0), (ORDER, ORDER)).solve_upper_triangular(&told)?;
-        let coefficients: Vec<f64> = std::iter::once(1.0).chain(w.iter().rev().map(|w| -w)).collect();
-        let residual = |k: usize| -> f64 { coefficients.iter().enumerate().map(|(i, c)| c * y[k - i]).sum() };
-        let squares: f64 = rows.iter().map(|k| residual(*k).powi(2)).sum();
-        let left = (squares.max(rounding * rounding) / (rows.len() - ORDER) as f64).sqrt();
+        let coefficients = normal_equations(y, &runs).or_else(|| orthogonal_triangle(y, &runs, rounding))?;
+        let backwards: Vec<f64> = coefficients.iter().rev().copied().collect();
+        let residual = |k: usize| dot(&backwards, &y[k - ORDER..=k]);
+        let squares: f64 = runs.iter().flat_map(Clone::clone).map(|k| residual(k).powi(2)).sum();
+        let left = (squares.max(rounding * rounding) / (rows - ORDER) as f64).sqrt();
         Some(Self { coefficients, left })
     }
 
@@ -166,6 +157,119 @@ impl Model {
         // The two ways say the same of one noise.
         Some(((&inverse * b)[at], self.left * (2.0 * inverse[(at, at)]).sqrt()))
     }
+}
+
+/// Runs of the rows, the samples from [`ORDER`] on with those before them, that touch no lost sample (rising order).
+fn sound_runs(samples: usize, lost: &[usize]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut start = ORDER;
+    for &k in lost {
+        runs.push(start..k.min(samples));
+        start = start.max(k + ORDER + 1);
+    }
+    runs.push(start..samples);
+    runs.retain(|r| r.start < r.end);
+    runs
+}
+
+/// The coefficients by the normal equations, `None` where these are too ill-conditioned for it.
+///
+/// The regressors are `y(k-1)`, its difference `d(k-1)` and the second differences `e(k-1) .. e(k-30)`, which span the same space as
+/// `y(k-1) .. y(k-32)`; the target is `e(k)`. A motion that is slow beside the sampling is nearly all in the first two, so that the
+/// others are well conditioned. The Gram matrix of the second differences is one of shifts of one series: its first row is summed over the
+/// samples, and every other entry is that of one shift less, corrected at both ends of each run.
+fn normal_equations(y: &[f64], runs: &[Range<usize>]) -> Option<Vec<f64>> {
+    /// The second differences, the target `e(k)` the first.
+    const SHIFTS: usize = ORDER - 1;
+    let d: Vec<f64> = std::iter::once(0.0).chain(y.windows(2).map(|w| w[1] - w[0])).collect();
+    let e: Vec<f64> = std::iter::once(0.0).chain(d.windows(2).map(|w| w[1] - w[0])).collect();
+    // Index 0 is y(k-1), 1 is d(k-1), and SHIFTS + 1 - i is e(k-i): the target comes last.
+    let mut gram = DMatrix::<f64>::zeros(ORDER + 1, ORDER + 1);
+    let mut shifted = vec![[0.0; SHIFTS]; SHIFTS];
+    for run in runs {
+        let (a, b) = (run.start, run.end);
+        for i in 0..SHIFTS {
+            shifted[0][i] = dot(&e[a..b], &e[a - i..b - i]);
+        }
+        for i in 1..SHIFTS {
+            for j in i..SHIFTS {
+                shifted[i][j] = shifted[i - 1][j - 1] + e[a - i] * e[a - j] - e[b - i] * e[b - j];
+            }
+        }
+        let (before, rate) = (&y[a - 1..b - 1], &d[a - 1..b - 1]);
+        gram[(0, 0)] += dot(before, before);
+        gram[(1, 0)] += dot(rate, before);
+        gram[(1, 1)] += dot(rate, rate);
+        for i in 0..SHIFTS {
+            let row = ORDER - i;
+            gram[(row, 0)] += dot(&e[a - i..b - i], before);
+            gram[(row, 1)] += dot(&e[a - i..b - i], rate);
+            for j in i..SHIFTS {
+                gram[(row, ORDER - j)] += shifted[i][j];
+            }
+        }
+    }
+    // Regressors of unit size; the factorisation reads the lower triangle alone.
+    let size: Vec<f64> = (0..=ORDER).map(|i| gram[(i, i)].sqrt()).collect();
+    if size.iter().any(|s| !s.is_normal()) {
+        return None;
+    }
+    for i in 0..=ORDER {
+        for j in 0..=i {
+            gram[(i, j)] /= size[i] * size[j];
+        }
+    }
+    let l = gram.cholesky()?.unpack();
+    let pivots = (0..=ORDER).map(|i| l[(i, i)] * l[(i, i)]).enumerate();
+    if !pivots.into_iter().all(|(i, p)| p > if i == ORDER { RESIDUAL } else { INDEPENDENT }) {
+        return None;
+    }
+    let target = l.row(ORDER).columns(0, ORDER).transpose();
+    let w = l.view((0, 0), (ORDER, ORDER)).tr_solve_lower_triangular(&target)?;
+    let w = |i: usize| w[i] * size[ORDER] / size[i];
+    // Back to the samples themselves: e(k) less what the regressors make of it.
+    let mut coefficients = vec![0.0; ORDER + 1];
+    let mut add = |lag: usize, weights: &[f64], factor: f64| {
+        weights.iter().enumerate().for_each(|(i, weight)| coefficients[lag + i] += factor * weight);
+    };
+    add(0, &[1.0, -2.0, 1.0], 1.0);
+    add(1, &[1.0], -w(0));
+    add(1, &[1.0, -1.0], -w(1));
+    for i in 1..SHIFTS {
+        add(i, &[1.0, -2.0, 1.0], -w(ORDER - i));
+    }
+    Some(coefficients)
+}
+
+/// The coefficients by a QR factorisation of the regressors. `rounding` (unit of the signal) keeps them small where fewer regressors
+/// explain all there is.
+fn orthogonal_triangle(y: &[f64], runs: &[Range<usize>], rounding: f64) -> Option<Vec<f64>> {
+    let rows: Vec<usize> = runs.iter().flat_map(Clone::clone).collect();
+    let triangle = DMatrix::from_fn(rows.len() + ORDER, ORDER + 1, |r, i| match rows.get(r) {
+        // The samples before, the farthest first, and the target.
+        Some(k) => y[k - ORDER + i],
+        None if r - rows.len() == i => rounding,
+        None => 0.0,
+    })
+    .qr()
+    .r();
+    let target = triangle.column(ORDER).rows(0, ORDER).into_owned();
+    let w = triangle.view((0, 0), (ORDER, ORDER)).solve_upper_triangular(&target)?;
+    Some(std::iter::once(1.0).chain(w.iter().rev().map(|w| -w)).collect())
+}
+
+/// Scalar product, summed in lanes.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.zip(b) {
+        for i in 0..LANES {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]
@@ -206,6 +310,28 @@ mod tests {
         let told = floor(&signal(1e-3)).expect("long enough");
         assert!((told / 1e-3 - 1.0).abs() < 0.2, "{told}");
         assert!(floor(&signal(1e-3)[..200]).is_none());
+    }
+
+    #[test]
+    fn the_normal_equations_leave_as_little_as_an_orthogonal_factorisation() {
+        let noise = 1e-3;
+        // A fast motion upon a way of thousands, as of an axis that runs on.
+        let y: Vec<f64> = signal(noise).iter().enumerate().map(|(k, v)| v + 1e-4 * (k as f64).powi(2)).collect();
+        let runs = sound_runs(y.len(), &[5, 700, 701, 2000, 5999]);
+        assert_eq!(runs, [38..700, 734..2000, 2033..5999]);
+        let squares = |c: &[f64]| -> f64 {
+            let residual = |k: usize| -> f64 { (0..=ORDER).map(|i| c[i] * y[k - i]).sum() };
+            runs.iter().flat_map(Clone::clone).map(|k| residual(k).powi(2)).sum()
+        };
+        let (normal, orthogonal) = (
+            normal_equations(&y, &runs).expect("well conditioned"),
+            orthogonal_triangle(&y, &runs, 0.0).expect("sound"),
+        );
+        let (normal, orthogonal) = (squares(&normal), squares(&orthogonal));
+        assert!((normal / orthogonal - 1.0).abs() < 1e-6, "{normal} {orthogonal}");
+        // Without noise every sample follows from those before it: nothing is left for the normal equations.
+        let runs = sound_runs(y.len(), &[]);
+        assert!(normal_equations(&signal(0.0), &runs).is_none());
     }
 
     #[test]
