@@ -4,6 +4,8 @@
 use std::fmt::Write;
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::ceiling::{self, Actual};
 use super::finding::{Finding, Severity};
 use super::robust::{self, quantile, span, step};
@@ -23,41 +25,47 @@ const MOSTLY: f64 = 0.5;
 
 /// Looks at every channel. Gives the stretches that no use can be made of.
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
-    let mut bad = Vec::new();
+    let channels: Vec<Channel<'_>> = input.channels().collect();
+    let of_each: Vec<_> = channels.into_par_iter().map(|channel| one(input, channel)).collect();
+    let (found, bad): (Vec<_>, Vec<_>) = of_each.into_iter().unzip();
+    findings.extend(found.into_iter().flatten());
+    bad.concat()
+}
+
+/// What was found of one channel, and the stretches of it that no use can be made of.
+fn one(input: &Input<'_>, channel: Channel<'_>) -> (Vec<Finding>, Vec<Range<usize>>) {
+    let (mut findings, mut bad) = (Vec::new(), Vec::new());
     let n = input.len();
-    for channel in input.channels() {
-        if span(channel.values) <= 1e-12 * channel.values[0].abs() {
-            findings.push(constant(channel));
-            continue;
-        }
-        let position = channel.name.starts_with("theta");
-        if position || channel.name == "T" {
-            bad.extend(jumps(input, channel, findings));
-        }
-        let stuck = if channel.name == "T" { stuck_torque(input, channel) } else { stuck_motion(input, channel) };
-        if !stuck.is_empty() {
-            let total: usize = stuck.iter().map(Range::len).sum();
-            findings.push(
-                Finding::new(
-                    "stuck",
-                    Severity::Refuse,
-                    channel.name,
-                    format!(
-                        "{} keeps one value for {total} samples ({:.1} % of the record) while the axis moves.",
-                        channel.name,
-                        100.0 * total as f64 / n as f64
-                    ),
-                    "The sensor, its cable or the logger stopped; the axis did not.",
-                    "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
-                )
-                .at(input, stuck.clone()),
-            );
-            bad.extend(stuck);
-        }
-        held(channel, findings);
-        clipped(input, channel, findings);
+    if span(channel.values) <= 1e-12 * channel.values[0].abs() {
+        return (vec![constant(channel)], bad);
     }
-    bad
+    let position = channel.name.starts_with("theta");
+    if position || channel.name == "T" {
+        bad.extend(jumps(input, channel, &mut findings));
+    }
+    let stuck = if channel.name == "T" { stuck_torque(input, channel) } else { stuck_motion(input, channel) };
+    if !stuck.is_empty() {
+        let total: usize = stuck.iter().map(Range::len).sum();
+        findings.push(
+            Finding::new(
+                "stuck",
+                Severity::Refuse,
+                channel.name,
+                format!(
+                    "{} keeps one value for {total} samples ({:.1} % of the record) while the axis moves.",
+                    channel.name,
+                    100.0 * total as f64 / n as f64
+                ),
+                "The sensor, its cable or the logger stopped; the axis did not.",
+                "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
+            )
+            .at(input, stuck.clone()),
+        );
+        bad.extend(stuck);
+    }
+    held(channel, &mut findings);
+    clipped(input, channel, &mut findings);
+    (findings, bad)
 }
 
 fn constant(channel: Channel<'_>) -> Finding {

@@ -37,6 +37,8 @@ mod tests;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 pub use finding::{Finding, Severity};
 
 use crate::axis::{Motion, Parameters, Structure};
@@ -257,11 +259,20 @@ pub fn examine(input: &Input<'_>) -> Examination {
         return Examination { findings, usable, ..Examination::default() };
     }
     let input = &cut(input, n);
-    let bad = channels::examine(input, &mut findings);
-    copies::examine(input, &mut findings);
-    computed::examine(input, &mut findings);
-    slips::examine(input, &mut findings);
-    sizes(input, &mut findings);
+    let even = findings.iter().all(|f| f.signal != "time");
+    let mut bad = Vec::new();
+    let found = side_by_side([
+        &mut |found| bad = channels::examine(input, found),
+        &mut |found| copies::examine(input, found),
+        &mut |found| computed::examine(input, found),
+        &mut |found| {
+            if even {
+                slips::examine(input, found);
+            }
+        },
+        &mut |found| sizes(input, found),
+    ]);
+    findings.extend(found);
     let usable = usable::examine(input, &bad, &mut findings);
     // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.
     let piece = usable.iter().max_by_key(|r| r.len()).cloned().unwrap_or(0..n);
@@ -288,14 +299,28 @@ pub fn examine(input: &Input<'_>) -> Examination {
         // In its place nothing is known of the table.
         let part = if twist.is_some() { Input { theta2: None, omega2: None, ..part } } else { part };
         findings.extend(twist);
-        band = momentum::examine(&part, &mut inertia, &mut findings);
         // A guess is asked for where no nominal value is known.
-        if part.nominal.is_none() {
-            inertia = rigid::inertia(&part).or(inertia);
-        }
+        let guess = || part.nominal.is_none().then(|| rigid::inertia(&part)).flatten();
+        let (of_the_lines, guessed) = rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), guess);
+        band = of_the_lines;
+        inertia = guessed.or(inertia);
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }
+}
+
+/// A part of an examination that needs no other's findings.
+type Part<'a> = &'a mut (dyn FnMut(&mut Vec<Finding>) + Send);
+
+/// What independent parts of an examination find, in their order whichever ends first.
+fn side_by_side<const N: usize>(parts: [Part<'_>; N]) -> Vec<Finding> {
+    let run = |part: Part<'_>| {
+        let mut found = Vec::new();
+        part(&mut found);
+        found
+    };
+    let found: Vec<Vec<Finding>> = parts.into_par_iter().map(run).collect();
+    found.into_iter().flatten().collect()
 }
 
 /// Numbers that can be computed with; says so where they cannot.

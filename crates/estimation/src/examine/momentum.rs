@@ -70,16 +70,14 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
     let mut columns: Vec<&[f64]> = vec![&torque[..n - 1], main, &sign];
     columns.extend(table.map(Vec::as_slice));
     let lengths = [power_of_two((n - 1) / 8).clamp(32, 8192), power_of_two((n - 1) / 3).clamp(32, 65_536)];
-    let nominal = rigid::weigh(input);
-    let mut lines = None;
-    for length in lengths {
-        let spectra = Spectra::new(&columns, length, input.dt);
-        let found = coherent(&spectra);
-        if !found.is_empty() {
-            lines = Some((spectra, found));
-            break;
-        }
-    }
+    let of_lines = || {
+        lengths.into_iter().find_map(|length| {
+            let spectra = Spectra::new(&columns, length, input.dt);
+            let found = coherent(&spectra);
+            (!found.is_empty()).then_some((spectra, found))
+        })
+    };
+    let (nominal, lines) = rayon::join(|| rigid::weigh(input), of_lines);
     let Some((spectra, lines)) = lines else {
         whole_record(input, &columns, collocated, nominal, inertia, findings);
         return None;

@@ -13,6 +13,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::finding::{Finding, Severity, told};
 use super::least::bounded;
 use super::motor_side::rather_as_logged;
@@ -97,11 +99,9 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
 /// motion's band from all. None where less than three quarters are explained, or the inertia is not known to a third.
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
-    let n = x.len();
     let mut best: Option<InTime> = None;
-    for width in widths(n) {
-        if let Some(found) = in_time(input, torque, x, width)
-            && found.left < MOST_LEFT
+    for found in at_widths(input, torque, x) {
+        if found.left < MOST_LEFT
             && found.mass > SURELY * found.error
             && found.mass.is_finite()
             && best.as_ref().is_none_or(|best| found.left < 0.98 * best.left)
@@ -116,8 +116,7 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
 /// one: of slow moves, where friction or a weight is nearly all of the torque, spectra show a few lines alone, and noise in those.
 pub(super) fn follows(input: &Input<'_>) -> bool {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    let found = widths(x.len()).filter_map(|width| in_time(input, torque, x, width));
-    found.min_by(|a, b| a.left.total_cmp(&b.left)).is_some_and(|found| {
+    at_widths(input, torque, x).into_iter().min_by(|a, b| a.left.total_cmp(&b.left)).is_some_and(|found| {
         let (friction, mass) = (found.friction / found.friction_error, found.mass / found.error);
         found.left < MOST_LEFT && (friction > 0.0 && mass > -SURELY || friction > -SURELY && mass > SURELY)
     })
@@ -143,6 +142,12 @@ struct InTime {
     /// Friction at the ninth decile of the speeds and its standard error.
     friction: f64,
     friction_error: f64,
+}
+
+/// The balance by the smoothings of all widths, the narrowest first.
+fn at_widths(input: &Input<'_>, torque: &[f64], x: &[f64]) -> Vec<InTime> {
+    let widths: Vec<usize> = widths(x.len()).collect();
+    widths.into_par_iter().filter_map(|width| in_time(input, torque, x, width)).collect()
 }
 
 /// The balance by a smoothing of a width.

@@ -143,7 +143,7 @@ fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Looks for samples that are missing under even stamps.
+/// Looks for samples that are missing under even stamps; stamps that are not even are another finding.
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     // A value that is rounded to steps of q is off by q/sqrt(12) rms.
     let positions: Vec<Position<'_>> = input
@@ -152,9 +152,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
         .map(|c| Position { values: c.values, rounding: step(c.values).powi(2) / 12.0 })
         .collect();
     let n = input.len();
-    // Stamps that are not even are another finding: what they leave of the motion is no cubic.
-    let uneven = findings.iter().any(|f| f.signal == "time");
-    if positions.is_empty() || n < BLOCK || uneven {
+    if positions.is_empty() || n < BLOCK {
         return;
     }
     let found = slips(&positions);
