@@ -5,7 +5,8 @@ use memchr::memchr;
 use super::super::error::TraceError;
 use super::super::table::{Header, MAX_COLUMNS, header};
 use super::super::units::Unit;
-use super::{Head, MAX_HEADER, distinct, number_of, separator, split, trim};
+use super::head::{Head, MAX_HEADER, distinct, number_of, separator, split};
+use super::trim;
 
 /// Whether a field can stand in a row of units.
 fn is_unit(field: &str) -> bool {
