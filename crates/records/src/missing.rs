@@ -1,7 +1,7 @@
 //! Cells without a number: few that stand alone are bridged by straight lines, in a whole table and in a stream by the same rule.
 
 use super::error::TraceError;
-use super::table::Fault;
+use super::table::{Fault, line_of};
 
 /// Share of a column's cells that may be missing for them to be bridged.
 const MISSING: f64 = 0.01;
@@ -91,10 +91,9 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// Line in the file of a row that is among them, from 1.
+    /// Line in the file, from 1, of a row that is among them.
     pub fn line(&self, row: usize) -> usize {
-        let last = self.lines.partition_point(|(first, _)| *first <= row);
-        last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
+        line_of(&self.lines, row)
     }
 }
 
