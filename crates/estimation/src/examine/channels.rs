@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::ceiling::{self, Actual};
+use super::ceiling::{self, AppliedTorque};
 use super::finding::{Finding, Severity};
 use super::robust::{self, quantile, span, step};
 use super::{Channel, Input};
@@ -316,7 +316,7 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
     if !(channel.name == "T" || channel.name.starts_with("omega")) {
         return;
     }
-    let mut at_end = ceiling::stands(x);
+    let mut at_end = ceiling::limited_stretches(x);
     if at_end.is_empty() {
         return;
     }
@@ -329,8 +329,8 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
     );
     let limit = "A model of the machine needs that limit: see `eixo effects saturation`.";
     let (severity, means, remedy) = if channel.name == "T" {
-        match ceiling::actual_torque(input, x) {
-            Actual::Larger(share) => {
+        match ceiling::applied_torque(input, x) {
+            AppliedTorque::Larger(share) => {
                 let _ = write!(seen, " The axis moves there as under {:.1} % more.", 100.0 * share);
                 (
                     Severity::Refuse,
@@ -338,14 +338,14 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
                     "Widen the range of the column in the logger, or record a motion that needs less torque.",
                 )
             }
-            Actual::AsLogged => (Severity::Note, "The drive's limit is reached.", limit),
-            Actual::Unknown if share > MOSTLY => (
+            AppliedTorque::AsLogged => (Severity::Note, "The drive's limit is reached.", limit),
+            AppliedTorque::Unknown if share > MOSTLY => (
                 Severity::Warn,
                 "The drive's limit is reached, or that of the log, most of the time: what more was asked for, or given, this record does not tell.",
                 "Record a motion that needs less torque, or widen the range of the column in the logger; where it is the drive that gives no \
                  more, a model of the machine needs that limit: see `eixo effects saturation`.",
             ),
-            Actual::Unknown => (
+            AppliedTorque::Unknown => (
                 Severity::Note,
                 "The drive's limit is reached, or that of the log: which of the two, this record does not tell.",
                 limit,

@@ -1,12 +1,12 @@
-//! What the experiment itself keeps from being seen: its time scale, its directions and its band.
+//! Conditions of the experiment that limit what it identifies: time scale, directions of motion, excited band.
 
 use crate::axis::Structure;
 use crate::examine::finding::{Finding, Severity, told};
 use crate::examine::robust::{quantile, span};
 use crate::examine::{Input, Nominal};
 
-/// Times that cannot belong to the nominal axis.
-pub(super) fn times(input: &Input<'_>, findings: &mut Vec<Finding>) {
+/// Checks sampling interval and duration against the natural frequency of the nominal axis.
+pub(super) fn check_time_scale(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let Some(Nominal { structure: Structure::TwoInertia, parameters: p }) = input.nominal else { return };
     let natural = (p.k * (1.0 / p.i1 + 1.0 / p.i2)).sqrt();
     let duration = input.dt * input.len() as f64;
@@ -34,8 +34,8 @@ pub(super) fn times(input: &Input<'_>, findings: &mut Vec<Finding>) {
     }
 }
 
-/// One direction only.
-pub(super) fn directions(speed: &[f64], findings: &mut Vec<Finding>) {
+/// Checks that the axis moves in both directions; `speed` in rad/s (m/s).
+pub(super) fn check_directions(speed: &[f64], findings: &mut Vec<Finding>) {
     let size = quantile(speed.iter().copied(), 0.9);
     let smooth: Vec<f64> =
         speed.chunks((speed.len() / 2000).max(1)).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
@@ -53,8 +53,8 @@ pub(super) fn directions(speed: &[f64], findings: &mut Vec<Finding>) {
     }
 }
 
-/// Parameters that the band cannot tell.
-pub(super) fn excitation(nominal: Option<Nominal>, band: [f64; 2], findings: &mut Vec<Finding>) {
+/// Checks that the excited band, Hz, reaches the frequencies at which the nominal coupling shows.
+pub(super) fn check_band(nominal: Option<Nominal>, band: [f64; 2], findings: &mut Vec<Finding>) {
     let Some(Nominal { structure: Structure::TwoInertia, parameters: p }) = nominal else { return };
     let anti = (p.k / p.i2).sqrt() / std::f64::consts::TAU;
     if band[1] < 0.3 * anti {

@@ -6,28 +6,28 @@ use super::{MAIN, SIGN, T, TABLE};
 use crate::examine::least::bounded;
 use crate::examine::spectra::Spectra;
 
-/// The balance of one record: regressors, lines and what they hold.
-pub(super) struct MomentumBalance<'a> {
+/// The momentum equation of one record, as a least-squares problem over the lines of its spectra.
+pub(super) struct MomentumEquation<'a> {
     pub(super) s: &'a Spectra,
     pub(super) lines: &'a [usize],
     pub(super) collocated: bool,
-    /// Frequency of the table's resonance against the motor, rad/s, where there is no encoder on the table.
+    /// Antiresonance of the table against the motor, rad/s, for a record without an encoder on the table.
     pub(super) table: Option<f64>,
     pub(super) total: f64,
 }
 
-/// What a balance found.
+/// A solution of the momentum equation.
 pub(super) struct Found {
-    /// M1, M2, c, F, k, -k.
+    /// M1, M2 (kg.m2), c (N.m.s/rad), F (N.m), k and -k (N.m/rad); for a linear axis kg, N.s/m, N, N/m.
     pub(super) x: Vec<f64>,
-    /// Share of the torque's power that is explained.
+    /// Explained share of the torque's power.
     pub(super) share: f64,
-    /// Share that the inertias alone explain of it.
+    /// Share that the inertias alone explain.
     pub(super) inertial: f64,
 }
 
-impl MomentumBalance<'_> {
-    /// The regressors at a line: column and factor.
+impl MomentumEquation<'_> {
+    /// The regressors at a line: the column of the spectra, and the complex factor on it.
     fn regressors(&self, f: usize) -> [(usize, Complex<f64>); 6] {
         let w = self.s.omega(f);
         let j = Complex::new(0.0, w);
@@ -37,7 +37,7 @@ impl MomentumBalance<'_> {
         } else if self.collocated {
             let wa = self.table.unwrap_or(f64::INFINITY);
             let r = w / wa;
-            // A hundredth of the critical damping keeps the line at the resonance finite.
+            // A damping ratio of 0.02 keeps the regressor finite at the antiresonance.
             (MAIN, if wa.is_finite() { j / Complex::new(1.0 - r * r, 0.04 * r) } else { Complex::new(0.0, 0.0) })
         } else {
             (MAIN, j * j * j)
@@ -58,7 +58,7 @@ impl MomentumBalance<'_> {
         gram
     }
 
-    /// Right side for a motion that is late by `late` seconds, with the torque's sign as given.
+    /// Right-hand side of the normal equations for a motion that is delayed by `late`, s.
     pub(super) fn right(&self, late: f64) -> Vec<f64> {
         let mut right = vec![0.0; 6];
         for &f in self.lines {
@@ -73,11 +73,11 @@ impl MomentumBalance<'_> {
     /// [`Self::right`] for a motion that is late by `-most` to `most` samples of `dt`, each: from one to the next the phase of a
     /// line turns by the same angle, so that a line's sines and cross spectra are asked for once; as far before as behind, the
     /// sine alone changes its sign.
-    pub(super) fn rights(&self, dt: f64, most: usize) -> Vec<[f64; 6]> {
-        let mut rights = vec![[0.0; 6]; 2 * most + 1];
+    pub(super) fn right_sides(&self, dt: f64, most: usize) -> Vec<[f64; 6]> {
+        let mut right_sides = vec![[0.0; 6]; 2 * most + 1];
         // From the middle outwards, before and behind.
-        let (before, rest) = rights.split_at_mut(most);
-        let Some((middle, behind)) = rest.split_first_mut() else { return rights };
+        let (before, rest) = right_sides.split_at_mut(most);
+        let Some((middle, behind)) = rest.split_first_mut() else { return right_sides };
         for &f in self.lines {
             let terms = self.regressors(f).map(|(column, factor)| factor.conj() * self.s.of(column, T, f));
             let turn = Complex::from_polar(1.0, self.s.omega(f) * dt);
@@ -94,14 +94,14 @@ impl MomentumBalance<'_> {
                 phase *= turn;
             }
         }
-        rights
+        right_sides
     }
 
     pub(super) fn solve(&self, gram: &[Vec<f64>], right: &[f64]) -> Found {
         self.within(gram, right, [[0.0, f64::INFINITY]; 2])
     }
 
-    /// The balance with M1 and M2 within bounds.
+    /// The solution with M1 and M2 within bounds, kg.m2 (kg) each.
     pub(super) fn within(&self, gram: &[Vec<f64>], right: &[f64], inertias: [[f64; 2]; 2]) -> Found {
         // Columns of unit size, so that one bound serves all.
         let size: Vec<f64> = (0..6).map(|i| gram[i][i].sqrt().max(f64::MIN_POSITIVE)).collect();
@@ -135,8 +135,8 @@ mod tests {
         let dt = 1e-3;
         let spectra = Spectra::new(&[&torque, &speed, &sign], 128, dt);
         let lines: Vec<usize> = (2..50).collect();
-        let balance = MomentumBalance { s: &spectra, lines: &lines, collocated: true, table: Some(700.0), total: 1.0 };
-        for (right, late) in balance.rights(dt, 5).into_iter().zip(-5..=5) {
+        let balance = MomentumEquation { s: &spectra, lines: &lines, collocated: true, table: Some(700.0), total: 1.0 };
+        for (right, late) in balance.right_sides(dt, 5).into_iter().zip(-5..=5) {
             let one = balance.right(f64::from(late) * dt);
             let size = one.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
             for (a, b) in right.iter().zip(&one) {

@@ -1,4 +1,4 @@
-//! Torque against motion, at the lines where the motion follows it:
+//! Torque against motion, at the spectral lines where the two are coherent:
 //!
 //! ```text
 //! T(t) = M1*a1 + M2*a2 + c*v1 + F*sign(v1) + k*x1      M1, M2, c, F >= 0; the motion may be late by tau
@@ -12,19 +12,19 @@
 mod conditions;
 mod equation;
 mod lines;
-mod weigh;
+mod torque;
 
 use super::Input;
-use super::encoders::{counted, encoders, slowly};
+use super::encoders::{compare_encoders, encoder_ratio, slow_motion_finding};
 use super::finding::{Finding, Severity};
-use super::rigid::{self, Weight};
+use super::rigid::{self, NominalFit};
 use super::robust::quantile;
 use super::spectra::Spectra;
-use conditions::{directions, excitation, times};
-use lines::coherent;
-use weigh::weigh;
+use conditions::{check_band, check_directions, check_time_scale};
+use lines::coherent_lines;
+use torque::torque_findings;
 
-/// Coherence from which a line tells something of the motion, where the averages do not ask for more.
+/// Least coherence of a line, where the number of averages does not require more.
 pub(super) const COHERENT: f64 = 0.4;
 
 /// Columns of the spectra.
@@ -33,8 +33,8 @@ pub(super) const MAIN: usize = 1;
 const SIGN: usize = 2;
 pub(super) const TABLE: usize = 3;
 
-/// Looks at torque and motion; gives the band in which the motion follows, Hz, and puts down the inertia that moves where it
-/// shows.
+/// Looks at torque and motion. Gives the band in which they are coherent, Hz, and sets the inertia that moves, kg.m2 (kg), where it is
+/// significant.
 pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
     let torque = input.torque?;
     let n = torque.len();
@@ -47,14 +47,14 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
     };
     let one = rate(input.theta1, input.omega1);
     let two = rate(input.theta2, input.omega2);
-    times(input, findings);
+    check_time_scale(input, findings);
     let collocated = one.is_some();
     let (main, table) = match (&one, &two) {
         (Some(a), b) => (a, b.as_ref()),
         (None, Some(b)) => (b, None),
         (None, None) => return None,
     };
-    directions(main, findings);
+    check_directions(main, findings);
     let quiet = 0.02 * quantile(main.iter().copied(), 0.9);
     let sign: Vec<f64> = main.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
     let mut columns: Vec<&[f64]> = vec![&torque[..n - 1], main, &sign];
@@ -63,16 +63,16 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
     let of_lines = || {
         lengths.into_iter().find_map(|length| {
             let spectra = Spectra::new(&columns, length, input.dt);
-            let found = coherent(&spectra);
+            let found = coherent_lines(&spectra);
             (!found.is_empty()).then_some((spectra, found))
         })
     };
-    let (nominal, lines) = rayon::join(|| rigid::weigh(input), of_lines);
+    let (nominal, lines) = rayon::join(|| rigid::compare_with_nominal(input), of_lines);
     let Some((spectra, lines)) = lines else {
-        whole_record(input, &columns, collocated, nominal, inertia, findings);
+        single_spectrum(input, &columns, collocated, nominal, inertia, findings);
         return None;
     };
-    // A line that stands alone passed by chance.
+    // A single line without neighbours may pass by chance.
     let adjacent: Vec<usize> = lines.windows(3).filter(|w| w[2] - w[0] == 2).map(|w| w[1]).collect();
     let [first, last] = match (adjacent.first(), adjacent.last()) {
         (Some(first), Some(last)) => [*first, *last],
@@ -80,25 +80,25 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
     };
     let band = [first, last].map(|f| spectra.omega(f) / std::f64::consts::TAU);
     if table.is_some() {
-        encoders(input, &spectra, &lines, findings);
+        compare_encoders(input, &spectra, &lines, findings);
     }
-    *inertia = believed(nominal, weigh(input, &spectra, &lines, collocated), findings);
-    excitation(input.nominal, band, findings);
+    *inertia = merge_with_nominal(nominal, torque_findings(input, &spectra, &lines, collocated), findings);
+    check_band(input.nominal, band, findings);
     Some(band)
 }
 
-/// A record without lines that averages could show: too short for its slow motion, or of a foreign torque. The balance is
-/// asked of the record as a whole, at the lines that hold the motion; few lines say nothing.
-fn whole_record(
+/// A record without coherent lines: too short for its slow motion, or with another axis' torque. The momentum equation is fitted to a single
+/// spectrum of the whole record, at the lines with 98 % of the speed's power; too few lines determine nothing.
+fn single_spectrum(
     input: &Input<'_>,
     columns: &[&[f64]],
     collocated: bool,
-    nominal: Option<Weight>,
+    nominal: Option<NominalFit>,
     inertia: &mut Option<f64>,
     findings: &mut Vec<Finding>,
 ) {
-    let spectra = Spectra::new(columns, transformable(columns[0].len()), input.dt);
-    // Acceleration is noise above the motion's band: the lines that hold nearly all of the speed.
+    let spectra = Spectra::new(columns, fft_length(columns[0].len()), input.dt);
+    // Above the motion's band the acceleration is noise: the lowest lines, with nearly all of the speed's power.
     let total: f64 = (0..spectra.lines).map(|f| spectra.power(MAIN, f)).sum();
     let mut sum = 0.0;
     let lines: Vec<usize> = (0..spectra.lines)
@@ -109,20 +109,20 @@ fn whole_record(
         })
         .collect();
     if lines.len() < LEAST_LINES {
-        findings.extend(slowly(input));
+        findings.extend(slow_motion_finding(input));
         let nothing = if nominal.is_some() { Vec::new() } else { vec![too_short(lines.len())] };
-        believed(nominal, (None, nothing), findings);
+        merge_with_nominal(nominal, (None, nothing), findings);
         return;
     }
     if spectra.has(TABLE) {
-        findings.extend(counted(input, &spectra, &lines).1);
+        findings.extend(encoder_ratio(input, &spectra, &lines).1);
     }
-    *inertia = believed(nominal, weigh(input, &spectra, &lines, collocated), findings);
+    *inertia = merge_with_nominal(nominal, torque_findings(input, &spectra, &lines, collocated), findings);
 }
 
 /// Even number of samples, all of `n` or, of a long record, a little fewer: a length with a large prime factor is transformed several
 /// times as slowly.
-fn transformable(n: usize) -> usize {
+fn fft_length(n: usize) -> usize {
     if n < 1 << 16 {
         return n / 2 * 2;
     }
@@ -130,18 +130,19 @@ fn transformable(n: usize) -> usize {
     odd.filter(|odd| 2 * odd <= n).map(|odd| odd << (n / odd).ilog2()).max().unwrap_or(n / 2 * 2)
 }
 
-/// What a balance of free coefficients found, but of sign and unit what the nominal axis says of them, where it says anything.
-fn believed(
-    nominal: Option<Weight>,
+/// Findings of the fit with free coefficients; those on sign and unit are replaced by the comparison with the nominal axis, where there is
+/// one. Gives the inertia, kg.m2 (kg).
+fn merge_with_nominal(
+    nominal: Option<NominalFit>,
     (inertia, found): (Option<f64>, Vec<Finding>),
     findings: &mut Vec<Finding>,
 ) -> Option<f64> {
     let known = nominal.is_some();
     findings.extend(found.into_iter().filter(|f| !(known && ["sign", "units", "inertia"].contains(&f.id))));
-    // An encoder that counts in another unit than the motor's makes both of one inertia: it is what is wrong.
+    // A table encoder in another unit changes the inertia too: that finding is the cause.
     let of_the_table = findings.iter().any(|f| f.severity == Severity::Refuse && f.signal == "theta2");
     match nominal {
-        Some(Weight::Wrong(finding)) if !of_the_table => {
+        Some(NominalFit::Inconsistent(finding)) if !of_the_table => {
             let kept = inertia.filter(|_| finding.id != "sign");
             findings.push(finding);
             kept
@@ -150,7 +151,7 @@ fn believed(
     }
 }
 
-/// A record whose motion so few lines hold that nothing is said of its torque.
+/// The note that too few lines have the motion's power for a statement on the torque.
 fn too_short(lines: usize) -> Finding {
     Finding::new(
         "too_short",
@@ -162,7 +163,7 @@ fn too_short(lines: usize) -> Finding {
     )
 }
 
-/// Lines below which the balance of a record as a whole says nothing: each of its six coefficients takes half a line.
+/// Least number of lines for a fit to a single spectrum: each of the six coefficients takes half a line.
 const LEAST_LINES: usize = 12;
 
 fn power_of_two(n: usize) -> usize {
@@ -176,7 +177,7 @@ mod tests {
     #[test]
     fn a_long_record_is_cut_to_a_length_of_small_factors() {
         for n in [100_003, 999_999, 3_000_017] {
-            let length = transformable(n);
+            let length = fft_length(n);
             assert!(length <= n && length > n - n / 50 && length.is_multiple_of(2), "{n}: {length}");
             let mut rest = length;
             for factor in [2, 3, 5] {
@@ -186,6 +187,6 @@ mod tests {
             }
             assert_eq!(rest, 1, "{n}: {length}");
         }
-        assert_eq!(transformable(4001), 4000);
+        assert_eq!(fft_length(4001), 4000);
     }
 }

@@ -83,13 +83,13 @@ fn a_torque_that_friction_and_inertia_explain_in_time_is_followed_and_another_is
     let mut e = noise(23, 2e-3);
     let mut columns = slow_moves();
     columns.v[1].iter_mut().for_each(|x| *x += e());
-    assert!(rigid::follows(&columns.motor_only()));
+    assert!(rigid::explained_in_time(&columns.motor_only()));
     let own = columns.v[0].clone();
     columns.v[0].iter_mut().for_each(|t| *t = -*t);
-    assert!(!rigid::follows(&columns.motor_only()), "it brakes the wrong way");
+    assert!(!rigid::explained_in_time(&columns.motor_only()), "it brakes the wrong way");
     let n = own.len();
     columns.v[0] = (0..n).map(|k| own[(k + n / 8) % n]).collect();
-    assert!(!rigid::follows(&columns.motor_only()), "an eighth of the record late");
+    assert!(!rigid::explained_in_time(&columns.motor_only()), "an eighth of the record late");
 }
 
 #[test]
@@ -104,9 +104,9 @@ fn a_weight_that_pushes_away_from_rest_is_followed_without_friction_and_one_turn
     let torque = (0..1024).map(|k| inertia * rate(k) - weight * at(k).sin()).collect();
     let x1 = (0..1024).map(|k| at(k) + e()).collect();
     let mut columns = Columns { dt: 2e-3, v: [torque, x1, Vec::new(), Vec::new(), Vec::new()] };
-    assert!(rigid::follows(&columns.motor_only()));
+    assert!(rigid::explained_in_time(&columns.motor_only()));
     columns.v[0].iter_mut().for_each(|t| *t = -*t);
-    assert!(!rigid::follows(&columns.motor_only()), "its inertia is none");
+    assert!(!rigid::explained_in_time(&columns.motor_only()), "its inertia is none");
 }
 
 #[test]

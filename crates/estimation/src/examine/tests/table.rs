@@ -1,7 +1,7 @@
 //! The table's encoder beside the motor's: its sign, its unit, and what moves the table beside the coupling.
 
 use super::*;
-use crate::examine::motor_side::feels_the_table;
+use crate::examine::motor_side::coupling_explains_torque;
 
 #[test]
 fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_period_too() {
@@ -139,7 +139,7 @@ fn a_motor_feels_its_own_table_whatever_swings_that_and_no_other_axis() {
         columns.v[3].push(x2 + e());
     }
     let nominal = Nominal { parameters: p, ..NOMINAL };
-    let feels = |x: &Columns| feels_the_table(&Input { nominal: Some(nominal), ..x.positions() });
+    let feels = |x: &Columns| coupling_explains_torque(&Input { nominal: Some(nominal), ..x.positions() });
     assert!(feels(&columns));
     columns.v[3] = another.iter().map(|[x, ..]| x + e()).collect();
     assert!(!feels(&columns));
