@@ -1,69 +1,70 @@
-//! Samples of a signal that its own past and future tell: interpolation by an autoregressive model (Janssen, Veldhuis, Vries, Adaptive
+//! Interpolation of samples from those before and after them by an autoregressive model (Janssen, Veldhuis, Vries, Adaptive
 //! interpolation of discrete-time signals that can be modeled as autoregressive processes, IEEE Trans. ASSP 34(2), 1986).
 //!
-//! A polynomial through the neighbours follows a motion that is slow beside the sampling; this one follows any motion whose spectrum
-//! leaves a part of the band to the noise, however near its frequencies are to Nyquist's.
+//! A polynomial through the neighbours interpolates a motion that is slow compared with the sampling; this model interpolates any motion
+//! whose spectrum is at the noise floor in a part of the band, however near its frequencies are to Nyquist's.
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Samples before one that it is told by.
+/// Order of the model.
 const ORDER: usize = 32;
-/// Samples that a model is of: a motion changes its kind, and a record may have a million.
-const STRETCH: usize = 4096;
-/// Values for each coefficient from which a model is one.
+/// Samples of a segment, each with a model of its own, since the spectrum of the motion changes along a record.
+const SEGMENT: usize = 4096;
+/// Least number of rows for each coefficient.
 const VALUES: usize = 8;
-/// Share of the signal, rms, below which what a model leaves is rounding.
+/// Rms residual over the rms signal below which the residual is rounding.
 const ROUNDING: f64 = 1e-13;
 /// Share of a regressor's power that those before it must leave, and of the target's that all of them must, for the normal equations to be
 /// as good as an orthogonal factorisation: their rounding is 1e-15 of a regressor's power.
 const INDEPENDENT: f64 = 1e-12;
 const RESIDUAL: f64 = 1e-9;
-/// Samples that tell a noise: more hardly tell it better.
-const TELLING: usize = 4 * STRETCH;
-/// Frequencies at which a spectrum is looked at.
+/// Most samples that a noise floor is estimated from.
+const NOISE_SAMPLES: usize = 4 * SEGMENT;
+/// Frequencies at which a spectrum is evaluated.
 const FREQUENCIES: usize = 512;
 
-/// A sample with the value that the others expect there, and the standard error of that.
+/// A sample interpolated from the others, in the signal's unit.
 pub struct Expected {
     /// Its index.
     pub at: usize,
-    /// The value that the others expect.
+    /// Interpolated value.
     pub value: f64,
-    /// Standard error of that value.
+    /// Its standard error.
     pub error: f64,
 }
 
-/// What a signal is expected to be at samples, in rising order, whose own values say nothing. Where too few others are sound nothing is.
+/// Interpolates the samples `lost` (indices, in rising order) of a signal; their own values are not used. Samples with too few others about
+/// them are left out.
 pub fn expected(y: &[f64], lost: &[usize]) -> Vec<Expected> {
     let within = |range: &Range<usize>| {
         let [from, to] = [range.start, range.end].map(|end| lost.partition_point(|k| *k < end));
         &lost[from..to]
     };
-    // The last stretch takes what is left of the record.
-    let stretches = (y.len() / STRETCH).max(1);
+    // The last segment is longer by the remainder.
+    let segments = (y.len() / SEGMENT).max(1);
     let of = |number: usize| -> Vec<Expected> {
-        let end = if number + 1 == stretches { y.len() } else { (number + 1) * STRETCH };
-        let stretch = number * STRETCH..end;
-        let own = within(&stretch);
+        let end = if number + 1 == segments { y.len() } else { (number + 1) * SEGMENT };
+        let segment = number * SEGMENT..end;
+        let own = within(&segment);
         if own.is_empty() {
             return Vec::new();
         }
-        // A model of its neighbours' samples, too: at the edge a sample has few to one side.
-        let whole = stretch.start.saturating_sub(ORDER)..(end + ORDER).min(y.len());
-        of_stretch(y, within(&whole), own, whole)
+        // The model is fitted to some samples of the neighbouring segments, too: a sample at the edge has few to one side.
+        let whole = segment.start.saturating_sub(ORDER)..(end + ORDER).min(y.len());
+        of_segment(y, within(&whole), own, whole)
     };
-    let all: Vec<Vec<Expected>> = (0..stretches).into_par_iter().map(of).collect();
+    let all: Vec<Vec<Expected>> = (0..segments).into_par_iter().map(of).collect();
     all.into_iter().flatten().collect()
 }
 
-/// Standard deviation, a sample, of the noise under a signal: the level above which 95 % of its spectrum lie, as its model has it. A motion
-/// that leaves no twentieth of the band to the noise hides it. `None` of too short a signal.
+/// Standard deviation of the noise of a signal, in its unit: the 5 % quantile of the model's spectrum, as a white noise. It is overestimated
+/// where the motion fills more than 95 % of the band. `None` for too short a signal.
 #[must_use]
 pub fn floor(y: &[f64]) -> Option<f64> {
-    let y = &y[..y.len().min(TELLING)];
+    let y = &y[..y.len().min(NOISE_SAMPLES)];
     let mean = y.iter().sum::<f64>() / y.len() as f64;
     let model = Model::of(&y.iter().map(|v| v - mean).collect::<Vec<f64>>(), &[])?;
     let mut levels: Vec<f64> = (0..FREQUENCIES)
@@ -72,13 +73,13 @@ pub fn floor(y: &[f64]) -> Option<f64> {
             let part = |of: fn(f64) -> f64| -> f64 {
                 model.coefficients.iter().enumerate().map(|(i, c)| c * of(turn * i as f64)).sum()
             };
-            model.left / part(f64::cos).hypot(part(f64::sin))
+            model.residual / part(f64::cos).hypot(part(f64::sin))
         })
         .collect();
     Some(*levels.select_nth_unstable_by(FREQUENCIES / 20, f64::total_cmp).1)
 }
 
-fn of_stretch(y: &[f64], lost: &[usize], own: &[usize], whole: Range<usize>) -> Vec<Expected> {
+fn of_segment(y: &[f64], lost: &[usize], own: &[usize], whole: Range<usize>) -> Vec<Expected> {
     let sound = whole.clone().filter(|k| lost.binary_search(k).is_err());
     let (sum, count) = sound.fold((0.0, 0.0), |(sum, count), k| (sum + y[k], count + 1.0));
     let mean = sum / count;
@@ -87,21 +88,21 @@ fn of_stretch(y: &[f64], lost: &[usize], own: &[usize], whole: Range<usize>) -> 
     let lost: Vec<usize> = lost.iter().filter_map(inside).collect();
     let own: Vec<usize> = own.iter().filter_map(inside).collect();
     let Some(model) = Model::of(&series, &lost) else { return Vec::new() };
-    // Each with those that it is told beside.
+    // Lost samples within one order of each other are interpolated together.
     let group = |k: usize| -> Vec<usize> { lost.iter().copied().filter(|l| l.abs_diff(k) <= ORDER).collect() };
     own.iter()
         .filter_map(|&k| {
-            let (value, error) = model.expects(&series, k, &group(k))?;
+            let (value, error) = model.interpolate(&series, k, &group(k))?;
             Some(Expected { at: whole.start + k, value: value + mean, error })
         })
         .collect()
 }
 
-/// A signal's value less what the ones before it tell: `coefficients` of the value and of those before it, one first.
+/// Prediction error `e(k) = sum of coefficients[i]*y(k - i)`, of which the first coefficient is 1.
 struct Model {
     coefficients: Vec<f64>,
-    /// Standard deviation of what is left.
-    left: f64,
+    /// Standard deviation of the prediction error, in the signal's unit.
+    residual: f64,
 }
 
 impl Model {
@@ -119,13 +120,13 @@ impl Model {
         let backwards: Vec<f64> = coefficients.iter().rev().copied().collect();
         let residual = |k: usize| dot(&backwards, &y[k - ORDER..=k]);
         let squares: f64 = runs.iter().flat_map(Clone::clone).map(|k| residual(k).powi(2)).sum();
-        let left = (squares.max(rounding * rounding) / (rows - ORDER) as f64).sqrt();
-        Some(Self { coefficients, left })
+        let deviation = (squares.max(rounding * rounding) / (rows - ORDER) as f64).sqrt();
+        Some(Self { coefficients, residual: deviation })
     }
 
-    /// What the others expect at one of a group of lost samples, and its standard error: the values that leave the least, forwards
-    /// in time and backwards.
-    fn expects(&self, y: &[f64], k: usize, group: &[usize]) -> Option<(f64, f64)> {
+    /// Sample `k` of a group of lost samples and its standard error: the values that minimise the prediction errors, forwards in time and
+    /// backwards.
+    fn interpolate(&self, y: &[f64], k: usize, group: &[usize]) -> Option<(f64, f64)> {
         let n = group.len();
         let mut a = DMatrix::<f64>::zeros(n, n);
         let mut b = DVector::<f64>::zeros(n);
@@ -154,8 +155,8 @@ impl Model {
         }
         let inverse = a.cholesky()?.inverse();
         let at = group.binary_search(&k).ok()?;
-        // The two ways say the same of one noise.
-        Some(((&inverse * b)[at], self.left * (2.0 * inverse[(at, at)]).sqrt()))
+        // Forward and backward prediction errors are of one noise: they count once.
+        Some(((&inverse * b)[at], self.residual * (2.0 * inverse[(at, at)]).sqrt()))
     }
 }
 
