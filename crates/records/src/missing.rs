@@ -46,6 +46,9 @@ impl Missing {
 
     /// Of a column that is at its end: the fault for which it is not bridged, or what is said of it where it is; nothing where no cell
     /// is missing.
+    ///
+    /// # Errors
+    /// The first cell without a number of a column that is not bridged.
     pub fn ended(&self, file: &str, column: &str) -> Result<Option<String>, Fault> {
         let Some(fault) = &self.first else { return Ok(None) };
         if self.beyond().is_some() || self.run > 0 || self.count as f64 > MISSING * self.rows as f64 {

@@ -39,6 +39,9 @@ pub(super) enum Kind {
 
 impl Kind {
     /// Tells from a file's first 128 bytes (fewer for a shorter one).
+    ///
+    /// # Errors
+    /// When the file is of a form that is not read.
     pub fn of(first: &[u8], file: &str) -> Result<Self, TraceError> {
         if first.starts_with(b"PAR1") {
             return Ok(Self::Parquet);
@@ -84,6 +87,9 @@ impl Kind {
     }
 
     /// Opens a file and tells what it is.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is of a form that is not read.
     pub fn open(path: &Path) -> Result<(Self, File), TraceError> {
         let failed = |reason| TraceError::Read { path: path.to_owned(), reason };
         let mut first = Vec::with_capacity(128);

@@ -25,6 +25,9 @@ pub(crate) struct Head {
 
 impl Head {
     /// The header of a file without byte order mark; `file` names it in messages.
+    ///
+    /// # Errors
+    /// When there is no header, it is too long, or two columns have one name.
     pub fn find(bytes: &[u8], file: &str) -> Result<Self, TraceError> {
         let none = |what: String| TraceError::NoTable { file: file.to_owned(), what };
         let (mut at, mut lines) = (0, 0);
@@ -79,6 +82,9 @@ impl Head {
 
 /// Refuses a name that two columns have. Of a quantity that stands in several units, each in a column of its own, as in the summary of
 /// rotary and linear machines, every column keeps its unit in its name; of a signal one is meant, and which is not guessed.
+///
+/// # Errors
+/// [`TraceError::TwiceNamed`] when two columns have one name.
 pub(super) fn distinct(headers: &mut [Header], file: &str) -> Result<(), TraceError> {
     let signal = |name: &str| name.eq_ignore_ascii_case("time") || Signal::from_name(name).is_some();
     let several = |h: &Header| {

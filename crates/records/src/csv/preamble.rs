@@ -101,6 +101,10 @@ impl Preamble {
         Some(Self { names, units, separator, blank_last, body, lines })
     }
 
+    /// As the head of a file.
+    ///
+    /// # Errors
+    /// When there are too many columns, or two of one name.
     pub fn head(self, file: &str) -> Result<Head, TraceError> {
         if self.names.len() > MAX_COLUMNS {
             let what = format!("{} columns; at most {MAX_COLUMNS} are read", self.names.len());

@@ -26,6 +26,9 @@ pub(crate) struct Rows {
 }
 
 /// Parses whole lines, of which the first holds row `row` (from 0) or what stands before it, and is line `line` (from 1).
+///
+/// # Errors
+/// [`Ragged`] of the first row with too few or too many fields.
 pub(crate) fn rows(body: &[u8], format: &Format, row: usize, line: usize) -> Result<Rows, Ragged> {
     let chunks = chunks(body);
     let counts: Vec<Count> = chunks.par_iter().map(|range| count(&body[range.clone()])).collect();
