@@ -1,5 +1,7 @@
 //! Samples that a log held, as notes on a record: `identify` and `diagnose` bridge them, and who reads the log should know how many and when.
 
+use rayon::prelude::*;
+
 use crate::examine::{Finding, Severity};
 use crate::trace::{Signal, Trace, held};
 
@@ -9,7 +11,7 @@ const MOST: usize = 64;
 /// A note for each position of the record that has such samples.
 pub(super) fn notes(trace: &Trace) -> Vec<Finding> {
     let positions = [Signal::Theta1, Signal::Theta2, Signal::X2];
-    positions.into_iter().filter_map(|signal| note(trace, signal, &held(trace.get(signal)?, 0.0))).collect()
+    positions.into_par_iter().filter_map(|signal| note(trace, signal, &held(trace.get(signal)?, 0.0))).collect()
 }
 
 fn note(trace: &Trace, signal: Signal, at: &[usize]) -> Option<Finding> {

@@ -50,8 +50,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let file = args.trace.display().to_string();
     let loaded = load(&args.trace, &machine.signals)?;
     let input = Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, args.axis.is_some());
-    let mut examination = examine(&input);
-    examination.findings.extend(held::notes(&loaded.trace));
+    let (mut examination, notes) = rayon::join(|| examine(&input), || held::notes(&loaded.trace));
+    examination.findings.extend(notes);
     let seen = Inspected {
         examination: &examination,
         trace: &loaded.trace,

@@ -11,6 +11,9 @@ thread_local! {
 }
 
 /// What a reader gives; its error or its panic as a text. Panics elsewhere are printed as ever.
+///
+/// # Errors
+/// The error of `run` as a text, or that the reader panicked.
 pub(super) fn caught<T, E: std::fmt::Display>(run: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {

@@ -100,6 +100,9 @@ const BRIDGED: f64 = 6.0;
 const MISSING: f64 = 0.05;
 
 /// The grid: cut by `from` and `to`, at gaps, and brought to even steps where the stamps are not.
+///
+/// # Errors
+/// When the time column is missing, has a cell that is no number or a wrong unit, gives no sampling interval, or too few rows are left.
 pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>) -> Result<Clocks, TraceError> {
     let file = || table.file.clone();
     let count = table.rows();

@@ -20,6 +20,9 @@ pub(super) enum Form {
 }
 
 /// Tells what the text is, and brings it to a table or to CSV where it is neither.
+///
+/// # Errors
+/// When the bytes are no text of a known encoding, or are of a known form and damaged.
 pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
     if let [0xff, 0xfe, rest @ ..] = bytes {
         return utf16(rest, u16::from_le_bytes, file);
@@ -116,6 +119,9 @@ impl Filled {
     }
 
     /// Puts a value into the row that is being filled; `text` is what stands there, for a fault.
+    ///
+    /// # Errors
+    /// When there are more columns or numbers than are read.
     pub fn put(
         &mut self,
         name: &str,

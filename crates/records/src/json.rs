@@ -8,6 +8,9 @@ use super::forms::Filled;
 use super::table::Table;
 
 /// JSON Lines, an array of objects, or an object of arrays.
+///
+/// # Errors
+/// When the text is no JSON, or holds no table.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
     let mut filled = Filled::default();

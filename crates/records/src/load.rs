@@ -226,6 +226,9 @@ pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal,
 }
 
 /// The signals that the file has, and where.
+///
+/// # Errors
+/// When a column of `[signals]` is not in the table.
 pub(super) fn wanted(
     table: &Table,
     mapping: &Mapping,
@@ -285,6 +288,9 @@ fn missing(table: &Table, signal: &'static str, wanted: &str) -> TraceError {
 }
 
 /// Which column it is, and the factor that brings it to SI.
+///
+/// # Errors
+/// When the column is missing, or its unit is unknown or of another quantity.
 pub(super) fn scale(
     table: &Table,
     column: &Column,
@@ -329,6 +335,9 @@ pub(super) fn scaled(raw: &[f64], scale: f64, offset: f64) -> Vec<f64> {
 }
 
 /// The values of a column in SI units, scaled.
+///
+/// # Errors
+/// As [`scale`]; and when a cell among the rows is no finite number.
 pub(super) fn values(
     table: &Table,
     column: &Column,
@@ -347,6 +356,9 @@ pub(super) fn time_name(name: &str) -> bool {
 }
 
 /// The column of time; none where the mapping gives the interval and the file has no such column.
+///
+/// # Errors
+/// When there is no column of time and no interval is given.
 pub(super) fn time_column(table: &Table, mapping: &Mapping) -> Result<Option<Column>, TraceError> {
     let column = mapping.time.clone();
     if table.position(&column.column).is_some() {

@@ -1,11 +1,11 @@
 //! Samples that a log lost: spikes of a disturbed line, and samples that repeat the one before.
 //!
-//! A reading with noise in it repeats by chance hardly ever: one that does, where the others expect another value
-//! ([`super::autoregressive`]), was held.
+//! A reading with noise hardly ever repeats by chance: one that repeats although the others interpolate to another value
+//! ([`super::autoregressive`]) was held.
 //!
-//! Else a position runs smoothly from sample to sample, at a blow with a kink that stays; lost is one, or two near each other, that their
-//! neighbours, which agree with each other, do not expect. It is bridged by the cubic through them (Savitzky, Golay, Analytical Chemistry
-//! 36(8), 1964).
+//! Other lost samples are found by a cubic through their neighbours: a position is smooth from sample to sample, and after an impact its slope
+//! changes for good. One sample, or two near each other, are lost where they deviate from the cubic and their neighbours fit it. They
+//! are replaced by the cubic's values (Savitzky, Golay, Analytical Chemistry 36(8), 1964). Values are in the position's unit.
 
 use std::ops::Range;
 
@@ -16,27 +16,27 @@ use crate::autoregressive::expected;
 /// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
 /// hides another near it until it is bridged, and two that hide each other are found together.
 const PASSES: [(usize, usize); 8] = [(0, MANY), (0, MANY), (0, 3), (0, 3), (1, MANY), (1, 3), (2, MANY), (3, MANY)];
-/// Neighbours on each side that tell a slow motion.
+/// Neighbours on each side for a slow motion.
 const MANY: usize = 6;
-/// Neighbours on each side that a motion of the record's highest frequencies is told by.
+/// Neighbours on each side for a motion of the record's highest frequencies.
 const NEAREST: usize = 3;
-/// Error of the cubic, in rms of its residual here and about and in noise of the channel, from which a sample is lost: Gaussian noise
-/// makes one in five hundred million.
+/// Deviation of a sample from the cubic from which it is lost, over the rms residual of the cubic, over its median in the block and over the
+/// noise: with Gaussian noise one sample in five hundred million is beyond it.
 const FAR: f64 = 6.0;
-/// Residual of the cubic over the usual one about it up to which the neighbours agree with each other.
+/// Rms residual of the cubic, over its median in the block, up to which the neighbours fit it.
 const AGREE: f64 = 2.5;
-/// Error of the cubic over its residual from which a held sample is lost however far its neighbours agree: a blow, which they do not agree
-/// about, leaves as much at them as at the sample between them.
+/// Deviation of a held sample from the cubic, over the rms residual, from which it is lost whatever the residual is: an impact leaves a
+/// residual at the neighbours as large as at the sample itself.
 const CLEAR: f64 = 20.0;
-/// Samples in which the residual is a usual one.
+/// Samples of a block, over which the median residual is taken.
 const BLOCK: usize = 256;
 /// Share of the samples that may be lost: more are the signal.
 const MOST: f64 = 0.02;
 
-/// Samples that a cubic is laid through at a time: so the processor does several at once.
+/// Samples at which the cubic is evaluated together, for vector instructions.
 const LANES: usize = 8;
 
-/// Two neighbours at one distance from the middle: where they stand, from the first neighbour on, and the distance in samples with its cube.
+/// Two neighbours at the same distance from the middle: their offsets from the first neighbour, and the distance in samples with its cube.
 struct Pair {
     before: usize,
     after: usize,
@@ -44,10 +44,11 @@ struct Pair {
     x3: f64,
 }
 
-/// The cubic through the neighbours of a sample and of the one `span` intervals on: what of it is the same at every sample.
+/// The least-squares cubic through the neighbours of a sample and of the one `span` intervals later: the terms common to all samples. `neighbours` is
+/// their number on each side.
 struct Cubic {
     span: usize,
-    reach: usize,
+    neighbours: usize,
     pairs: Vec<Pair>,
     /// Sums over the neighbours: of one, of x^2, x^4 and x^6.
     s: f64,
@@ -56,18 +57,18 @@ struct Cubic {
     s6: f64,
 }
 
-/// A cubic at a sample: what it expects there and `span` intervals on, and the rms of its residual.
+/// The cubic at a sample: its values there and `span` intervals later, and its rms residual.
 #[derive(Clone, Copy)]
-struct Laid {
+struct CubicValue {
     expected: [f64; 2],
     residual: f64,
 }
 
 impl Cubic {
-    fn new((span, reach): (usize, usize)) -> Self {
-        let outside = (1..=reach).map(|j| (reach - j, reach + span + j));
+    fn new((span, neighbours): (usize, usize)) -> Self {
+        let outside = (1..=neighbours).map(|j| (neighbours - j, neighbours + span + j));
         // Those between the two; of an odd number the one in the middle is left out, which has no other.
-        let between = (1..).take_while(|j| 2 * j < span).map(|j| (reach + j, reach + span - j));
+        let between = (1..).take_while(|j| 2 * j < span).map(|j| (neighbours + j, neighbours + span - j));
         let (mut s, mut s2, mut s4, mut s6) = (0.0, 0.0, 0.0, 0.0);
         let pairs = outside.chain(between).map(|(before, after)| {
             let x = 0.5 * after.abs_diff(before) as f64;
@@ -78,14 +79,14 @@ impl Cubic {
             Pair { before, after, x, x3: x.powi(3) }
         });
         let pairs = pairs.collect();
-        Self { span, reach, pairs, s, s2, s4, s6 }
+        Self { span, neighbours, pairs, s, s2, s4, s6 }
     }
 
     /// At `N` samples in a row from `k` on.
-    fn at<const N: usize>(&self, y: &[f64], k: usize) -> [Laid; N] {
-        let lanes = |at: usize| -> &[f64] { &y[k - self.reach + at..][..N] };
-        let own = lanes(self.reach);
-        // Even powers about the middle tell the value there, odd ones belong to the slope.
+    fn at<const N: usize>(&self, y: &[f64], k: usize) -> [CubicValue; N] {
+        let lanes = |at: usize| -> &[f64] { &y[k - self.neighbours + at..][..N] };
+        let own = lanes(self.neighbours);
+        // The even and the odd coefficients about the middle separate.
         let ([mut a, mut a2], [mut b, mut b3], mut squares) = ([[0.0; N]; 2], [[0.0; N]; 2], [0.0; N]);
         for pair in &self.pairs {
             let (before, after) = (lanes(pair.before), lanes(pair.after));
@@ -107,12 +108,12 @@ impl Cubic {
             let (c1, c3) = ((s6 * b[i] - s4 * b3[i]) / odd, (s2 * b3[i] - s4 * b[i]) / odd);
             let left = squares[i] - c0 * a[i] - c2 * a2[i] - c1 * b[i] - c3 * b3[i];
             let expected = [-middle, middle].map(|x| own[i] + c0 + x * (c1 + x * (c2 + x * c3)));
-            Laid { expected, residual: (left.max(0.0) / (s - 4.0)).sqrt() }
+            CubicValue { expected, residual: (left.max(0.0) / (s - 4.0)).sqrt() }
         })
     }
 
     /// At the samples of a range.
-    fn along(&self, y: &[f64], range: Range<usize>) -> Vec<Laid> {
+    fn along(&self, y: &[f64], range: Range<usize>) -> Vec<CubicValue> {
         let mut all = Vec::with_capacity(range.len());
         let mut k = range.start;
         while k + LANES <= range.end {
@@ -124,22 +125,22 @@ impl Cubic {
     }
 }
 
-/// Whether a sample repeats the one before: a reading with noise in it does so only where it is held.
+/// Whether a sample equals the one before: a reading with noise does so only where it is held.
 fn repeats(y: &[f64], k: usize) -> bool {
     y[k] == y[k - 1]
 }
 
-/// A lost sample, the first of a pass' two, with what the neighbours expect and the rms by which these disagree.
+/// A lost sample (of a pass for two the first), the cubic's values there and `span` intervals later, and its rms residual.
 type Lost = (usize, [f64; 2], f64);
 
 /// Lost samples of a position whose noise has a standard deviation of `noise`.
 fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<Lost> {
-    let (span, reach) = pass;
+    let (span, neighbours) = pass;
     if y.len() < BLOCK {
         return Vec::new();
     }
     let cubic = Cubic::new(pass);
-    let end = y.len() - reach - span;
+    let end = y.len() - neighbours - span;
     let of_block = |first: usize| {
         let block = first..(first + BLOCK).min(end);
         let held = |k: usize| repeats(y, k) && repeats(y, k + span);
@@ -149,18 +150,18 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<Lost> {
         }
         let cubics = cubic.along(y, block.clone());
         let mut residuals: Vec<f64> = cubics.iter().map(|c| c.residual).collect();
-        let usual = *residuals.select_nth_unstable_by(block.len() / 2, f64::total_cmp).1;
-        let is_lost = |(k, c): &(usize, Laid)| {
-            // A fast motion is no cubic: what it leaves now and then is measured by what it leaves as a rule.
+        let median = *residuals.select_nth_unstable_by(block.len() / 2, f64::total_cmp).1;
+        let is_lost = |(k, c): &(usize, CubicValue)| {
+            // A fast motion is no cubic: a residual is compared with the median of the block.
             let off = (y[*k] - c.expected[0]).abs().max((y[k + span] - c.expected[1]).abs());
             let clear = off > CLEAR * c.residual && held(*k);
-            let agree = c.residual <= AGREE * usual.max(noise);
-            off > FAR * c.residual.max(usual).max(noise) && (clear || agree && span < 2)
+            let agree = c.residual <= AGREE * median.max(noise);
+            off > FAR * c.residual.max(median).max(noise) && (clear || agree && span < 2)
         };
         let told = block.zip(cubics).filter(is_lost);
         told.map(|(k, c)| (k, c.expected, c.residual)).collect::<Vec<Lost>>()
     };
-    let blocks: Vec<usize> = (reach..end).step_by(BLOCK).collect();
+    let blocks: Vec<usize> = (neighbours..end).step_by(BLOCK).collect();
     let found: Vec<Vec<Lost>> = blocks.into_par_iter().map(of_block).collect();
     let mut out: Vec<Lost> = Vec::new();
     for one in found.into_iter().flatten() {
@@ -171,7 +172,7 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<Lost> {
     out
 }
 
-/// Samples that repeat the one before and are expected to be something else, and what: as many as may be lost of a record at most.
+/// Samples that repeat the one before and are interpolated to another value, with that value; none where more than [`MOST`] repeat.
 fn repeated(y: &[f64], noise: f64) -> Vec<(usize, f64)> {
     let repeats: Vec<usize> = (1..y.len()).filter(|k| repeats(y, *k)).collect();
     if repeats.len() as f64 > MOST * y.len() as f64 {
@@ -181,7 +182,7 @@ fn repeated(y: &[f64], noise: f64) -> Vec<(usize, f64)> {
     told.filter(|e| (y[e.at] - e.value).abs() > FAR * e.error.max(noise)).map(|e| (e.at, e.value)).collect()
 }
 
-/// Gives the samples that repeat the one before the values that the others expect there, whatever the noise of the position is.
+/// Replaces the samples that repeat the one before by their interpolated values, whatever the noise of the position is.
 pub fn restore(y: &mut [f64]) {
     repeated(y, 0.0).into_iter().for_each(|(k, expected)| y[k] = expected);
 }

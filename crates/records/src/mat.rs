@@ -102,6 +102,9 @@ pub(super) fn parse(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
 }
 
 /// The table of all vectors that are as long as most of them.
+///
+/// # Errors
+/// When there is no vector of numbers, there are too many, or two have one name.
 pub(super) fn table(vectors: Vec<Vector>, file: &str) -> Result<Table, TraceError> {
     // The most frequent length; of two, the longer.
     let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();

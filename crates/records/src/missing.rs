@@ -1,7 +1,7 @@
 //! Cells without a number: few that stand alone are bridged by straight lines, in a whole table and in a stream by the same rule.
 
 use super::error::TraceError;
-use super::table::Fault;
+use super::table::{Fault, line_of};
 
 /// Share of a column's cells that may be missing for them to be bridged.
 const MISSING: f64 = 0.01;
@@ -46,6 +46,9 @@ impl Missing {
 
     /// Of a column that is at its end: the fault for which it is not bridged, or what is said of it where it is; nothing where no cell
     /// is missing.
+    ///
+    /// # Errors
+    /// The first cell without a number of a column that is not bridged.
     pub fn ended(&self, file: &str, column: &str) -> Result<Option<String>, Fault> {
         let Some(fault) = &self.first else { return Ok(None) };
         if self.beyond().is_some() || self.run > 0 || self.count as f64 > MISSING * self.rows as f64 {
@@ -91,10 +94,9 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// Line in the file of a row that is among them, from 1.
+    /// Line in the file, from 1, of a row that is among them.
     pub fn line(&self, row: usize) -> usize {
-        let last = self.lines.partition_point(|(first, _)| *first <= row);
-        last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
+        line_of(&self.lines, row)
     }
 }
 

@@ -17,11 +17,17 @@ pub(super) struct Source {
 
 impl Source {
     /// Refuses the file.
+    ///
+    /// # Errors
+    /// Always: the feature is off.
     pub fn open(_open: File, file: &str) -> Result<Self, TraceError> {
         Err(refused(file.to_owned()))
     }
 
     /// Reads what [`Source::open`] has opened.
+    ///
+    /// # Errors
+    /// Always: the feature is off.
     pub fn batches(
         &self,
         _wanted: &[usize],
@@ -32,11 +38,17 @@ impl Source {
 }
 
 /// Refuses the file.
+///
+/// # Errors
+/// Always: the feature is off.
 pub(super) fn read(_open: File, file: &str) -> Result<Table, TraceError> {
     Err(refused(file.to_owned()))
 }
 
 /// Refuses to make the file.
+///
+/// # Errors
+/// Always: the feature is off.
 pub(super) fn pack(_columns: &[(&str, &[f64])], path: &Path) -> Result<Vec<u8>, TraceError> {
     Err(refused(path.display().to_string()))
 }

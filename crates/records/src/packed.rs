@@ -13,6 +13,9 @@ use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table, header};
 const UNFOLDED: u64 = 2 << 30;
 
 /// What an archive holds, by the names of its entries.
+///
+/// # Errors
+/// When the archive is damaged, unfolds to too much, or holds no table.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
     let damaged = |e: zip::result::ZipError| wrong(format!("a damaged archive ({e}); copy it again"));

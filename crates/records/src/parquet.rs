@@ -80,6 +80,9 @@ struct Batch {
 
 impl Source {
     /// Reads the file's description.
+    ///
+    /// # Errors
+    /// When the file is no Parquet, has too many columns, or two of one name.
     pub fn open(open: File, file: &str) -> Result<Self, TraceError> {
         let reader = guarded(file, || SerializedFileReader::new(open))?;
         let described = reader.metadata().file_metadata();
@@ -269,6 +272,9 @@ fn numbers<T: DataType>(
     Ok(Batch { values, fault })
 }
 /// Columns of numbers as a file, one row group, shorter columns ending in nulls.
+///
+/// # Errors
+/// When the columns cannot be written as Parquet.
 pub(super) fn pack(columns: &[(&str, &[f64])], path: &std::path::Path) -> Result<Vec<u8>, TraceError> {
     let rows = columns.iter().map(|(_, v)| v.len()).max().unwrap_or(0);
     let made = || -> Result<Vec<u8>, ParquetError> {

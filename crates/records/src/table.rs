@@ -39,6 +39,9 @@ pub(super) enum Kind {
 
 impl Kind {
     /// Tells from a file's first 128 bytes (fewer for a shorter one).
+    ///
+    /// # Errors
+    /// When the file is of a form that is not read.
     pub fn of(first: &[u8], file: &str) -> Result<Self, TraceError> {
         if first.starts_with(b"PAR1") {
             return Ok(Self::Parquet);
@@ -84,6 +87,9 @@ impl Kind {
     }
 
     /// Opens a file and tells what it is.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is of a form that is not read.
     pub fn open(path: &Path) -> Result<(Self, File), TraceError> {
         let failed = |reason| TraceError::Read { path: path.to_owned(), reason };
         let mut first = Vec::with_capacity(128);
@@ -242,8 +248,7 @@ impl Table {
     /// Line in the file, from 1, of a row of data, from 0.
     #[must_use]
     pub fn line(&self, row: usize) -> usize {
-        let last = self.lines.partition_point(|(first, _)| *first <= row);
-        last.checked_sub(1).map_or(row + 1, |i| self.lines[i].1 + row - self.lines[i].0)
+        line_of(&self.lines, row)
     }
 
     /// The column of that name; with its unit behind it, as the file writes it, it is the same.
@@ -298,6 +303,13 @@ impl Table {
     pub fn names(&self) -> String {
         self.headers.iter().map(|h| h.name.as_str()).collect::<Vec<_>>().join(", ")
     }
+}
+
+/// Line in the file, from 1, of a row of data, from 0. `lines`: in order, (row, line) wherever the line of a row is not one more than that of
+/// the row before; without any the first row is line 1.
+pub(super) fn line_of(lines: &[(usize, usize)], row: usize) -> usize {
+    let after = lines.partition_point(|(first, _)| *first <= row);
+    after.checked_sub(1).map_or(row + 1, |i| lines[i].1 + row - lines[i].0)
 }
 
 /// Words for a count of an encoder or converter, which is in no unit: its scale is the user's to say.

@@ -35,6 +35,9 @@ fn named(name: &str, unit: &str) -> String {
 }
 
 /// A trace of Sinumerik.
+///
+/// # Errors
+/// When the file is damaged, or holds no table.
 pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
     let mut cut = None;
@@ -119,6 +122,9 @@ fn closed(bytes: &[u8]) -> Option<Closed> {
 }
 
 /// A file of TNCscope.
+///
+/// # Errors
+/// When the file is damaged, or holds no table.
 pub(super) fn tncscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let wrong = |what: String| TraceError::Format { file: file.to_owned(), what };
     let text = String::from_utf8_lossy(bytes);

@@ -12,6 +12,9 @@ const WORDS: [u32; 2] = [16, 32];
 
 /// Counters of limited width go on where they start anew; says so. A counter is one whose whole numbers stay within its width,
 /// from zero on or about zero, and jump by nearly that; an angle within one turn jumps by nearly that.
+///
+/// # Errors
+/// As [`scale`].
 pub(super) fn unwrap(
     values: &mut [f64],
     table: &Table,

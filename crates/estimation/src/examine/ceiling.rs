@@ -4,45 +4,46 @@
 //! T = M1*a1 + M2*a2 + c*v + F*sign(v) + k*x + b        where T is off its ends, by least squares
 //! ```
 //!
-//! and there against the motion while T stands at an end. Behind a limit of the drive the axis is moved by that limit; behind one of the log
-//! by more. Torque and motion pass the same smoothing, so that the equation holds between them; noise of the encoder that is left takes from
-//! the inertia, and so speaks for the drive. A torque that is held from sample to sample moves a difference of the second order by the mean of
-//! two.
+//! The equation is fitted where T is within its range and evaluated where T is at an end of it. If the drive limits the torque, the axis moves
+//! as under that limit; if the log limits the column, as under more. Torque and motion pass the same smoothing, so that the equation holds
+//! between them. Remaining encoder noise biases the inertia low, and so favours the drive's limit. A torque that is held between samples acts
+//! on a second difference as the mean of two samples.
 
 use super::Input;
 use super::finding::runs;
-use super::rigid::{MOST_LEFT, SAMPLES};
+use super::rigid::{MAX_RESIDUAL, SAMPLES};
 use super::robust::quantile;
 use super::smoothing::{SHORTEST, smoothed};
 use crate::identify::lsq::triangularise;
 
-/// Widths of the smoothing that are tried.
+/// Widths of the smoothing that are tried, samples to either side.
 const WIDTHS: [usize; 7] = [0, 1, 2, 4, 8, 16, 32];
-/// Rows for each coefficient from which it says something.
+/// Least number of rows for each coefficient.
 const ROWS: usize = 10;
 /// Stretches at an end from which their spread is known to a quarter.
 const STRETCHES: usize = 8;
-/// Errors of the mean of what the axis felt beyond an end, from which it felt more than was logged; the equation's rms error off the ends is
-/// that of one stretch. Chance makes three; what the equation leaves out, in sound records with friction, play and ripple, made less than that.
+/// Mean excess of the computed torque over the logged limit, in its standard errors, from which the axis was driven by more than was logged;
+/// the rms residual of the fit is the standard error of one stretch. Chance makes three; unmodelled friction, play and ripple made less than
+/// that in sound records.
 const SURE: f64 = 6.0;
 
 /// What the axis felt while its torque stood at an end.
-pub(super) enum Actual {
+pub(super) enum AppliedTorque {
     /// That torque.
     AsLogged,
     /// More, by that share of the end.
     Larger(f64),
-    /// It cannot be told: too little of the record is off the ends, or no equation explains it.
+    /// Undetermined: too few samples are within the range, or the equation does not explain the torque.
     Unknown,
 }
 
 /// What the axis felt while its torque stood at an end.
-pub(super) fn actual_torque(input: &Input<'_>, torque: &[f64]) -> Actual {
+pub(super) fn applied_torque(input: &Input<'_>, torque: &[f64]) -> AppliedTorque {
     let mut best: Option<(f64, Option<f64>)> = None;
     for width in WIDTHS.into_iter().filter(|w| SHORTEST + 8 * w <= torque.len()) {
         for held in [true, false] {
             if let Some((left, excess)) = at_width(input, torque, width, held)
-                && left < MOST_LEFT
+                && left < MAX_RESIDUAL
                 && best.is_none_or(|(least, _)| left < 0.98 * least)
             {
                 best = Some((left, excess));
@@ -50,13 +51,14 @@ pub(super) fn actual_torque(input: &Input<'_>, torque: &[f64]) -> Actual {
         }
     }
     match best {
-        None => Actual::Unknown,
-        Some((_, None)) => Actual::AsLogged,
-        Some((_, Some(share))) => Actual::Larger(share),
+        None => AppliedTorque::Unknown,
+        Some((_, None)) => AppliedTorque::AsLogged,
+        Some((_, Some(share))) => AppliedTorque::Larger(share),
     }
 }
 
-/// Share of the torque's power that is left off its ends, and how much more the axis felt at them where that is sure.
+/// Residual share of the torque's variance within its range, and the relative excess of the computed torque at its ends where that is
+/// significant. `width`: of the smoothing, samples to either side; `held`: the torque is held between samples.
 fn at_width(input: &Input<'_>, torque: &[f64], width: usize, held: bool) -> Option<(f64, Option<f64>)> {
     let dt = input.dt;
     let positions: Vec<Vec<f64>> =
@@ -69,14 +71,14 @@ fn at_width(input: &Input<'_>, torque: &[f64], width: usize, held: bool) -> Opti
     }
     let (q, last) = (positions.first()?, t.len() - 1);
     let (low, high) = torque.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    // Smoothed twice, a value reaches 2*width samples to either side; a difference one more.
-    let reach = 2 * width;
+    // A value that is smoothed twice depends on 2*width samples to either side; a difference on one more.
+    let support = 2 * width;
     let at_end = |k: usize| torque[k] == low || torque[k] == high;
     let mut before = vec![0_usize; torque.len() + 1];
     for k in 0..torque.len() {
         before[k + 1] = before[k] + usize::from(at_end(k));
     }
-    let touched = |k: usize| before[(k + 2 * reach + 1).min(torque.len())] > before[k - 1];
+    let touched = |k: usize| before[(k + 2 * support + 1).min(torque.len())] > before[k - 1];
     let free: Vec<usize> = (1..last).filter(|k| !touched(*k)).collect();
     let columns = positions.len() + 4;
     if free.len() < ROWS * columns {
@@ -106,21 +108,21 @@ fn at_width(input: &Input<'_>, torque: &[f64], width: usize, held: bool) -> Opti
     if !left.is_finite() {
         return None;
     }
-    // Stretches that the smoothing joins are one observation.
+    // Stretches nearer to each other than the smoothing's support are one observation.
     let mut regressors = vec![0.0; columns];
     let mut more = Vec::new();
     for (end, side) in [(high, 1.0), (low, -1.0)] {
         let (mut sum, mut count, mut since) = (0.0, 0.0, 0);
         for k in 1..last {
-            if torque[k + reach] == end && (!held || torque[k + reach - 1] == end) {
+            if torque[k + support] == end && (!held || torque[k + support - 1] == end) {
                 fill(k, &mut regressors);
-                let felt: f64 = regressors.iter().enumerate().map(|(i, r)| solution.phi[(i, 0)] * r).sum();
-                sum += side * (felt - t[k]);
+                let computed: f64 = regressors.iter().enumerate().map(|(i, r)| solution.phi[(i, 0)] * r).sum();
+                sum += side * (computed - t[k]);
                 count += 1.0;
                 since = 0;
             } else {
                 since += 1;
-                if since > reach && count > 0.0 {
+                if since > support && count > 0.0 {
                     more.push(sum / count);
                     (sum, count) = (0.0, 0.0);
                 }
@@ -139,9 +141,9 @@ fn at_width(input: &Input<'_>, torque: &[f64], width: usize, held: bool) -> Opti
     Some((left, (excess > SURE * error).then(|| excess / high.abs().max(low.abs()))))
 }
 
-/// Stretches in which a column stands at its ends time and again, between which it takes many values: a column of a few levels ends at one by
-/// nature.
-pub(super) fn stands(x: &[f64]) -> Vec<std::ops::Range<usize>> {
+/// Stretches of at least three samples in which a column is at the smallest or largest value of its range, where there are several of them and
+/// the column takes many values between: a column of a few levels has such stretches by nature.
+pub(super) fn limited_stretches(x: &[f64]) -> Vec<std::ops::Range<usize>> {
     let n = x.len();
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     let at_end: Vec<std::ops::Range<usize>> =
@@ -150,11 +152,10 @@ pub(super) fn stands(x: &[f64]) -> Vec<std::ops::Range<usize>> {
     if at_end.len() < 3 || count * 200 < n || levels(x, low, high) { Vec::new() } else { at_end }
 }
 
-/// Values between the ends from which they are told from some levels.
+/// Distinct values within the range below which a column is one of a few levels.
 const VALUES: usize = 16;
 
-/// Whether a column takes a few values, or keeps each for some samples, and does not pass all that are between its ends: however little of it
-/// is there.
+/// Whether a column takes few distinct values between its ends, `low` and `high`, or keeps each for some samples.
 fn levels(x: &[f64], low: f64, high: f64) -> bool {
     let inside = |v: &f64| *v > low && *v < high;
     let within = x.windows(2).filter(|w| w.iter().all(inside)).count();

@@ -4,7 +4,9 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use super::ceiling::{self, Actual};
+use rayon::prelude::*;
+
+use super::ceiling::{self, AppliedTorque};
 use super::finding::{Finding, Severity};
 use super::robust::{self, quantile, span, step};
 use super::{Channel, Input};
@@ -12,52 +14,59 @@ use crate::numerics::level::{deviation, rms};
 
 /// Least samples of a stretch that counts as stuck.
 const STUCK: usize = 20;
-/// A braking so many times harder than nearly all others (the 99.9th percentile) is no braking: the sensor stopped, not the axis.
+/// Deceleration at the begin or end of a constant stretch, over the 99.9th percentile of the record, from which the sensor stopped and not the
+/// axis.
 const ABRUPT: f64 = 3.0;
-/// A step so many times larger than nearly all others (the 98th percentile), with none like it beside it, is a jump.
+/// Step from sample to sample, over the 98th percentile of the record, from which it is a jump where the steps beside it are small.
 const JUMP: f64 = 8.0;
-/// Share of samples that repeat the one before from which a channel counts as held.
+/// Share of samples that repeat the one before, from which a channel may be written by a slower loop.
 const HELD: f64 = 0.3;
-/// Share of the samples at its ends from which a torque stands there most of the time.
+/// Share of the samples at the ends of the range above which a torque is at its limit most of the time.
 const MOSTLY: f64 = 0.5;
 
-/// Looks at every channel. Gives the stretches that no use can be made of.
+/// Looks at every channel. Gives the stretches of samples that are not usable.
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
-    let mut bad = Vec::new();
+    let channels: Vec<Channel<'_>> = input.channels().collect();
+    let of_each: Vec<_> = channels.into_par_iter().map(|channel| one(input, channel)).collect();
+    let (found, bad): (Vec<_>, Vec<_>) = of_each.into_iter().unzip();
+    findings.extend(found.into_iter().flatten());
+    bad.concat()
+}
+
+/// The findings on one channel, and its stretches of samples that are not usable.
+fn one(input: &Input<'_>, channel: Channel<'_>) -> (Vec<Finding>, Vec<Range<usize>>) {
+    let (mut findings, mut bad) = (Vec::new(), Vec::new());
     let n = input.len();
-    for channel in input.channels() {
-        if span(channel.values) <= 1e-12 * channel.values[0].abs() {
-            findings.push(constant(channel));
-            continue;
-        }
-        let position = channel.name.starts_with("theta");
-        if position || channel.name == "T" {
-            bad.extend(jumps(input, channel, findings));
-        }
-        let stuck = if channel.name == "T" { stuck_torque(input, channel) } else { stuck_motion(input, channel) };
-        if !stuck.is_empty() {
-            let total: usize = stuck.iter().map(Range::len).sum();
-            findings.push(
-                Finding::new(
-                    "stuck",
-                    Severity::Refuse,
-                    channel.name,
-                    format!(
-                        "{} keeps one value for {total} samples ({:.1} % of the record) while the axis moves.",
-                        channel.name,
-                        100.0 * total as f64 / n as f64
-                    ),
-                    "The sensor, its cable or the logger stopped; the axis did not.",
-                    "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
-                )
-                .at(input, stuck.clone()),
-            );
-            bad.extend(stuck);
-        }
-        held(channel, findings);
-        clipped(input, channel, findings);
+    if span(channel.values) <= 1e-12 * channel.values[0].abs() {
+        return (vec![constant(channel)], bad);
     }
-    bad
+    let position = channel.name.starts_with("theta");
+    if position || channel.name == "T" {
+        bad.extend(jumps(input, channel, &mut findings));
+    }
+    let stuck = if channel.name == "T" { stuck_torque(input, channel) } else { stuck_motion(input, channel) };
+    if !stuck.is_empty() {
+        let total: usize = stuck.iter().map(Range::len).sum();
+        findings.push(
+            Finding::new(
+                "stuck",
+                Severity::Refuse,
+                channel.name,
+                format!(
+                    "{} keeps one value for {total} samples ({:.1} % of the record) while the axis moves.",
+                    channel.name,
+                    100.0 * total as f64 / n as f64
+                ),
+                "The sensor, its cable or the logger stopped; the axis did not.",
+                "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
+            )
+            .at(input, stuck.clone()),
+        );
+        bad.extend(stuck);
+    }
+    held(channel, &mut findings);
+    clipped(input, channel, &mut findings);
+    (findings, bad)
 }
 
 fn constant(channel: Channel<'_>) -> Finding {
@@ -77,7 +86,7 @@ fn constant(channel: Channel<'_>) -> Finding {
     Finding::new("constant", Severity::Refuse, name, format!("{name} is {value:e} in every sample."), means, remedy)
 }
 
-/// Runs of one and the same value, at least `least` samples.
+/// Stretches of at least `least` samples with one value.
 fn flat(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let mut out = Vec::new();
     let mut start = 0;
@@ -92,7 +101,7 @@ fn flat(values: &[f64], least: usize) -> Vec<Range<usize>> {
     out
 }
 
-/// Stretches where a motion channel keeps its value though the axis does not stand.
+/// Stretches where an angle or a speed is constant although the axis is not at rest.
 fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
     let x = channel.values;
     let n = x.len();
@@ -109,7 +118,7 @@ fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
     }
     let braking = quantile(moving.iter().map(|k| d(k + 1) - d(*k)), 0.999).max(step(x));
     let usual = quantile(moving.iter().map(|k| d(*k)), 0.5);
-    // The other channels that tell of the same motion.
+    // The other channels of the same motion.
     let others: Vec<(&[f64], f64)> = input
         .channels()
         .filter(|c| c.name != channel.name && c.name != "T" && span(c.values) > 0.0)
@@ -126,7 +135,7 @@ fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
                 let part = &v[r.clone()];
                 r.len() >= 2 * STUCK && deviation(part) > 0.5 * size && flat(part, part.len() / 4).is_empty()
             });
-            // A position that runs at full speed until one sample and stands from the next on.
+            // A position that moves at full speed up to one sample and is constant from the next on.
             let before = if r.start >= 2 {
                 d(r.start - 2).abs().min(d(r.start - 1).abs().max(d(r.start - 2).abs()))
             } else {
@@ -139,19 +148,20 @@ fn stuck_motion(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
         .collect()
 }
 
-/// A channel that keeps a value: the value, the step it is counted in, its deviation over the record.
+/// A channel in a constant stretch, in its unit: the value, its quantisation step, its standard deviation over the record.
 struct Stuck {
     value: f64,
     step: f64,
     size: f64,
 }
 
-/// Whether the other channel of the same side moves during a stretch by much more than the stuck one's step.
+/// Whether the other channel of the same side (motor or table) moves during a stretch by much more than the constant one's quantisation step;
+/// `dt` in s.
 fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position: bool, stuck: &Stuck) -> bool {
     let &Stuck { value, step, size } = stuck;
     let part = &other.values[stretch.clone()];
     if stuck_is_position {
-        // The speed says how far the position went.
+        // The distance is the integral of the speed.
         let way = part.iter().scan(0.0, |sum, v| {
             *sum += v * dt;
             Some(*sum)
@@ -159,7 +169,7 @@ fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position:
         let way: Vec<f64> = way.collect();
         rms(part) > 0.3 * rms(other.values) && span(&way) > 20.0 * step
     } else {
-        // A speed that stands while the position goes another way than it says: the way over sixteenths of the stretch.
+        // A constant speed while the position moves at another one: mean speeds over sixteenths of the stretch.
         let length = (part.len() / 16).max(4);
         let speeds: Vec<f64> =
             part.chunks_exact(length).map(|c| (c[c.len() - 1] - c[0]) / ((c.len() - 1) as f64 * dt)).collect();
@@ -169,21 +179,21 @@ fn moves(other: Channel<'_>, stretch: &Range<usize>, dt: f64, stuck_is_position:
     }
 }
 
-/// Stretches where the torque keeps a value inside its range though the motion goes on as elsewhere.
+/// Stretches where the torque is constant within its range although the motion continues as elsewhere.
 fn stuck_torque(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
     let x = channel.values;
     let n = x.len();
     let repeats = x.windows(2).filter(|w| w[0] == w[1]).count() as f64 / n as f64;
     let runs = flat(x, (n / 50).max(2 * STUCK));
     let long: usize = runs.iter().map(Range::len).sum();
-    // A torque of steps is flat by nature.
+    // A torque of steps is constant in stretches by nature.
     if runs.is_empty() || repeats - long as f64 / n as f64 > 0.2 {
         return Vec::new();
     }
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     let Some(motion) = input.channels().find(|c| c.name != "T" && span(c.values) > 0.0) else { return Vec::new() };
     let speed: Vec<f64> = if motion.name.starts_with("theta") {
-        // Over several samples, so that a slow motion stands out of the encoder's noise.
+        // Over several samples, so that a slow motion exceeds the encoder's noise.
         let apart = STUCK / 2;
         motion.values.windows(apart + 1).map(|w| w[apart] - w[0]).collect()
     } else {
@@ -199,7 +209,7 @@ fn stuck_torque(input: &Input<'_>, channel: Channel<'_>) -> Vec<Range<usize>> {
         .collect()
 }
 
-/// Positions that jump and stay, go out and come back, or wrap; gives the samples at which they jump.
+/// Jumps, spikes and wrapped counters of a position, spikes of a torque; gives the samples of the jumps.
 fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
     let x = channel.values;
     let n = x.len();
@@ -212,7 +222,7 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
         if size.abs() <= JUMP * usual {
             continue;
         }
-        // Beside it nothing of the kind: neither a fast motion nor the way back.
+        // The steps beside it are small: neither a fast motion nor the return from a spike.
         let near = [k - 2, k - 1, k + 1, k + 2].map(|i| d(i).abs()).into_iter().fold(0.0, f64::max);
         if near < 0.4 * size.abs() && channel.name != "T" {
             isolated.push((k + 1, size));
@@ -284,7 +294,7 @@ fn held(channel: Channel<'_>, findings: &mut Vec<Finding>) {
     if changes.len() < 16 || repeats < HELD {
         return;
     }
-    // Quantisation repeats where the motion is slow and changes by one step; a held channel changes by many.
+    // A slow motion repeats values because of the quantisation and then changes by one step; a held channel changes by many.
     let size = quantile(changes.iter().map(|k| x[*k] - x[k - 1]), 0.5);
     let steps = size / step(x);
     let gaps: Vec<f64> = changes.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
@@ -302,13 +312,13 @@ fn held(channel: Channel<'_>, findings: &mut Vec<Finding>) {
     }
 }
 
-/// Channels that end at one value time and again.
+/// Torques and speeds that are at an end of their range in several stretches.
 fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) {
     let x = channel.values;
     if !(channel.name == "T" || channel.name.starts_with("omega")) {
         return;
     }
-    let mut at_end = ceiling::stands(x);
+    let mut at_end = ceiling::limited_stretches(x);
     if at_end.is_empty() {
         return;
     }
@@ -321,8 +331,8 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
     );
     let limit = "A model of the machine needs that limit: see `eixo effects saturation`.";
     let (severity, means, remedy) = if channel.name == "T" {
-        match ceiling::actual_torque(input, x) {
-            Actual::Larger(share) => {
+        match ceiling::applied_torque(input, x) {
+            AppliedTorque::Larger(share) => {
                 let _ = write!(seen, " The axis moves there as under {:.1} % more.", 100.0 * share);
                 (
                     Severity::Refuse,
@@ -330,14 +340,14 @@ fn clipped(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>)
                     "Widen the range of the column in the logger, or record a motion that needs less torque.",
                 )
             }
-            Actual::AsLogged => (Severity::Note, "The drive's limit is reached.", limit),
-            Actual::Unknown if share > MOSTLY => (
+            AppliedTorque::AsLogged => (Severity::Note, "The drive's limit is reached.", limit),
+            AppliedTorque::Unknown if share > MOSTLY => (
                 Severity::Warn,
                 "The drive's limit is reached, or that of the log, most of the time: what more was asked for, or given, this record does not tell.",
                 "Record a motion that needs less torque, or widen the range of the column in the logger; where it is the drive that gives no \
                  more, a model of the machine needs that limit: see `eixo effects saturation`.",
             ),
-            Actual::Unknown => (
+            AppliedTorque::Unknown => (
                 Severity::Note,
                 "The drive's limit is reached, or that of the log: which of the two, this record does not tell.",
                 limit,

@@ -1,14 +1,14 @@
-//! A torque that nobody measured: an inertia times the acceleration of a column of the same record.
+//! A torque that was not measured: an inertia times the acceleration of a column of the same record.
 //!
 //! ```text
 //! T(k) = a*(x(k + s) - 2*x(k) + x(k - s)) + b      of a position, s = 1 (differences) or 2 (gradients of gradients)
 //! T(k) = a*(v(k + s) - v(k - 1)) + b                of a speed,    s = 0 (a difference) or 1 (a gradient)
 //! ```
 //!
-//! some samples late or early. The motion of an axis without friction that is simulated from its torque holds the same equation, so the
-//! equation alone says nothing. What tells the two apart is where the noise is: differences of a sensor's noise or steps grow with the
-//! frequency, as its square of a position, and such a torque is mostly that noise. One that a drive gave is not, and differs from the
-//! differences of the position that it caused by the sensor's noise at once.
+//! with a delay or lead of some samples. The motion of an axis without friction that is simulated from its torque fulfils the same equation,
+//! so the equation alone is no criterion. The noise distinguishes the two: the power of differences of a sensor's noise or quantisation grows
+//! with the frequency, and a computed torque is mostly that noise. A torque of a drive is not, and differs by the sensor's noise from the
+//! differences of the position.
 
 use super::Input;
 use super::finding::{Finding, Severity};

@@ -5,28 +5,29 @@
 //! y(k) = x(k)                at one sample of m, and not at the others
 //! ```
 //!
-//! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: noise, steps and the twist of the coupling part them.
+//! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: they differ by noise, quantisation and the twist of the
+//! coupling.
 
 use super::finding::{Finding, Severity, told};
 use super::least::Line;
 use super::{Channel, Input};
 
-/// Share of a column's deviation up to which what another does not explain of it is rounding.
+/// Residual over a column's standard deviation up to which it is rounding and the column a copy.
 const ROUNDING: f64 = 1e-6;
-/// Samples that a copy may be late or early: a cycle or two of a slower task.
+/// Largest delay or lead of a copy, samples: a cycle or two of a slower task.
 const LATE: usize = 10;
-/// Samples that are compared first, all over the record, and then: nearly every pair differs in those, and of two encoders on one shaft that
-/// went far the most that agree in the first.
+/// Samples, evenly spaced over the record, that are compared first and second: nearly every pair differs in the first ones; of those that
+/// do not, as two encoders on one shaft that moved far, most differ in the second ones.
 const FIRST: usize = 256;
 const THEN: usize = 64 * FIRST;
 
-/// Most columns that a logger's task takes turns with.
+/// Most columns that a logger multiplexes.
 const TURNS: usize = 8;
-/// Samples of one turn from which two columns cannot agree in all of them by chance, coarse as they may be.
+/// Samples of one column in which two columns cannot agree by chance, however coarse their quantisation is.
 const LEAST: usize = 64;
 
-/// How many columns took turns, where `x` and `y` are one at each sample of a turn and apart at half of the others or more.
-fn taking_turns(x: &[f64], y: &[f64]) -> Option<usize> {
+/// The number of multiplexed columns, where `x` and `y` are equal at one sample of so many and differ at half of the others or more.
+fn multiplexed(x: &[f64], y: &[f64]) -> Option<usize> {
     let one = |k: &usize| x[*k] == y[*k];
     (2..=TURNS.min(x.len() / LEAST)).find(|turns| {
         (0..*turns).any(|own| {
@@ -36,7 +37,7 @@ fn taking_turns(x: &[f64], y: &[f64]) -> Option<usize> {
     })
 }
 
-/// How `y` is made of `x`: the factor, where it is a copy.
+/// The factor `a` of `y = a*x + b` (unit of `y` over that of `x`), where `y` is a copy of `x`.
 fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
     let every = |samples: usize| (x.len() / samples).max(1);
     slope(x, y, every(FIRST), 100.0 * ROUNDING)?;
@@ -44,16 +45,16 @@ fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
     slope(x, y, 1, ROUNDING)
 }
 
-/// The slope of `y` over `x`, where it is all of `y` at every `stride`-th sample but for a share of its deviation.
+/// The slope of `y` over `x` at every `stride`-th sample, where the residual is at most `rounding` times the standard deviation of `y`.
 fn slope(x: &[f64], y: &[f64], stride: usize, rounding: f64) -> Option<f64> {
     let line = Line::through(|| x.iter().copied().zip(y.iter().copied()).step_by(stride));
-    // What is left of a constant beside its mean is rounding.
+    // The deviation of a constant from its mean is rounding.
     let moves = |i: usize| line.squares[i] > line.count * (1e-12 * line.means[i]).powi(2);
     let is_all = moves(0) && moves(1) && line.slope.is_finite() && line.left <= rounding * rounding * line.squares[1];
     is_all.then_some(line.slope)
 }
 
-/// The speed of a position, by central differences.
+/// The speed, rad/s (m/s), of a position by central differences: two samples fewer.
 fn speed(x: &[f64], dt: f64) -> Vec<f64> {
     x.windows(3).map(|w| (w[2] - w[0]) / (2.0 * dt)).collect()
 }
@@ -115,7 +116,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
                 "One sensor was logged twice: the coupling between the two does not show.",
                 "Map the column of the table's own encoder in [signals], or leave it out and describe the axis as structure = \"rigid\".",
             ));
-        } else if let Some(turns) = taking_turns(x.values, y.values) {
+        } else if let Some(turns) = multiplexed(x.values, y.values) {
             let share = if turns == 2 { "Every other sample".to_owned() } else { format!("One sample of {turns}") };
             findings.push(Finding::new(
                 "copy",

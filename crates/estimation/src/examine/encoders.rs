@@ -1,49 +1,53 @@
-//! The encoder of the table beside that of the motor.
+//! The table's encoder against the motor's: sign, scale and exchange of the two columns.
+//!
+//! Positions are in rad (m), frequencies in rad/s. `s` holds the cross spectra of torque, motor speed, sign of the motor speed and table
+//! speed ([`T`], [`MAIN`], [`TABLE`]); `lines` are indices into them. A ratio is that of table motion to motor motion, without unit.
 
 use rustfft::num_complex::Complex;
 
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
-use super::motor_side::{feels_the_table, rather_as_logged};
-use super::nominal::explains_the_table;
+use super::motor_side::{coupling_explains_torque, fits_better_as_logged};
+use super::nominal::nominal_explains_with_table;
 use super::pairs::{NEAR, factor_within};
-use super::rigid::{Slow, rigid_up_to};
+use super::rigid::{MotionLines, rigid_band};
 use super::spectra::Spectra;
 use super::{Input, Structure};
 use crate::numerics::level::deviation;
 
-/// Twist over motion, both about their means, up to which the table goes along with the motor whatever their spectra say: of a slow
-/// motion the spectra of the speed hold little but noise.
-const ALONG: f64 = 0.05;
+/// Standard deviation of the twist over that of the motor angle up to which the table is taken to track the motor. The spectra are not
+/// used for this: those of the speed of a slow motion are mostly noise.
+const MAX_RELATIVE_TWIST: f64 = 0.05;
 
-fn goes_along(input: &Input<'_>) -> bool {
+/// Whether the twist is small beside the motor's motion.
+fn table_tracks_motor(input: &Input<'_>) -> bool {
     let (Some(x1), Some(x2)) = (input.theta1, input.theta2) else { return false };
     let twist: Vec<f64> = x1.iter().zip(x2).map(|(a, b)| a - b).collect();
-    deviation(&twist) < ALONG * deviation(x1)
+    deviation(&twist) < MAX_RELATIVE_TWIST * deviation(x1)
 }
 
-/// Coherence of both encoders over all lines of slow motion from which they are of one body.
-const ONE_BODY: f64 = 0.9;
+/// Coherence of both encoders, over all lines of slow motion, from which motor and table move as one rigid body.
+const RIGID_COHERENCE: f64 = 0.9;
 
-/// How many times as far as the motor the table moves below the nominal coupling's resonance, where both are one body; None where the
-/// record does not show that.
-fn of_one_body(input: &Input<'_>) -> Option<f64> {
+/// Ratio of the motions below the nominal coupling's antiresonance, where motor and table move as one rigid body. `None` without a nominal
+/// model, or where the two are not coherent there.
+fn rigid_body_ratio(input: &Input<'_>) -> Option<f64> {
     let (Some(x1), Some(x2)) = (input.theta1, input.theta2) else { return None };
-    let slow = Slow::new(&[x1, x2], 0..2, input.dt, rigid_up_to(input.nominal?))?;
+    let slow = MotionLines::new(&[x1, x2], 0..2, input.dt, rigid_band(input.nominal?))?;
     let sum = |i: usize, k: usize| slow.lines.iter().map(|f| slow.spectra.of(i, k, *f)).sum::<Complex<f64>>();
     let (one, two, both) = (sum(0, 0).re, sum(1, 1).re, sum(0, 1));
-    (both.re * both.re > ONE_BODY * one * two).then(|| both.re / one)
+    (both.re * both.re > RIGID_COHERENCE * one * two).then(|| both.re / one)
 }
 
-/// What the slow motion says of the two encoders alone, where the record is too short for more.
-pub(super) fn slowly(input: &Input<'_>) -> Option<Finding> {
-    let ratio = of_one_body(input)?;
-    miscounted(input, ratio, ratio < 0.0).filter(|_| !rather_as_logged(input, 1.0 / ratio, 1.0))
+/// The finding on sign or unit that follows from the slow motion alone, for a record too short for averaged spectra.
+pub(super) fn slow_motion_finding(input: &Input<'_>) -> Option<Finding> {
+    let ratio = rigid_body_ratio(input)?;
+    ratio_finding(input, ratio, ratio < 0.0).filter(|_| !fits_better_as_logged(input, 1.0 / ratio, 1.0))
 }
 
-/// What is wrong where the table moves so many times as far as the motor: it counts the other way round, or in another unit.
-fn miscounted(input: &Input<'_>, ratio: f64, turned: bool) -> Option<Finding> {
+/// The finding on sign or unit for a ratio of the motions; `turned`: the phase between the two is half a turn.
+fn ratio_finding(input: &Input<'_>, ratio: f64, turned: bool) -> Option<Finding> {
     if turned && (-2.0..-0.5).contains(&ratio) {
         return Some(Finding::new(
             "sign",
@@ -54,24 +58,24 @@ fn miscounted(input: &Input<'_>, ratio: f64, turned: bool) -> Option<Finding> {
             "Give its column scale = -1 in [signals] of the axis file.",
         ));
     }
-    unit(input, ratio)
+    unit_finding(input, ratio)
 }
 
-/// How many times as far as the motor the table moves, beside what its coupling makes of it, by the lines that show both; and what is
-/// wrong with that: it counts the other way round, or in another unit. What else acts on the table may move it any way; where the motor's
-/// side has it as it is logged, nothing is wrong.
-pub(super) fn counted(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
-    let (ratio, finding) = moves_along(input, s, lines);
-    let alike = (LIKE.recip()..LIKE).contains(&ratio.abs()) && finding.is_none();
-    if !alike && rather_as_logged(input, 1.0 / ratio, 1.0) { (1.0, None) } else { (ratio, finding) }
+/// Ratio of the motions at the lines where both encoders are coherent, divided by the ratio that the nominal coupling gives; and the
+/// finding on sign or unit that follows. Torques on the table can cause any ratio: where the motor's equation of motion is fulfilled best by
+/// the column as logged, the ratio is reported as 1 and there is no finding.
+pub(super) fn encoder_ratio(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
+    let (ratio, finding) = ratio_by_encoders(input, s, lines);
+    let alike = (COMPATIBLE_RATIO.recip()..COMPATIBLE_RATIO).contains(&ratio.abs()) && finding.is_none();
+    if !alike && fits_better_as_logged(input, 1.0 / ratio, 1.0) { (1.0, None) } else { (ratio, finding) }
 }
 
-/// The same by the two encoders alone.
-fn moves_along(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
-    if let Some(ratio) = of_one_body(input) {
-        return (ratio, miscounted(input, ratio, ratio < 0.0));
+/// [`encoder_ratio`] from the two encoders alone, without the motor's equation of motion.
+fn ratio_by_encoders(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<Finding>) {
+    if let Some(ratio) = rigid_body_ratio(input) {
+        return (ratio, ratio_finding(input, ratio, ratio < 0.0));
     }
-    // Where the coupling is stiff to the motion both turn alike: the lowest lines that hold a tenth of the motor's motion.
+    // Well below the resonance both move alike: the lowest lines, with a tenth of the motor's power.
     let total: f64 = lines.iter().map(|f| s.power(MAIN, *f)).sum();
     let mut sum = 0.0;
     let low: Vec<usize> = lines
@@ -93,29 +97,29 @@ fn moves_along(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> (f64, Option<
         let spring = Complex::new(p.k, w * p.b);
         (spring / (spring - p.i2 * w * w)).re
     });
-    // Near the table's resonance against the motor, and above it, the size and the sign of its motion are the coupling's.
+    // Near the antiresonance and above, the coupling determines amplitude and sign of the table's motion.
     let ratio = if (0.5..2.0).contains(&expected) { gain.re / expected } else { 1.0 };
-    // Phase near a half turn at the lowest lines, and a size that the antiresonance has not taken yet.
+    // The phase at the lowest lines is near half a turn.
     let turned = gain.re < 0.0 && gain.im.abs() < 0.5 * gain.re.abs();
-    (ratio, miscounted(input, ratio, turned))
+    (ratio, ratio_finding(input, ratio, turned))
 }
 
-/// The same for a table that moves less than the motor, in the logarithm of the ratio: friction that holds it on a soft coupling leaves it any
-/// share of the motor's way, a unit just one.
-const HELD: f64 = 0.02;
-/// Ratio of two motions up to which they are alike.
-const LIKE: f64 = 1.67;
-/// Table over motor, both of one body below half the nominal antiresonance, from which the two count different angles: the coupling makes
-/// 4/3 of it there, or 2 where its stiffness is half the nominal one.
-const GEARED: f64 = 3.0;
+/// Tolerance, in the logarithm of the ratio, within which a ratio below 1 is taken for a unit's factor. It is narrower than [`NEAR`]: friction
+/// that holds the table on a soft coupling can cause any ratio below 1.
+const HELD_TOLERANCE: f64 = 0.02;
+/// Ratio of the motions, or its reciprocal, up to which it is compatible with one unit for both.
+const COMPATIBLE_RATIO: f64 = 1.67;
+/// Ratio of the motions below half the nominal antiresonance from which a gear lies between the encoders: there the coupling causes a ratio
+/// of 4/3, or of 2 if its stiffness is half the nominal one.
+const GEAR_RATIO: f64 = 3.0;
 
-/// That the table moves so many times as far as the motor because one of them is in another unit.
-fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
+/// The finding that one of the columns is in another unit, where the ratio of the motions is near a unit's factor.
+fn unit_finding(input: &Input<'_>, ratio: f64) -> Option<Finding> {
     let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
     let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < NEAR);
     let words = lead
         .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
-        .or_else(|| factor_within(ratio, if ratio.abs() < 1.0 { HELD } else { NEAR }).map(str::to_owned))
+        .or_else(|| factor_within(ratio, if ratio.abs() < 1.0 { HELD_TOLERANCE } else { NEAR }).map(str::to_owned))
         .filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25)?;
     Some(Finding::new(
         "units",
@@ -128,19 +132,23 @@ fn unit(input: &Input<'_>, ratio: f64) -> Option<Finding> {
 }
 
 /// The two encoders against each other: sign, scale, and which one is the motor's.
-pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
+pub(super) fn compare_encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings: &mut Vec<Finding>) {
     let coherent: Vec<usize> =
         (0..s.lines).filter(|f| s.coherence(MAIN, TABLE, *f) > s.by_chance().max(COHERENT)).collect();
-    // At the lines where the torque moves anything: does the table move with the motor, or with the torque? A table that is
-    // moved by something else as well (a stop, stick and slip) still does at some, or where most of the motion is.
+    // Is the table coherent with motor or torque at the lines that the torque excites? One that another force acts on as well (an end
+    // stop, stick-slip) still is at some of them, or at those with most of the power.
     let chance = s.by_chance();
     let own = lines.iter().filter(|f| s.coherence(MAIN, TABLE, **f).max(s.coherence(T, TABLE, **f)) > chance).count();
     let driven = || 0..=lines[lines.len() - 1];
     let common: f64 = driven().map(|f| s.power(MAIN, f) * s.coherence(MAIN, TABLE, f)).sum();
     let motion: f64 = driven().map(|f| s.power(MAIN, f)).sum();
     let unlike = (own as f64) < 0.1 * lines.len() as f64 && common < chance.max(0.3) * motion;
-    // A table that friction holds, or that swings on a soft belt, twists the coupling as the torque says.
-    if unlike && !goes_along(input) && !explains_the_table(input, s, lines) && !feels_the_table(input) {
+    // For a table held by friction, or oscillating on a soft belt, the twist of the coupling still explains the torque.
+    if unlike
+        && !table_tracks_motor(input)
+        && !nominal_explains_with_table(input, s, lines)
+        && !coupling_explains_torque(input)
+    {
         findings.push(Finding::new(
             "foreign",
             Severity::Refuse,
@@ -154,14 +162,14 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     if coherent.is_empty() {
         return;
     }
-    let (ratio, finding) = counted(input, s, &coherent);
+    let (ratio, finding) = encoder_ratio(input, s, &coherent);
     if let Some(finding) = finding {
         findings.push(finding);
         return;
     }
-    if !(LIKE.recip()..LIKE).contains(&ratio.abs()) {
-        // Nothing that acts on a table makes it go so much further than the motor that moves it.
-        let geared = of_one_body(input).is_some_and(|r| r.abs() > GEARED) && ratio.abs() > GEARED;
+    if !(COMPATIBLE_RATIO.recip()..COMPATIBLE_RATIO).contains(&ratio.abs()) {
+        // No force on a table makes it move so much further than the motor that drives it.
+        let geared = rigid_body_ratio(input).is_some_and(|r| r.abs() > GEAR_RATIO) && ratio.abs() > GEAR_RATIO;
         findings.push(Finding::new(
             "scale",
             if geared { Severity::Refuse } else { Severity::Warn },
@@ -171,7 +179,7 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
             "Give theta2 the gear's ratio as scale in [signals], so that both count the same angle.",
         ));
     }
-    // The table is moved by the twist alone: I2*a2 = B*d' + K*d. Which of the two is?
+    // The table is accelerated by the twist alone, I2*a2 = B*d' + K*d: which column fulfils that better?
     let misfit = |of: usize, sense: f64| -> f64 {
         let (mut aa, mut ad, mut dd, mut av, mut dv, mut vv) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for &f in lines.iter().filter(|f| s.coherence(MAIN, TABLE, **f) > COHERENT) {
@@ -195,12 +203,12 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
         1.0 - non_negative(&gram, &[ad, av]).1 / aa
     };
     let (as_given, exchanged) = (misfit(TABLE, 1.0), misfit(MAIN, -1.0));
-    // A blow on the table (the end of its travel) drives it as the torque drives a motor: the torque must speak for the
-    // exchange, too.
-    let unexplained = |motor: usize, table: usize| motor_side(s, lines, motor, table);
+    // An impact on the table (the end of its travel) drives it as a torque drives a motor: the exchange must also explain the torque
+    // better.
+    let unexplained = |motor: usize, table: usize| motor_side_unexplained(s, lines, motor, table);
     let speaks = || unexplained(TABLE, MAIN) < 0.5 * unexplained(MAIN, TABLE);
-    // A spring alone moves the table at most as far as the motor, slowly: one that moves further is not it.
-    let may_be = ratio.abs() > LIKE.recip();
+    // Of exchanged columns the one named theta2 is the motor's, which at low frequencies does not move less than the table.
+    let may_be = ratio.abs() > COMPATIBLE_RATIO.recip();
     if may_be && exchanged < 0.3 && as_given > 3.0 * exchanged && speaks() {
         findings.push(Finding::new(
             "swapped",
@@ -213,8 +221,9 @@ pub(super) fn encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], findings
     }
 }
 
-/// Share of the torque that the motor's side leaves unexplained: `T = I1*a + B*d' + K*d` holds whatever acts on the table.
-pub(super) fn motor_side(s: &Spectra, lines: &[usize], motor: usize, table: usize) -> f64 {
+/// Share of the torque's power that the motor's equation of motion `T = I1*a + B*d' + K*d` leaves unexplained, I1, B, K >= 0 free. It holds
+/// whatever acts on the table. `motor` and `table` are the columns of the spectra taken for the two.
+pub(super) fn motor_side_unexplained(s: &Spectra, lines: &[usize], motor: usize, table: usize) -> f64 {
     let (mut gram, mut right, mut size) = (vec![vec![0.0; 3]; 3], vec![0.0; 3], 0.0);
     for &f in lines {
         let j = Complex::new(0.0, s.omega(f));

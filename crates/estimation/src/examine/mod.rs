@@ -37,6 +37,8 @@ mod tests;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 pub use finding::{Finding, Severity};
 
 use crate::axis::{Motion, Parameters, Structure};
@@ -184,14 +186,14 @@ impl Examination {
 }
 
 /// Sampling intervals between which drives are logged, s: a converter's own rate, and one that still shows an acceleration.
-const FASTEST: f64 = 1e-8;
-const SLOWEST: f64 = 10.0;
+const MIN_INTERVAL: f64 = 1e-8;
+const MAX_INTERVAL: f64 = 10.0;
 /// Speeds beyond what machines turn or move at: three million turns a minute, ten times the fastest turbine; a rifle's bullet.
-const MOST_TURNED: f64 = 3e5;
-const MOST_MOVED: f64 = 1e3;
+const MAX_SPEED_ROTARY: f64 = 3e5;
+const MAX_SPEED_LINEAR: f64 = 1e3;
 /// Torques and forces beyond those of the largest drives: a wind turbine's gear sees 1e7 N.m, a forging press 1e9 N.
-const MOST_TORQUE: f64 = 1e8;
-const MOST_FORCE: f64 = 1e10;
+const MAX_TORQUE: f64 = 1e8;
+const MAX_FORCE: f64 = 1e10;
 
 /// Torques and speeds that no machine has: the column is in another unit, or counts.
 fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
@@ -210,7 +212,7 @@ fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
     for channel in input.channels() {
         if channel.name == "T" {
             let typical = robust::quantile(channel.values.iter().copied(), 0.9);
-            if typical > if linear { MOST_FORCE } else { MOST_TORQUE } {
+            if typical > if linear { MAX_FORCE } else { MAX_TORQUE } {
                 let seen = format!("T is about {} {}: no drive gives that.", finding::told(typical), unit("N.m"));
                 findings.push(say(
                     "T",
@@ -229,7 +231,7 @@ fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
         } else {
             robust::quantile(channel.values.iter().copied(), 0.9)
         };
-        if speed > if linear { MOST_MOVED } else { MOST_TURNED } {
+        if speed > if linear { MAX_SPEED_LINEAR } else { MAX_SPEED_ROTARY } {
             let seen =
                 format!("{} moves at about {} {}: no axis does.", channel.name, finding::told(speed), unit("rad/s"));
             let remedy = if linear {
@@ -243,7 +245,7 @@ fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
 }
 
 /// Largest size that is taken for a measurement: its fourth power is still finite.
-const LARGEST: f64 = 1e60;
+const MAX_MAGNITUDE: f64 = 1e60;
 
 /// Examines a record. All columns must be as long as each other; a shorter one limits what is looked at.
 #[must_use]
@@ -257,11 +259,20 @@ pub fn examine(input: &Input<'_>) -> Examination {
         return Examination { findings, usable, ..Examination::default() };
     }
     let input = &cut(input, n);
-    let bad = channels::examine(input, &mut findings);
-    copies::examine(input, &mut findings);
-    computed::examine(input, &mut findings);
-    slips::examine(input, &mut findings);
-    sizes(input, &mut findings);
+    let even = findings.iter().all(|f| f.signal != "time");
+    let mut bad = Vec::new();
+    let found = in_parallel([
+        &mut |found| bad = channels::examine(input, found),
+        &mut |found| copies::examine(input, found),
+        &mut |found| computed::examine(input, found),
+        &mut |found| {
+            if even {
+                slips::examine(input, found);
+            }
+        },
+        &mut |found| sizes(input, found),
+    ]);
+    findings.extend(found);
     let usable = usable::examine(input, &bad, &mut findings);
     // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.
     let piece = usable.iter().max_by_key(|r| r.len()).cloned().unwrap_or(0..n);
@@ -288,20 +299,34 @@ pub fn examine(input: &Input<'_>) -> Examination {
         // In its place nothing is known of the table.
         let part = if twist.is_some() { Input { theta2: None, omega2: None, ..part } } else { part };
         findings.extend(twist);
-        band = momentum::examine(&part, &mut inertia, &mut findings);
         // A guess is asked for where no nominal value is known.
-        if part.nominal.is_none() {
-            inertia = rigid::inertia(&part).or(inertia);
-        }
+        let guess = || part.nominal.is_none().then(|| rigid::inertia(&part)).flatten();
+        let (of_the_lines, guessed) = rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), guess);
+        band = of_the_lines;
+        inertia = guessed.or(inertia);
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }
 }
 
+/// A part of an examination that needs no other's findings.
+type Part<'a> = &'a mut (dyn FnMut(&mut Vec<Finding>) + Send);
+
+/// What independent parts of an examination find, in their order whichever ends first.
+fn in_parallel<const N: usize>(parts: [Part<'_>; N]) -> Vec<Finding> {
+    let run = |part: Part<'_>| {
+        let mut found = Vec::new();
+        part(&mut found);
+        found
+    };
+    let found: Vec<Vec<Finding>> = parts.into_par_iter().map(run).collect();
+    found.into_iter().flatten().collect()
+}
+
 /// Numbers that can be computed with; says so where they cannot.
 fn numbers(input: &Input<'_>, findings: &mut Vec<Finding>) -> bool {
     let mut sound = true;
-    if !(input.dt > FASTEST && input.dt < SLOWEST) {
+    if !(input.dt > MIN_INTERVAL && input.dt < MAX_INTERVAL) {
         sound = false;
         findings.push(Finding::new(
             "interval",
@@ -313,7 +338,7 @@ fn numbers(input: &Input<'_>, findings: &mut Vec<Finding>) -> bool {
         ));
     }
     for channel in input.channels() {
-        let wrong = |v: &f64| !v.is_finite() || v.abs() > LARGEST || (*v != 0.0 && v.abs() < 1.0 / LARGEST);
+        let wrong = |v: &f64| !v.is_finite() || v.abs() > MAX_MAGNITUDE || (*v != 0.0 && v.abs() < 1.0 / MAX_MAGNITUDE);
         let concerned = finding::runs(channel.values.len(), |k| wrong(&channel.values[k]));
         if !concerned.is_empty() {
             sound = false;

@@ -1,4 +1,4 @@
-//! The torque that the nominal axis would need for the motion, beside the one that was logged.
+//! The torque that the nominal axis needs for the logged motion, compared with the logged torque in the frequency domain.
 
 use rustfft::num_complex::Complex;
 
@@ -6,27 +6,30 @@ use super::momentum::{MAIN, T, TABLE};
 use super::spectra::Spectra;
 use super::{Input, Nominal, Structure};
 
-/// Share of the torque's power up to which the nominal axis may miss it for it to be this axis' own torque and motion: in its unit and at
-/// its time. A factor of six, a foreign torque and half a turn of phase miss more; friction and parameters some tens of per cent off do not.
-const MISSED: f64 = 0.5;
+/// Unexplained share of the torque's power up to which torque and motion are of the nominal axis, in its units and at the same times. A factor
+/// of six, another axis' torque or half a turn of phase leave more; friction, and parameters some tens of per cent off, leave less.
+const MAX_UNEXPLAINED: f64 = 0.5;
 
-/// Times that with the table's encoder the axis may miss more than without it for that encoder to be the table's: on a table that is heavy
-/// enough to tell, a foreign one misses many times more.
-const WORSE: f64 = 4.0;
+/// Unexplained share with the table's encoder over that without it, up to which the encoder is this table's: if the table's inertia matters,
+/// another axis' encoder leaves many times more.
+const SIGNIFICANTLY_WORSE: f64 = 4.0;
 
-/// Whether the nominal axis needs about this torque for this motion at the lines: of the motor, and of the table where it is measured.
-pub(super) fn explains(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> bool {
-    missed(input, s, lines, s.has(TABLE)).is_some_and(|m| m < MISSED)
+/// Whether the nominal axis needs about the logged torque for the logged motion of the motor and, where it is measured, of the table.
+pub(super) fn nominal_explains(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> bool {
+    unexplained(input, s, lines, s.has(TABLE)).is_some_and(|m| m < MAX_UNEXPLAINED)
 }
 
-/// Whether the table's encoder explains the torque at the lines, and as well as a table that only hangs on the motor.
-pub(super) fn explains_the_table(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> bool {
-    let of = |measured: bool| missed(input, s, lines, measured);
-    of(true).zip(of(false)).is_some_and(|(with, without)| with < MISSED && with < WORSE * without)
+/// Whether the nominal axis explains the torque with the table's encoder, and not much worse than with a table moved by the coupling alone.
+pub(super) fn nominal_explains_with_table(input: &Input<'_>, s: &Spectra, lines: &[usize]) -> bool {
+    let of = |measured: bool| unexplained(input, s, lines, measured);
+    of(true)
+        .zip(of(false))
+        .is_some_and(|(with, without)| with < MAX_UNEXPLAINED && with < SIGNIFICANTLY_WORSE * without)
 }
 
-/// Share of the torque's power that the nominal axis misses at the lines, the table's motion as measured or as the coupling makes it.
-fn missed(input: &Input<'_>, s: &Spectra, lines: &[usize], measured: bool) -> Option<f64> {
+/// Share of the torque's power at the lines that the nominal axis leaves unexplained; `measured`: the table's motion is taken from its
+/// encoder, else from the coupling. `None` without a nominal model or a motor column.
+fn unexplained(input: &Input<'_>, s: &Spectra, lines: &[usize], measured: bool) -> Option<f64> {
     let Nominal { structure, parameters: p } = input.nominal?;
     if input.theta1.is_none() && input.omega1.is_none() {
         return None;
@@ -35,7 +38,7 @@ fn missed(input: &Input<'_>, s: &Spectra, lines: &[usize], measured: bool) -> Op
     for &f in lines {
         let j = Complex::new(0.0, s.omega(f));
         let coupling = p.k / j + p.b;
-        // Torque over the speeds of motor and table; a table that is not measured hangs on the coupling.
+        // Torque over the speeds of motor and table, N.m.s/rad; a table without encoder is moved by the coupling.
         let (motor, table) = match structure {
             Structure::Rigid => (j * (p.i1 + p.i2), None),
             Structure::TwoInertia if measured => (j * p.i1 + coupling, Some(-coupling)),

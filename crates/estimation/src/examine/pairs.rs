@@ -1,4 +1,4 @@
-//! A speed against its angle: the angle's way over some samples is the integral of the speed.
+//! A speed against its angle: the difference of the angle over some samples is the integral of the speed.
 
 use super::Input;
 use super::finding::{Finding, Severity};
@@ -29,7 +29,8 @@ pub(super) fn factor_within(ratio: f64, near: f64) -> Option<&'static str> {
     FACTORS.iter().find(|(f, _)| (size - f.ln()).abs() < near).map(|(_, words)| *words)
 }
 
-/// How an angle follows a speed: `way = gain*integral`, and the square of their correlation.
+/// Regression of the differences of an angle on the integral of a speed over as many samples, `dt` in s: the gain (1 where both are in one unit)
+/// and the square of their correlation. `None` where one of them does not change.
 fn against(angle: &[f64], speed: &[f64], dt: f64) -> Option<(f64, f64)> {
     let n = angle.len();
     let fine = step(angle);
@@ -57,7 +58,7 @@ fn against(angle: &[f64], speed: &[f64], dt: f64) -> Option<(f64, f64)> {
             i1 += by_speed;
             count += 1.0;
         }
-        // About the mean, so that a speed's offset does not hide what it follows.
+        // About the mean, so that an offset of the speed does not lower the correlation.
         let (vw, cov, vi) = (ww - w1 * w1 / count, wi - w1 * i1 / count, ii - i1 * i1 / count);
         if vw > 0.0 && vi > 0.0 {
             let alike = cov * cov / (vw * vi);
@@ -74,9 +75,9 @@ fn against(angle: &[f64], speed: &[f64], dt: f64) -> Option<(f64, f64)> {
     best
 }
 
-/// From here on a speed follows its angle.
+/// Squared correlation from which a speed is the derivative of its angle.
 const FOLLOWS: f64 = 0.8;
-/// Below this it is another signal.
+/// Squared correlation below which it is another signal.
 const FOREIGN: f64 = 0.3;
 
 /// Looks at the speeds that are logged beside their angles.

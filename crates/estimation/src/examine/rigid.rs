@@ -1,21 +1,23 @@
-//! Torque against the nominal inertia, where no coupling comes between them: below its resonance every axis moves as one body, and with
-//! an encoder on either side the momentum of both is known at every frequency:
+//! Torque against the nominal inertia, independent of the coupling: below its antiresonance every axis moves as one rigid body, and with
+//! encoders on motor and table the momentum of both is known at every frequency:
 //!
 //! ```text
 //! T = M*a + c*v + F*sign(v) + k*x      c, F >= 0; k of either sign (a spring, gravity)
 //!          a = (I1*a1 + I2*a2)/(I1 + I2)
 //! ```
 //!
-//! The record is taken whole, so that slow moves under control, whose averaged spectra show few lines or none, are examined as well as a
-//! band of noise. Derivatives are taken before the window: the equation then holds at every line, the lowest, too. What is asked is not how
-//! large `M` is but whether an `M` near the nominal one explains the torque about as well as any: friction, gravity, a ripple or a foreign
-//! torque take from both alike.
+//! T in N.m, a, v, x in rad/s^2, rad/s, rad, M in kg.m2; for a linear axis N, m and kg. The spectra are of the whole record, so that slow
+//! moves in closed loop, whose averaged spectra have few coherent lines or none, are examined as well as broadband noise. Derivatives are
+//! taken before the window: the equation then holds at every line, also the lowest. The test is not how large `M` is, but whether an `M` near
+//! the nominal one explains the torque about as well as any: friction, gravity, a ripple or another axis' torque affect both alike.
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::finding::{Finding, Severity, told};
 use super::least::bounded;
-use super::motor_side::rather_as_logged;
+use super::motor_side::fits_better_as_logged;
 use super::pairs::factor;
 use super::robust::quantile;
 use super::smoothing::{SHORTEST, smoothed, widths};
@@ -23,21 +25,22 @@ use super::spectra::Spectra;
 use super::{Input, Motion, NOMINAL_OFF, Nominal, Structure};
 use crate::identify::lsq::triangularise;
 
-/// Share of the antiresonance (table against a held motor) up to which the axis moves as one body: its motion is there 4/3 of a rigid one's.
+/// Share of the antiresonance (table against a locked motor) up to which the axis moves as one body: the table moves there 4/3 times as far
+/// as the motor.
 const RIGID: f64 = 0.5;
-/// Power of the position over that of its noise from which a line is one of motion: chance passes one of twenty thousand.
-const STANDS: f64 = 10.0;
-/// Lines from which four coefficients say something.
+/// Power of the position over its noise power from which a line shows motion: of noise one line in twenty thousand passes.
+const MIN_SIGNAL_TO_NOISE: f64 = 10.0;
+/// Least number of lines for a fit of four coefficients.
 const LEAST: usize = 6;
-/// A ratio beyond this is no nominal value's error, whatever it is near to.
-const BEYOND: f64 = 10.0;
-/// Times as much of the torque that the nominal axis must leave for another sign or unit to be believed: friction that is not Coulomb's, a
-/// ripple or a foreign torque made it 1.5 on sound records.
-pub(super) const WORSE: f64 = 2.0;
-/// Equations left over from which chance adds nothing to that: of fewer the ratio of two remainders spreads as their square.
-const ENOUGH: f64 = 8.0;
-/// Share of the torque's power that may be left beside an inertia that is read from a record.
-pub(super) const MOST_LEFT: f64 = 0.25;
+/// Ratio to the nominal inertia, or its reciprocal, beyond which it is a wrong unit and no error of the nominal value.
+const MAX_NOMINAL_ERROR: f64 = 10.0;
+/// Unexplained share with the nominal axis, over that with another sign or unit, from which the latter is reported: on sound records with
+/// friction that is not Coulomb's, a ripple or another axis' torque it was up to 1.5.
+pub(super) const SIGNIFICANTLY_WORSE: f64 = 2.0;
+/// Degrees of freedom beyond which that limit needs no addition: for fewer, the ratio of two residuals scatters with their inverse square.
+const AMPLE_FREEDOM: f64 = 8.0;
+/// Residual share of the torque's power up to which an inertia estimated from the record is given.
+pub(super) const MAX_RESIDUAL: f64 = 0.25;
 /// Most samples of one segment.
 const LONGEST: usize = 65_536;
 
@@ -46,16 +49,16 @@ const T: usize = 0;
 const A: usize = 1;
 const X: usize = 4;
 
-/// What the nominal inertia makes of a record.
-pub(super) enum Weight {
+/// Result of the comparison of a record with the nominal inertia.
+pub(super) enum NominalFit {
     /// The nominal axis explains the torque as well as another sign or unit.
-    Nominal,
-    /// Something is wrong with sign or unit.
-    Wrong(Finding),
+    Consistent,
+    /// The sign or the unit of a column is wrong.
+    Inconsistent(Finding),
 }
 
-/// Weighs the record against the nominal axis; None where there is none or where the record shows too little of its motion.
-pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
+/// Compares the record with the nominal axis; `None` without a nominal model, or where too few lines show motion.
+pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
     let nominal = input.nominal?;
     let balance = Balance::new(input, nominal)?;
     let inertia = nominal.parameters.i1 + nominal.parameters.i2;
@@ -64,28 +67,29 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
     let turned = balance.unexplained(-1.0, near).0;
     let (any, mass) = balance.unexplained(1.0, [0.0, f64::INFINITY]);
     let without = balance.unexplained(1.0, [0.0, 0.0]).0;
-    // Numbers at the end of their range weigh nothing.
+    // Overflow: no comparison.
     if ![own, turned, any, mass, without].iter().all(|v| v.is_finite()) {
         return None;
     }
-    let worse = WORSE * (1.0 + (ENOUGH / balance.freedom).powi(2));
+    let worse = SIGNIFICANTLY_WORSE * (1.0 + (AMPLE_FREEDOM / balance.freedom).powi(2));
     if own <= worse * any.min(turned) {
-        return Some(Weight::Nominal);
+        return Some(NominalFit::Consistent);
     }
     if turned <= any {
-        // What moves the table beside the coupling counts in the momentum of both, not on the motor's side.
-        let sound = rather_as_logged(input, 1.0, -1.0);
-        return Some(if sound { Weight::Nominal } else { Weight::Wrong(against(turned, own)) });
+        // Another torque on the table enters the momentum of both, but not the motor's equation of motion.
+        let sound = fits_better_as_logged(input, 1.0, -1.0);
+        return Some(if sound { NominalFit::Consistent } else { NominalFit::Inconsistent(sign_finding(turned, own)) });
     }
     let ratio = mass / inertia;
-    // Noise of the encoder, differentiated twice, hides an inertia: what it does not explain it does not tell.
+    // Noise of the encoder, differentiated twice, hides an inertia: if no inertia explains the torque, none is compared.
     if own.min(without) <= worse * any || ratio <= 0.0 || !ratio.is_finite() {
         return None;
     }
-    Some(Weight::Wrong(other_unit(input, mass, ratio, true)))
+    Some(NominalFit::Inconsistent(inertia_finding(input, mass, ratio, true)))
 }
 
-/// The inertia with which friction, a weight on a hinge and a spring explain most of the torque, of a record of which nothing is known:
+/// The inertia, kg.m2 (kg), that explains most of the torque together with friction, a weight on a hinge and a spring; no nominal model is
+/// needed:
 ///
 /// ```text
 /// T = M*a + c*v + F*sign(v) + k*x + g*sin(x) + h*cos(x) + b        rotary; without sine and cosine where it moves along a line
@@ -97,12 +101,10 @@ pub(super) fn weigh(input: &Input<'_>) -> Option<Weight> {
 /// motion's band from all. None where less than three quarters are explained, or the inertia is not known to a third.
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
-    let n = x.len();
-    let mut best: Option<InTime> = None;
-    for width in widths(n) {
-        if let Some(found) = in_time(input, torque, x, width)
-            && found.left < MOST_LEFT
-            && found.mass > SURELY * found.error
+    let mut best: Option<TimeDomainFit> = None;
+    for found in at_widths(input, torque, x) {
+        if found.left < MAX_RESIDUAL
+            && found.mass > SIGNIFICANT * found.error
             && found.mass.is_finite()
             && best.as_ref().is_none_or(|best| found.left < 0.98 * best.left)
         {
@@ -112,14 +114,15 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     best.map(|found| found.mass)
 }
 
-/// Whether the same balance explains most of the torque with a friction that brakes or, where there is next to none, an inertia that is
-/// one: of slow moves, where friction or a weight is nearly all of the torque, spectra show a few lines alone, and noise in those.
-pub(super) fn follows(input: &Input<'_>) -> bool {
+/// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is
+/// significantly negative. For slow moves, where friction or a weight is nearly all of the torque: their spectra have few lines above the
+/// noise.
+pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    let found = widths(x.len()).filter_map(|width| in_time(input, torque, x, width));
-    found.min_by(|a, b| a.left.total_cmp(&b.left)).is_some_and(|found| {
+    at_widths(input, torque, x).into_iter().min_by(|a, b| a.left.total_cmp(&b.left)).is_some_and(|found| {
         let (friction, mass) = (found.friction / found.friction_error, found.mass / found.error);
-        found.left < MOST_LEFT && (friction > 0.0 && mass > -SURELY || friction > -SURELY && mass > SURELY)
+        found.left < MAX_RESIDUAL
+            && (friction > 0.0 && mass > -SIGNIFICANT || friction > -SIGNIFICANT && mass > SIGNIFICANT)
     })
 }
 
@@ -127,26 +130,32 @@ pub(super) fn follows(input: &Input<'_>) -> bool {
 /// hinge, whose sine would be noise.
 const HINGE: f64 = 0.3;
 const TURNS: f64 = 1e4;
-/// Most samples that one solution looks at.
+/// Most samples that enter one least-squares fit.
 pub(super) const SAMPLES: usize = 20_000;
 
 /// Standard errors from which a value is surely not zero.
-const SURELY: f64 = 3.0;
+const SIGNIFICANT: f64 = 3.0;
 
-/// The balance in the time domain.
-struct InTime {
-    /// Share of the torque's power about its mean that is left.
+/// The fit in the time domain.
+struct TimeDomainFit {
+    /// Residual share of the torque's variance.
     left: f64,
-    /// Inertia and its standard error.
+    /// Inertia and its standard error, kg.m2 (kg).
     mass: f64,
     error: f64,
-    /// Friction at the ninth decile of the speeds and its standard error.
+    /// Friction at the ninth decile of the speeds and its standard error, N.m (N).
     friction: f64,
     friction_error: f64,
 }
 
-/// The balance by a smoothing of a width.
-fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option<InTime> {
+/// The fits with the smoothings of all widths, the narrowest first.
+fn at_widths(input: &Input<'_>, torque: &[f64], x: &[f64]) -> Vec<TimeDomainFit> {
+    let widths: Vec<usize> = widths(x.len()).collect();
+    widths.into_par_iter().filter_map(|width| time_domain_fit(input, torque, x, width)).collect()
+}
+
+/// The fit with a smoothing of `width` samples to either side.
+fn time_domain_fit(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option<TimeDomainFit> {
     let (t, q) = (smoothed(torque, width), smoothed(x, width));
     let dt = input.dt;
     let speed = |k: usize| (q[k + 1] - q[k - 1]) / (2.0 * dt);
@@ -174,7 +183,7 @@ fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option
     let variance = |i: usize, k: usize| solution.variance(0) * solution.inverse[(i, k)] * (2 * width + 1) as f64;
     let left = solution.residual[(0, 0)] / total;
     let of = |i: usize| solution.phi[(i, 0)];
-    left.is_finite().then(|| InTime {
+    left.is_finite().then(|| TimeDomainFit {
         left,
         mass: of(0),
         error: variance(0, 0).sqrt(),
@@ -183,7 +192,7 @@ fn in_time(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option
     })
 }
 
-fn against(turned: f64, own: f64) -> Finding {
+fn sign_finding(turned: f64, own: f64) -> Finding {
     let explained = |left: f64| 100.0 * (1.0 - left).max(0.0);
     Finding::new(
         "sign",
@@ -199,12 +208,13 @@ fn against(turned: f64, own: f64) -> Finding {
     )
 }
 
-/// An inertia that is not the nominal one: by a unit's factor or, where it is `sure` what moves, by more than any nominal value is off.
-pub(super) fn other_unit(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -> Finding {
+/// The finding on an inertia `mass`, kg.m2 (kg), that is `ratio` times the nominal one: a wrong unit if the ratio is near a unit's factor or,
+/// where `sure`, beyond the error of any nominal value; else a warning.
+pub(super) fn inertia_finding(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -> Finding {
     let unit = Motion::unit(input.motion, "kg.m2");
     let seen = format!("The inertia that moves is {mass:.4e} {unit}, {} times the nominal one", told(ratio));
     let words = factor(ratio);
-    let of_a_nominal = !sure || (1.0 / BEYOND..BEYOND).contains(&ratio);
+    let of_a_nominal = !sure || (1.0 / MAX_NOMINAL_ERROR..MAX_NOMINAL_ERROR).contains(&ratio);
     if words.is_none() && of_a_nominal {
         return Finding::new(
             "inertia",
@@ -229,8 +239,8 @@ pub(super) fn other_unit(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -
     )
 }
 
-/// Frequency up to which the nominal axis moves as one body, rad/s.
-pub(super) fn rigid_up_to(nominal: Nominal) -> f64 {
+/// Frequency up to which the nominal axis moves as one rigid body, rad/s.
+pub(super) fn rigid_band(nominal: Nominal) -> f64 {
     let p = nominal.parameters;
     match nominal.structure {
         Structure::Rigid => f64::INFINITY,
@@ -238,13 +248,13 @@ pub(super) fn rigid_up_to(nominal: Nominal) -> f64 {
     }
 }
 
-/// Spectra of a record taken whole, and the lines of its motion.
-pub(super) struct Slow {
+/// Spectra of a whole record, and the lines that show motion.
+pub(super) struct MotionLines {
     pub spectra: Spectra,
     pub lines: Vec<usize>,
 }
 
-impl Slow {
+impl MotionLines {
     /// Of columns of one length; the lines up to `above` rad/s at which each of the `positions` among them stands out of its noise. None
     /// where there are too few samples.
     pub fn new(columns: &[&[f64]], positions: Range<usize>, dt: f64, above: f64) -> Option<Self> {
@@ -258,8 +268,9 @@ impl Slow {
         // Noise falls with the frequency or is flat: at a line it is at most the upper lines' in proportion.
         let noise = |x: usize| quantile(upper.clone().map(|f| spectra.power(x, f)), 0.5) / std::f64::consts::LN_2;
         let noise: Vec<(usize, f64)> = positions.map(|x| (x, noise(x))).collect();
-        let stands =
-            |f: &usize| noise.iter().all(|(x, n)| spectra.power(*x, *f) > STANDS * n * middle / (f + 1) as f64);
+        let stands = |f: &usize| {
+            noise.iter().all(|(x, n)| spectra.power(*x, *f) > MIN_SIGNAL_TO_NOISE * n * middle / (f + 1) as f64)
+        };
         let lines = (0..spectra.lines).take_while(|f| spectra.omega(*f) < above).filter(stands).collect();
         Some(Self { spectra, lines })
     }
@@ -292,7 +303,7 @@ impl Balance {
         let table = input.theta2.filter(|_| input.theta1.is_some() && nominal.structure == Structure::TwoInertia);
         let p = nominal.parameters;
         let (mean, above) = match table {
-            None => (acceleration(x), rigid_up_to(nominal)),
+            None => (acceleration(x), rigid_band(nominal)),
             Some(x2) => {
                 let of = |(a1, a2): (&f64, &f64)| (p.i1 * a1 + p.i2 * a2) / (p.i1 + p.i2);
                 (acceleration(x).iter().zip(&acceleration(x2)).map(of).collect(), f64::INFINITY)
@@ -300,7 +311,7 @@ impl Balance {
         };
         let mut columns = vec![&torque[1..n - 1], &mean, &speed, &sign, &x[1..n - 1]];
         columns.extend(table.map(|x2| &x2[1..n - 1]));
-        let Slow { spectra, lines } = Slow::new(&columns, X..columns.len(), dt, above)?;
+        let MotionLines { spectra, lines } = MotionLines::new(&columns, X..columns.len(), dt, above)?;
         let total: f64 = lines.iter().map(|f| spectra.power(T, *f)).sum();
         if lines.len() < LEAST || total.is_nan() || total <= 0.0 {
             return None;

@@ -1,4 +1,4 @@
-//! Sizes of columns that a few wild samples do not rule.
+//! Robust measures of columns, in the column's unit: outliers have little influence on them.
 
 /// Largest less smallest.
 pub(super) fn span(values: &[f64]) -> f64 {
@@ -6,10 +6,10 @@ pub(super) fn span(values: &[f64]) -> f64 {
     if high > low { high - low } else { 0.0 }
 }
 
-/// Most values that a quantile is taken of: of a longer column every so many-th.
+/// Most values that enter a quantile; a longer column is decimated.
 const SAMPLED: usize = 100_000;
 
-/// Quantile (0 to 1) of the sizes of a column's values, of at most [`SAMPLED`] of them.
+/// Quantile `share` (0 to 1) of the magnitudes of at most [`SAMPLED`] values; 0 of none.
 pub(super) fn quantile(values: impl ExactSizeIterator<Item = f64>, share: f64) -> f64 {
     let step = (values.len() / SAMPLED).max(1);
     let mut sizes: Vec<f64> = values.step_by(step).map(f64::abs).collect();
@@ -20,7 +20,7 @@ pub(super) fn quantile(values: impl ExactSizeIterator<Item = f64>, share: f64) -
     *sizes.select_nth_unstable_by(index, f64::total_cmp).1
 }
 
-/// The step in which a column is counted: its smallest difference that is not zero nor rounding.
+/// Quantisation step of a column: the smallest difference of neighbouring samples that is neither zero nor rounding.
 pub(super) fn step(values: &[f64]) -> f64 {
     let large = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let n = values.len().min(SAMPLED);

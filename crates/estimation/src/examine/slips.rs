@@ -1,9 +1,8 @@
-//! Samples that a log lost without a word: its stamps are even, and the motion goes on some samples further at once.
+//! Samples that a log dropped without a gap in its time stamps: the motion advances by several samples at once.
 //!
-//! A position is a cubic over a few samples on either side of a row (see [`crate::trace::bridge`]). Where `m` samples are missing before it,
-//! one cubic fits both sides with the later ones `m` samples later, and none fits them as they stand: the axis is not somewhere else, it is
-//! the same motion with a piece left out. A blow gives the speed a kink and a count that was lost puts the position elsewhere; neither is
-//! `m` samples of this motion, and not for both encoders at once.
+//! Over a few samples on either side of a row a position is close to a cubic (see [`crate::trace::bridge`]). Where `m` samples are missing
+//! before the row, one cubic fits both sides if the later samples are shifted by `m` sampling intervals, and none fits them without. An impact
+//! changes the speed and a lost count offsets the position; neither equals a shift in time by `m` samples, the same for both encoders.
 
 use std::ops::Range;
 
@@ -11,22 +10,23 @@ use super::Input;
 use super::finding::{Finding, Severity};
 use super::robust::{quantile, step};
 
-/// Samples on either side of a row, and the most lost in a row that a cubic over so many still reaches across: few samples for a fast motion,
-/// many for one that hardly stands out of the noise, or of which much is missing at once.
+/// Samples on either side of a row, and the most missing ones that a cubic over so many can span: few samples for a fast motion, many for one
+/// near the noise, or for many missing samples.
 const SIDES: [(usize, usize); 3] = [(3, 5), (6, 10), (12, 24)];
 /// Samples on either side of the shortest, and of the longest.
 const NEAR: usize = SIDES[0].0;
 const WIDE: usize = SIDES[2].0;
-/// Error of the cubic, in what it usually is about there, from which a row does not belong behind the one before: as of a lost sample.
+/// Rms residual of the cubic, over its median in the block, from which a row does not continue the one before.
 const FAR: f64 = 6.0;
-/// The same up to which samples belong together, with those between them missing.
+/// The same ratio up to which the cubic with missing samples fits.
 const AGREE: f64 = 2.5;
-/// Samples in which an error is a usual one; every so many-th of them is asked, in no step with samples that are held in twos or fours.
+/// Samples of a block over which the median residual is taken, and the stride in it: coprime to two and four, as samples may be held in twos
+/// or fours.
 const BLOCK: usize = 256;
 const EVERY: usize = 7;
-/// Sizes of a third difference, over its median, from which a row is looked at: a step beyond [`FAR`] makes one of eight.
+/// Magnitude of a third difference, over its median, from which a row is a candidate: a step beyond [`FAR`] gives eight.
 const STANDS: f64 = 6.0;
-/// Places from which a logger drops rows: of some hundred sound records one has a place that looks so by chance, none has more.
+/// Places from which it is certain that rows were dropped: of some hundred sound records one has a place by chance, none has more.
 const PLACES: usize = 3;
 
 /// An orthonormal basis of the cubics at `2*side` times, the later half `missing` samples later: four vectors.
@@ -49,7 +49,7 @@ fn cubics(side: usize, missing: usize) -> Vec<Vec<f64>> {
     basis
 }
 
-/// Mean square of what the cubics leave of some samples.
+/// Mean square of the residual of the cubic fitted to some samples, rad^2 (m^2).
 fn left(part: &[f64], basis: &[Vec<f64>]) -> f64 {
     let zero = part[part.len() / 2];
     let total: f64 = part.iter().map(|x| (x - zero).powi(2)).sum();
@@ -58,13 +58,13 @@ fn left(part: &[f64], basis: &[Vec<f64>]) -> f64 {
     (total - explained).max(0.0) / (part.len() - 4) as f64
 }
 
-/// The cubics of one side's length: by how many samples are missing.
+/// The bases of the cubics over `side` samples on either side, one for each number of missing samples from 0.
 struct Fits {
     side: usize,
     basis: Vec<Vec<Vec<f64>>>,
 }
 
-/// A position, and the mean square of its rounding: nothing is told more closely.
+/// A position, rad (m), and the mean square of its quantisation error, the least residual that is assumed.
 struct Position<'a> {
     values: &'a [f64],
     rounding: f64,
@@ -75,40 +75,40 @@ impl Fits {
         Self { side, basis: (0..=most).map(|missing| cubics(side, missing)).collect() }
     }
 
-    /// What the cubic leaves about row `k` with so many samples missing before it.
+    /// Mean square residual of the cubic about row `k` with so many samples missing before it.
     fn left(&self, x: &[f64], k: usize, missing: usize) -> f64 {
         left(&x[k - self.side..k + self.side], &self.basis[missing])
     }
 
-    /// What it usually leaves among some rows.
-    fn usual(&self, x: &Position<'_>, rows: Range<usize>) -> f64 {
+    /// Median of that residual over some rows, none missing.
+    fn median(&self, x: &Position<'_>, rows: Range<usize>) -> f64 {
         let asked: Vec<f64> = rows.step_by(EVERY).map(|k| self.left(x.values, k, 0)).collect();
         quantile(asked.into_iter(), 0.5).max(x.rounding)
     }
 
-    /// The rows among some before which samples are missing, and how many.
+    /// The rows among the candidates before which samples are missing, and how many.
     fn slips(&self, x: &Position<'_>, rows: Range<usize>, candidates: &[usize]) -> Vec<(usize, usize)> {
-        let usual = self.usual(x, rows);
+        let median = self.median(x, rows);
         let slip = |k: &usize| {
-            if self.left(x.values, *k, 0) <= FAR * FAR * usual {
+            if self.left(x.values, *k, 0) <= FAR * FAR * median {
                 return None;
             }
             let best =
                 (1..self.basis.len()).map(|m| (m, self.left(x.values, *k, m))).min_by(|a, b| a.1.total_cmp(&b.1));
-            best.filter(|(_, left)| *left <= AGREE * AGREE * usual).map(|(missing, _)| (*k, missing))
+            best.filter(|(_, left)| *left <= AGREE * AGREE * median).map(|(missing, _)| (*k, missing))
         };
         candidates.iter().filter_map(slip).collect()
     }
 
-    /// Whether a position has nothing against so many samples that are missing before a row.
+    /// Whether the cubic with so many samples missing before a row fits this position.
     fn agrees(&self, x: &Position<'_>, (k, missing): (usize, usize)) -> bool {
         let from = (k / BLOCK * BLOCK).max(self.side);
         let rows = from..(from + BLOCK).min(x.values.len() - self.side);
-        self.left(x.values, k, missing) <= AGREE * AGREE * self.usual(x, rows)
+        self.left(x.values, k, missing) <= AGREE * AGREE * self.median(x, rows)
     }
 }
 
-/// Rows before which samples are missing, and how many, as the positions say with one voice.
+/// Rows before which samples are missing, and how many, where all positions agree.
 fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
     let margin = WIDE;
     let mut found: Vec<(usize, usize)> = Vec::new();
@@ -121,10 +121,10 @@ fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
         while start + margin < n {
             let rows = start..((start / BLOCK + 1) * BLOCK).min(n - margin);
             start = rows.end;
-            let usual = quantile(rows.clone().map(third), 0.5);
-            // A sample that repeats the one before it is held, or the motion stands: what follows makes up for it.
+            let median = quantile(rows.clone().map(third), 0.5);
+            // A repeated sample is held, or the axis is at rest: the step after it is no missing sample.
             let moves = |k: &usize| x[k - NEAR..k + NEAR].windows(2).all(|w| w[0] != w[1]);
-            let stands = |k: &usize| third(*k).abs() > STANDS * usual;
+            let stands = |k: &usize| third(*k).abs() > STANDS * median;
             let candidates: Vec<usize> = rows.clone().filter(stands).filter(moves).collect();
             if candidates.is_empty() {
                 continue;
@@ -137,13 +137,13 @@ fn slips(positions: &[Position<'_>]) -> Vec<(usize, usize)> {
             }
         }
     }
-    // One is seen by both encoders, with both lengths, and from the rows beside it.
+    // The same place is found in both encoders, with several lengths and from neighbouring rows.
     found.sort_unstable();
     found.dedup_by(|next, first| next.0 - first.0 <= NEAR);
     found
 }
 
-/// Looks for samples that are missing under even stamps.
+/// Looks for samples that are missing under even stamps; stamps that are not even are another finding.
 pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     // A value that is rounded to steps of q is off by q/sqrt(12) rms.
     let positions: Vec<Position<'_>> = input
@@ -152,9 +152,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
         .map(|c| Position { values: c.values, rounding: step(c.values).powi(2) / 12.0 })
         .collect();
     let n = input.len();
-    // Stamps that are not even are another finding: what they leave of the motion is no cubic.
-    let uneven = findings.iter().any(|f| f.signal == "time");
-    if positions.is_empty() || n < BLOCK || uneven {
+    if positions.is_empty() || n < BLOCK {
         return;
     }
     let found = slips(&positions);

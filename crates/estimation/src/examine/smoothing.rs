@@ -8,18 +8,49 @@ pub(super) fn widths(n: usize) -> impl Iterator<Item = usize> {
     [0, 1, 2, 4, 8, 16, 32, 64].into_iter().filter(move |w| SHORTEST + 8 * w <= n)
 }
 
-/// A mean over `2*width + 1` samples, twice; the ends are left out.
+/// A mean over `2*width + 1` samples, twice; `2*width` samples at either end are left out.
 pub(super) fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
-    let once = |v: &[f64]| -> Vec<f64> {
-        let length = 2 * width + 1;
-        let middle = v[v.len() / 2];
-        let sums: Vec<f64> = std::iter::once(0.0)
-            .chain(v.iter().scan(0.0, |sum, v| {
-                *sum += v - middle;
-                Some(*sum)
-            }))
-            .collect();
-        sums.windows(length + 1).map(|w| middle + (w[length] - w[0]) / length as f64).collect()
-    };
-    once(&once(values))
+    let length = 2 * width + 1;
+    if width == 0 || values.len() < 2 * length {
+        return if width == 0 { values.to_vec() } else { Vec::new() };
+    }
+    let middle = values[values.len() / 2];
+    let share = 1.0 / length as f64;
+    // One column of memory: running sums of the samples, of their means, and those means' means follow one another in it.
+    let mut sums = Vec::with_capacity(values.len() + 1);
+    let mut sum = 0.0;
+    sums.push(sum);
+    sums.extend(values.iter().map(|v| {
+        sum += v - middle;
+        sum
+    }));
+    let once = values.len() + 1 - length;
+    sum = 0.0;
+    for k in 0..once {
+        let mean = (sums[k + length] - sums[k]) * share;
+        sums[k] = sum;
+        sum += mean;
+    }
+    sums[once] = sum;
+    let twice = once + 1 - length;
+    for k in 0..twice {
+        sums[k] = middle + (sums[k + length] - sums[k]) * share;
+    }
+    sums.truncate(twice);
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_twice_is_one_with_the_weights_of_a_triangle() {
+        let values: Vec<f64> = (0..100).map(|k| 3.0 + f64::from(k * k % 17)).collect();
+        assert_eq!(smoothed(&values, 0), values);
+        let by_weights = |k: usize| -> f64 { (0..9).map(|i| values[k + i] * (5 - i.abs_diff(4)) as f64 / 25.0).sum() };
+        let all = smoothed(&values, 2);
+        assert_eq!(all.len(), 92);
+        assert!(all.iter().enumerate().all(|(k, v)| (v - by_weights(k)).abs() < 1e-12));
+    }
 }

@@ -4,6 +4,8 @@
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use crate::numerics::level::deviation;
+
 /// Most segments that are averaged; of a longer record they are spread evenly.
 const SEGMENTS: usize = 96;
 
@@ -32,24 +34,47 @@ impl Spectra {
             (0..length).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / length as f64).cos()).collect();
         let m = columns.len();
         let mut values = vec![Complex::new(0.0, 0.0); m * m * lines];
-        let mut buffers = vec![vec![Complex::new(0.0, 0.0); length]; m];
+        let mut buffer = vec![Complex::new(0.0, 0.0); length];
+        let mut transforms = vec![vec![Complex::new(0.0, 0.0); lines]; m];
         let mut scratch = vec![Complex::new(0.0, 0.0); plan.get_inplace_scratch_len()];
+        // Powers of two that bring the columns to about one size: in one transform of two the smaller one is not lost in the rounding
+        // of the larger one.
+        let sizes: Vec<f64> = columns.iter().map(|c| power_of_two_above(deviation(c))).collect();
         for s in 0..count {
             let first = if count > 1 { s * (n - length) / (count - 1) } else { 0 };
-            for (buffer, column) in buffers.iter_mut().zip(columns) {
-                let part = &column[first..first + length];
-                let mean = part.iter().sum::<f64>() / length as f64;
-                for ((b, v), w) in buffer.iter_mut().zip(part).zip(&window) {
-                    *b = Complex::new((v - mean) * w, 0.0);
+            let parts: Vec<&[f64]> = columns.iter().map(|column| &column[first..first + length]).collect();
+            let means: Vec<f64> = parts.iter().map(|part| part.iter().sum::<f64>() / length as f64).collect();
+            let value = |c: usize, k: usize| (parts[c][k] - means[c]) * window[k] / sizes[c];
+            // Two real columns are one complex one: x + j*y, whose transform Z gives
+            // X(f) = (Z(f) + conj Z(-f))/2 and Y(f) = (Z(f) - conj Z(-f))/2j.
+            for x in (0..m).step_by(2) {
+                let y = (x + 1 < m).then_some(x + 1);
+                for (k, z) in buffer.iter_mut().enumerate() {
+                    *z = Complex::new(value(x, k), y.map_or(0.0, |y| value(y, k)));
                 }
-                plan.process_with_scratch(buffer, &mut scratch);
+                plan.process_with_scratch(&mut buffer, &mut scratch);
+                for f in 1..=lines {
+                    let (z, mirrored) = (buffer[f], buffer[length - f].conj());
+                    transforms[x][f - 1] = (z + mirrored) * (0.5 * sizes[x]);
+                    if let Some(y) = y {
+                        let twice = z - mirrored;
+                        transforms[y][f - 1] = Complex::new(twice.im, -twice.re) * (0.5 * sizes[y]);
+                    }
+                }
             }
             for i in 0..m {
-                for j in 0..m {
+                for j in i..m {
                     let out = &mut values[(i * m + j) * lines..][..lines];
-                    for ((o, a), b) in out.iter_mut().zip(&buffers[i][1..]).zip(&buffers[j][1..]) {
+                    for ((o, a), b) in out.iter_mut().zip(&transforms[i]).zip(&transforms[j]) {
                         *o += a.conj() * b;
                     }
+                }
+            }
+        }
+        for i in 0..m {
+            for j in 0..i {
+                for f in 0..lines {
+                    values[(i * m + j) * lines + f] = values[(j * m + i) * lines + f].conj();
                 }
             }
         }
@@ -94,5 +119,44 @@ impl Spectra {
     /// Coherence that unrelated columns exceed at one line of three hundred.
     pub fn by_chance(&self) -> f64 {
         if self.averages <= 1.5 { 1.0 } else { 1.0 - (1.0_f64 / 300.0).powf(1.0 / (self.averages - 1.0)) }
+    }
+}
+
+/// The power of two that is at least so large, within the range of normal numbers; one of zero.
+fn power_of_two_above(size: f64) -> f64 {
+    if size.is_normal() { size.log2().ceil().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::level::noise;
+
+    #[test]
+    fn the_spectra_of_columns_of_any_size_are_those_of_each_alone() {
+        let columns: Vec<Vec<f64>> = [1.0, 1e9, 1e-12]
+            .iter()
+            .zip(1..)
+            .map(|(size, seed)| noise(256, seed).iter().map(|e| size * e).collect())
+            .collect();
+        let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let all = Spectra::new(&slices, 64, 1e-3);
+        for (i, j) in [(0, 0), (0, 1), (1, 2), (2, 1), (2, 2)] {
+            let alone = [i, j].map(|c| Spectra::new(&[slices[c], &[0.0; 256]], 64, 1e-3));
+            for f in 0..all.lines {
+                let power = alone.each_ref().map(|s| s.power(0, f));
+                assert!((all.power(i, f) / power[0] - 1.0).abs() < 1e-12);
+                // Hermitian, and no larger than the two powers allow.
+                assert!((all.of(i, j, f) - all.of(j, i, f).conj()).norm() <= 1e-12 * (power[0] * power[1]).sqrt());
+                assert!(all.of(i, j, f).norm() <= (1.0 + 1e-12) * (power[0] * power[1]).sqrt());
+            }
+        }
+        // A column a quarter of a turn later: the phase of the cross spectrum.
+        let wave = |shift: f64| -> Vec<f64> {
+            (0..256).map(|k| (std::f64::consts::TAU * (8.0 * k as f64 / 64.0 - shift)).cos()).collect()
+        };
+        let two = Spectra::new(&[&wave(0.0), &wave(0.25)], 64, 1e-3);
+        let cross = two.of(0, 1, 7);
+        assert!((cross.arg() + std::f64::consts::FRAC_PI_2).abs() < 1e-9, "{cross}");
     }
 }

@@ -4,7 +4,7 @@ use super::Input;
 use super::finding::{Finding, Severity, runs};
 use super::robust::quantile;
 
-/// Distance from even spacing, in intervals, that is worth a word.
+/// Deviation from even spacing that is reported, in sampling intervals.
 const JITTER: f64 = 0.02;
 /// A step of so many intervals has lost samples (as [`crate::trace::grid`] counts them).
 const LOST: f64 = 1.5;

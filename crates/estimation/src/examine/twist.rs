@@ -1,7 +1,7 @@
 //! The twist of the coupling, logged in the table's place.
 //!
-//! Below the antiresonance the table goes as far as the motor or a little further. The twist is far smaller there, takes its part in the
-//! motor's torque, and gives the table its acceleration:
+//! Below the antiresonance the table moves as far as the motor or a little further. The twist `d` (rad, m) is far smaller there; it enters
+//! the motor's equation of motion and accelerates the table:
 //!
 //! ```text
 //! I1*a1 + B*d' + K*d = T
@@ -9,20 +9,20 @@
 //! ```
 
 use super::finding::{Finding, Severity, told};
-use super::motor_side::as_twist;
-use super::rigid::{Slow, rigid_up_to};
+use super::motor_side::fit_as_twist;
+use super::rigid::{MotionLines, rigid_band};
 use super::{Input, NOMINAL_OFF};
 use crate::numerics::level::deviation;
 
-/// Share of the motor's way up to which a column may be the twist: at half the antiresonance it is a third.
+/// Standard deviation over that of the motor angle up to which a column may be the twist: at half the antiresonance it is a third.
 const SMALL: f64 = 0.5;
-/// Share of the table's acceleration that it must give over all lines of slow motion.
+/// Share of the power of the table's acceleration, over all lines of slow motion, that the column must explain.
 const FOLLOWS: f64 = 0.8;
-/// Lines from which that is no chance.
+/// Least number of lines for that share to be significant.
 const LEAST: usize = 6;
 
-/// Finds that the table's column is the twist, either way round: on the motor's side the nominal axis has it as that and not as the table's
-/// motion, and either that side does not do without it or the table's has its acceleration of it.
+/// The finding that the table's column is the twist, with either sign: the motor's equation of motion fits better with the column as the
+/// twist than as the table's angle, and either it does not fit without the column or the table's equation of motion holds with it.
 pub(super) fn logged(input: &Input<'_>) -> Option<Finding> {
     let (x, y) = (input.theta1?, input.theta2?);
     let share = deviation(y) / deviation(x);
@@ -30,7 +30,7 @@ pub(super) fn logged(input: &Input<'_>) -> Option<Finding> {
         return None;
     }
     let is_twist = |sign: f64| {
-        as_twist(input, sign).is_some_and(|as_twist| as_twist.rather && (as_twist.felt || moves_the_table(input, sign)))
+        fit_as_twist(input, sign).is_some_and(|fit| fit.better && (fit.needed || accelerates_the_table(input, sign)))
     };
     let sign = [1.0, -1.0].into_iter().find(|sign| is_twist(*sign))?;
     let (difference, way_out) =
@@ -50,14 +50,16 @@ pub(super) fn logged(input: &Input<'_>) -> Option<Finding> {
     ))
 }
 
-/// Whether the table has its acceleration of the column, times `sign`, as the twist of about the nominal coupling.
-fn moves_the_table(input: &Input<'_>, sign: f64) -> bool {
+/// Whether the column, times `sign`, is the twist in the table's equation of motion, with about the nominal stiffness over inertia.
+fn accelerates_the_table(input: &Input<'_>, sign: f64) -> bool {
     let (Some(x), Some(y), Some(nominal)) = (input.theta1, input.theta2, input.nominal) else { return false };
-    let Some(Slow { spectra, lines }) = Slow::new(&[x, y], 0..2, input.dt, rigid_up_to(nominal)) else { return false };
+    let Some(MotionLines { spectra, lines }) = MotionLines::new(&[x, y], 0..2, input.dt, rigid_band(nominal)) else {
+        return false;
+    };
     if lines.len() < LEAST {
         return false;
     }
-    // Stiffness and damping over the table's inertia, which are least squares of their own: d and d' are a quarter turn apart.
+    // Stiffness and damping over the table's inertia (1/s^2, 1/s): two separate least squares, as d and d' are orthogonal.
     let (mut accelerations, mut twists, mut rates, mut by_twist, mut by_rate) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for f in lines {
         let (w, cross) = (spectra.omega(f), spectra.of(1, 0, f) * sign);

@@ -9,9 +9,10 @@ use crate::numerics::level::deviation;
 
 /// Blocks that a record is cut into to look for stretches without drive.
 const BLOCKS: usize = 100;
-/// A block with less than this share of the usual deviation is without drive, or stands.
+/// Standard deviation of the torque, or span of the position, in a block over its upper quartile, up to which the drive is off or the axis at
+/// rest.
 const QUIET: f64 = 0.02;
-/// Share of the usual deviation of the torque beyond which a constant one is held by the drive.
+/// Mean torque of a block, over the upper quartile of the standard deviations, above which the drive holds a constant torque.
 const HOLDS: f64 = 0.1;
 /// Standstill between motions is left in up to this share of the record: an axis that rests between moves is not cut to pieces.
 const REST: f64 = 0.2;
@@ -20,7 +21,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// The usable pieces; says what is left out. `bad`: stretches that are of no use for another reason.
+/// The usable pieces, as ranges of samples; what is left out is a finding. `bad`: stretches that are not usable for another reason.
 pub(super) fn examine(input: &Input<'_>, bad: &[Range<usize>], findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
     let n = input.len();
     let size = (n / BLOCKS).max(16);
@@ -45,7 +46,7 @@ pub(super) fn examine(input: &Input<'_>, bad: &[Range<usize>], findings: &mut Ve
     let still = |b: usize| ways[b] <= (QUIET * way).max(2.0 * quantum) && ways[b] < 0.5 * way;
     let drives: Option<Vec<f64>> = input.torque.map(|t| blocks.iter().map(|b| deviation(&t[b.clone()])).collect());
     let drive = drives.as_ref().map_or(0.0, |d| quantile(d.iter().copied(), 0.75));
-    // A torque that is held, and does not move the axis, is one of a drive that is on: friction holds against it.
+    // A constant torque that does not move the axis is of a drive that is on: friction balances it.
     let held = |b: usize| input.torque.is_some_and(|t| mean(&t[blocks[b].clone()]).abs() > HOLDS * drive);
     let off = |b: usize| drives.as_ref().is_some_and(|d| d[b] <= QUIET * drive && drive > 0.0) && !held(b);
 

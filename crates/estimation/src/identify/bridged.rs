@@ -1,20 +1,20 @@
-//! Samples of a position that the log lost, bridged before anything is identified: each reads as a blow that no torque gave.
+//! Lost samples of a position, interpolated before the identification: each would act as an impact without a torque.
 //!
-//! As in [`crate::diagnose`], where they are told against the record's noise floor. Here the noise is the median over short blocks of
-//! [`noise_level`], which a lost sample raises in its own block alone.
+//! As in [`crate::diagnose`], where the threshold is the record's noise floor. Here the noise (standard deviation, in the position's unit) is
+//! the median over short blocks of [`noise_level`], which a lost sample raises in its own block only.
 
 use super::joined::Joined;
 use super::statistics::noise_level;
 use crate::trace::{Signal, bridge};
 
-/// Samples of a block: of a record that lost one in fifty most blocks are still whole.
+/// Samples of a block: short enough that most blocks are complete in a record that lost one sample in fifty.
 const BLOCK: usize = 16;
 
-/// Bridges the lost samples of every position of a record, each piece by itself, and says so of each position that has any.
+/// Interpolates the lost samples of every position of a record, each piece by itself. Gives a warning for each position that has any.
 pub(super) fn lost(joined: &mut Joined) -> Vec<String> {
     let positions = [Signal::Theta1, Signal::Theta2, Signal::X2];
     let told = positions.into_iter().filter_map(|signal| {
-        let count = joined.mend(signal, |y| bridge(y, noise(y)));
+        let count = joined.repair(signal, |y| bridge(y, noise(y)));
         let samples = if count == 1 { "sample" } else { "samples" };
         (count > 0).then(|| {
             format!(
@@ -36,7 +36,7 @@ fn noise(y: &[f64]) -> f64 {
     let middle = levels.len() / 2;
     let usual = *levels.select_nth_unstable_by(middle, f64::total_cmp).1;
     let steps = y.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
-    // Of values with noise in them the smallest step is next to nothing.
+    // For values with noise the smallest step is close to zero.
     let step = steps.reduce(f64::min).unwrap_or_default();
     usual.max(step / 12.0_f64.sqrt())
 }

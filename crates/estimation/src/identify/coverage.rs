@@ -56,7 +56,7 @@ fn record(seed: u64, corner: f64, held: f64) -> Trace {
     trace
 }
 
-/// Estimates over all records, as far from the truth as the 95 % interval reaches or less, and their errors in standard errors, rms.
+/// Share of the estimates over all records whose 95 % interval covers the truth, and the rms of their errors over their standard errors.
 #[derive(Debug, Default)]
 struct Counted {
     of: u32,
@@ -131,7 +131,7 @@ fn samples_that_the_log_held_cost_the_estimates_nothing() {
     let (sound, found, as_they_are) = (identified(0.0, 0.0), identified(0.0, 0.003), plain(0.0, 0.003));
     println!("{sound:?} {found:?} {} against {as_they_are:?} {}", found.share(), as_they_are.share());
     assert!((0.85..=0.99).contains(&found.share()), "{found:?}");
-    // As sure as on the record that held none, where the samples as they are make the errors more than twice as large.
+    // The errors are as on the record without held samples; without interpolation they are more than twice as large.
     assert!(found.size < 1.1 * sound.size, "{found:?} {sound:?}");
     assert!(as_they_are.size > 2.0 * sound.size, "{as_they_are:?} {sound:?}");
 }

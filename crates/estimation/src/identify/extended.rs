@@ -52,7 +52,7 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
     for k in 0..n {
         let r = record.row(k);
         if record.place(k).1 == 0 {
-            // The noise before a gap says nothing of the noise behind it.
+            // The noise before a gap is independent of that after it.
             motor.forget_noise();
             table.forget_noise();
         }
@@ -131,8 +131,8 @@ fn pseudolinear(
     let weight = sums(lambda * lambda) * count / sums(lambda).powi(2);
     let mut covariance = inverse * scores.omega_of::<ALL>() * inverse.transpose() * weight;
     if lambda >= 1.0 {
-        // A recursion that remembers its first steps need not have come to rest where the sum of its scores is zero: what is
-        // left of the way there is an error, too.
+        // A recursion whose first steps still have weight need not end where the sum of its scores is zero: the remaining distance is an
+        // error, too.
         let way = inverse * SVector::<f64, ALL>::from(scores.total::<ALL>());
         covariance += way * way.transpose();
     }

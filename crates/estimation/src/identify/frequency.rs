@@ -94,7 +94,7 @@ fn periods(values: &[f64], period: usize, skip: usize) -> Vec<Vec<C>> {
 }
 
 /// Measures the response of every angle and speed of a periodic trace; None with fewer than two whole periods or no
-/// excited line. With four periods or more the first is left out, for the axis to settle.
+/// excited line. With four periods or more the first is left out, as it contains the transient.
 #[must_use]
 pub fn measure(trace: &Trace, period: usize) -> Option<Measured> {
     let torque = trace.get(Signal::T)?;

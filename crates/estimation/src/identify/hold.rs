@@ -1,4 +1,4 @@
-//! What the torque does between samples, where nobody says: what the record follows better.
+//! Whether the torque is held or linear between samples, where neither the axis file nor the user defines it: by the fit to the record.
 
 use super::joined::Joined;
 use super::result::Identification;
@@ -6,12 +6,12 @@ use super::run::{Request, identify_joined};
 use crate::axis::Hold;
 use crate::trace::{Machine, Trace, TraceError};
 
-/// Share of what a held torque leaves up to which a straight one does: of a wrong hold much more is left, of a fine sampling about as
-/// much by either.
+/// Residual with a linear torque, over that with a held one, up to which the linear one is taken: the wrong assumption leaves a much larger
+/// residual, and with fine sampling both leave about the same.
 const HALF: f64 = 0.5;
 
-/// The same identification with a torque that runs straight from sample to sample, and the pieces so, where that leaves half as much of the
-/// motion as the held one or less. Not tried where the held one explains the record.
+/// The same identification with a torque that is linear between samples, and the pieces with that hold; `None` where the residual is more than
+/// half of that with the held torque. Not tried where the held torque explains the record to its noise.
 ///
 /// # Errors
 /// As [`identify_joined`].
@@ -30,8 +30,8 @@ pub fn straight(
     let mut pieces = pieces.to_vec();
     pieces.iter_mut().for_each(|t| t.hold = Hold::Linear);
     let mut other = identify_joined(Joined::of(&pieces)?, &machine, request, file, progress)?;
-    let still = follows(&other);
-    if still.is_none_or(|still| still > HALF * left) {
+    let residual = worst_residual(&other);
+    if residual.is_none_or(|residual| residual > HALF * left) {
         return Ok(None);
     }
     other.warnings.insert(
@@ -39,21 +39,22 @@ pub fn straight(
         format!(
             "nothing says what the torque does between two samples: held, the model leaves {left:.2} % of the motion, running straight \
              from one to the next {:.2} %. It is taken as straight; --hold, or hold in [signals] of an axis file, says what it is",
-            still.unwrap_or_default()
+            residual.unwrap_or_default()
         ),
     );
     Ok(Some((other, pieces)))
 }
 
-/// What the estimates to trust leave of the output that they follow least, per cent; `None` where nothing was simulated.
-fn follows(result: &Identification) -> Option<f64> {
+/// Residual of the recommended estimates at the output with the worst fit, per cent of its standard deviation; `None` where nothing was
+/// simulated.
+fn worst_residual(result: &Identification) -> Option<f64> {
     let method = &result.methods[result.recommended.as_ref()?.method];
     method.outputs.iter().map(|o| 100.0 - o.fit_percent).reduce(f64::max)
 }
 
-/// The same where it is more than noise.
+/// [`worst_residual`] where a residual is not white, so more than noise.
 fn unexplained(result: &Identification) -> Option<f64> {
     let method = &result.methods[result.recommended.as_ref()?.method];
     let explained = method.explains_exactly() || method.outputs.iter().all(|o| o.whiteness.white);
-    follows(result).filter(|_| !explained)
+    worst_residual(result).filter(|_| !explained)
 }

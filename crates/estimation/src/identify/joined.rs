@@ -144,14 +144,14 @@ impl<'a> Joined<'a> {
         }
     }
 
-    /// Gives each piece of a signal to `mend`, which says how many samples it altered, and takes the signal as it left it; none where the
-    /// record does not have it. The record is copied only where there is something to mend.
-    pub(super) fn mend(&mut self, signal: Signal, mend: impl Fn(&mut [f64]) -> usize) -> usize {
+    /// Applies `repair` to the samples of each piece of a signal; it returns the number of samples that it changed. Gives their total, 0 without
+    /// the signal. The record is copied only if a sample changes.
+    pub(super) fn repair(&mut self, signal: Signal, repair: impl Fn(&mut [f64]) -> usize) -> usize {
         let Some(mut values) = self.samples.get(signal).map(<[f64]>::to_vec) else { return 0 };
-        let altered = self.pieces.iter().map(|piece| mend(&mut values[piece.clone()])).sum();
+        let altered = self.pieces.iter().map(|piece| repair(&mut values[piece.clone()])).sum();
         if altered > 0 {
             let set = self.samples.to_mut().set(signal, values);
-            debug_assert!(set.is_ok(), "a column as long as the one it stands for");
+            debug_assert!(set.is_ok(), "a column as long as the one it replaces");
         }
         altered
     }

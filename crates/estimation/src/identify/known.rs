@@ -14,10 +14,10 @@ use crate::axis::Structure;
 use crate::effects::{Base, EFFECTS, Effect, Law, Moment, Motion, Place, WithLaw};
 use crate::trace::{Machine, Signal, TraceError};
 
-/// Samples to either side over which a speed that is not measured is read off the angle.
-const REACH: usize = 4;
+/// Samples to either side over which a speed that is not measured is a difference of the angle.
+const HALF_WIDTH: usize = 4;
 
-/// What becomes of the known effects of a machine.
+/// The known effects of a machine, and how a regression uses them.
 pub(super) struct Known {
     /// Taken off the torque.
     pub taken: Vec<Effect>,
@@ -38,19 +38,19 @@ impl Known {
         let (taken, left) = on.partition(|e| {
             let info = e.info();
             let place = info.place == Place::Motor || (rigid && info.place == Place::Table);
-            // A friction that grows with the torque transmitted hangs on what is to be identified.
+            // A friction that depends on the transmitted torque depends on the parameters to be identified.
             let loaded = e.load_parameter().is_some_and(|i| machine.effects.of(*e)[i] != 0.0);
             (e.is_force() || e.is_dry()) && place && info.memory == 0 && !loaded
         });
         Self { taken, left }
     }
 
-    /// What is said of it.
-    pub fn words(&self, structure: Structure) -> Vec<String> {
-        let mut words = Vec::new();
+    /// Warnings on which effects are taken off and which are left out.
+    pub fn warnings(&self, structure: Structure) -> Vec<String> {
+        let mut warnings = Vec::new();
         let simulated = if structure == Structure::Rigid { "" } else { "; output error simulates it" };
         if !self.taken.is_empty() {
-            words.push(format!(
+            warnings.push(format!(
                 "the torque of {} in the axis file, along the measured motion, is taken off the record's torque before the \
                  regressions, so that it is not counted twice{simulated}",
                 names(&self.taken)
@@ -59,16 +59,19 @@ impl Known {
         if !self.left.is_empty() {
             let simulated =
                 if structure == Structure::Rigid { "" } else { " are part of the output-error model alone;" };
-            words.push(format!(
+            warnings.push(format!(
                 "of the effects of the axis file, {}{simulated} the regressions leave them out: they have no torque along a \
                  measured motion that could be taken off",
                 names(&self.left)
             ));
         }
-        words
+        warnings
     }
 
-    /// The record with the torque that the known effects leave; None where there is nothing to take off.
+    /// The record with the torque of the known effects subtracted; `None` where there is none to subtract.
+    ///
+    /// # Errors
+    /// When the record has no torque or no motor angle.
     pub fn taken_off(&self, joined: &Joined, machine: &Machine) -> Result<Option<Joined<'static>>, TraceError> {
         if self.taken.is_empty() {
             return Ok(None);
@@ -83,7 +86,8 @@ impl Known {
             for k in piece.clone() {
                 let v = omega.map_or_else(
                     || {
-                        let (a, b) = (k.saturating_sub(REACH).max(piece.start), (k + REACH).min(piece.end - 1));
+                        let (a, b) =
+                            (k.saturating_sub(HALF_WIDTH).max(piece.start), (k + HALF_WIDTH).min(piece.end - 1));
                         (theta[b] - theta[a]) / ((b - a).max(1) as f64 * trace.dt)
                     },
                     |w| w[k],

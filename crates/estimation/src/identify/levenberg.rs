@@ -83,7 +83,7 @@ pub trait Problem {
 pub struct Options {
     /// Most linearisations.
     pub iterations: usize,
-    /// Stop when a step promises and brings less than this share of the cost.
+    /// Stop when the predicted and the actual reduction by a step are both less than this share of the cost.
     pub cost: f64,
     /// Stop when a step is smaller than this share of the parameters (plus the same share of `scale`).
     pub step: f64,
@@ -309,9 +309,9 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 if options.abort_bounds.iter().any(|(steps, bar)| iterations == *steps && normal.cost > *bar) {
                     break Termination::AbortBound;
                 }
-                // A step that the damping holds short promises little wherever it stands.
-                let little = reduction.max(predicted) <= options.cost * before && damping <= HELD_SHORT;
-                calm = if little { calm + 1 } else { 0 };
+                // A step that is short because of the damping has a small predicted reduction anywhere.
+                let small = reduction.max(predicted) <= options.cost * before && damping <= HELD_SHORT;
+                calm = if small { calm + 1 } else { 0 };
                 if calm >= 2 {
                     break Termination::Cost;
                 }

@@ -72,6 +72,10 @@ fn unexcited(side: &'static str, names: &[&str], e: &Deficient) -> RegressionErr
 const MOTOR: [&str; 3] = ["K", "B", "I1"];
 const TABLE: [&str; 2] = ["K/I2", "B/I2"];
 
+/// The number of rows, where there are at least four for each unknown.
+///
+/// # Errors
+/// [`RegressionError::TooShort`].
 pub(super) fn long_enough(rows: usize, unknowns: usize) -> Result<usize, RegressionError> {
     if rows < 4 * unknowns { Err(RegressionError::TooShort { rows, unknowns }) } else { Ok(rows) }
 }
@@ -90,6 +94,9 @@ pub fn least_squares(record: &Record) -> Result<Estimated, RegressionError> {
 }
 
 /// Least squares for both rows.
+///
+/// # Errors
+/// When the record is too short or does not excite a direction.
 pub(super) fn rows(record: &Record) -> Result<Rows, RegressionError> {
     let mut squares = LeastSquares::new(record.rows());
     squares.extend(record, record.rows());
@@ -229,6 +236,9 @@ impl LeastSquares {
     }
 
     /// The estimates.
+    ///
+    /// # Errors
+    /// When there are too few rows, or a direction is not excited.
     pub fn rows(&self) -> Result<Rows, RegressionError> {
         long_enough(self.count, 5)?;
         let m = self.motor.solve().map_err(|e| unexcited("motor", &MOTOR, &e))?;
@@ -275,6 +285,9 @@ impl Sums {
 
 impl Scales {
     /// From all rows of a record.
+    ///
+    /// # Errors
+    /// When there are too few rows, or a regressor is zero throughout.
     pub fn new(record: &Record) -> Result<Self, RegressionError> {
         let mut sums = Sums::default();
         (0..record.rows()).for_each(|k| sums.take(&record.row(k)));
@@ -282,6 +295,9 @@ impl Scales {
     }
 
     /// From the sums over all rows.
+    ///
+    /// # Errors
+    /// When there are too few rows, or a regressor is zero throughout.
     pub fn of(sums: &Sums) -> Result<Self, RegressionError> {
         let n = long_enough(sums.count, 5)?;
         let [twist, rate, torque, a1, a2] = sums.sums.map(|s| (s / n as f64).sqrt());
@@ -428,6 +444,9 @@ impl Recursion {
     }
 
     /// The estimate at the end and its history; the moments of the same rows give its standard errors.
+    ///
+    /// # Errors
+    /// When the recursion diverged.
     pub fn finish(self, moments: &Moments) -> Result<(Estimated, History), RegressionError> {
         let rows = self.last.ok_or(RegressionError::Diverged { what: "RLS" })?;
         let coloured = moments.covariance(&rows.motor, &rows.table, self.lambda);

@@ -298,6 +298,9 @@ fn held_out(joined: &Joined) -> Option<f64> {
 }
 
 /// `eixo identify` for a rigid axis.
+///
+/// # Errors
+/// When the record lacks the torque or the motor angle.
 pub(super) fn identify(
     joined: &Joined,
     machine: &Machine,
@@ -369,7 +372,7 @@ pub(super) fn identify(
         torque: Series::over("T", unit, |k| joined.time(k), torque),
         torque_spectrum: spectrum("T", unit, trace.dt, &torque[joined.longest()]),
         frequency_response: None,
-        warnings: known.words(machine.structure),
+        warnings: known.warnings(machine.structure),
     })
 }
 

@@ -178,7 +178,7 @@ pub fn identify_joined(
     let joined = &joined;
     // The regressions have no term for what the axis file knows beside the parameters.
     let known = Known::of(machine);
-    warnings.extend(known.words(machine.structure));
+    warnings.extend(known.warnings(machine.structure));
     let taken_off = known.taken_off(joined, machine)?;
     let regressed = taken_off.as_ref().unwrap_or(joined);
     let record = Record::of(regressed, machine.parameters.rho)?;

@@ -5,7 +5,8 @@ use memchr::memchr;
 use super::super::error::TraceError;
 use super::super::table::{Header, MAX_COLUMNS, header};
 use super::super::units::Unit;
-use super::{Head, MAX_HEADER, distinct, number_of, separator, split, trim};
+use super::head::{Head, MAX_HEADER, distinct, number_of, separator, split};
+use super::trim;
 
 /// Whether a field can stand in a row of units.
 fn is_unit(field: &str) -> bool {
@@ -100,6 +101,10 @@ impl Preamble {
         Some(Self { names, units, separator, blank_last, body, lines })
     }
 
+    /// As the head of a file.
+    ///
+    /// # Errors
+    /// When there are too many columns, or two of one name.
     pub fn head(self, file: &str) -> Result<Head, TraceError> {
         if self.names.len() > MAX_COLUMNS {
             let what = format!("{} columns; at most {MAX_COLUMNS} are read", self.names.len());

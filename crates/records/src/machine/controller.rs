@@ -43,6 +43,9 @@ impl Controller {
 const NUMBERS: [&str; 7] = ["kp", "kv", "ki", "velocity_forward", "acceleration_forward", "inertia", "limit"];
 
 /// Reads the section; its columns go into the mapping.
+///
+/// # Errors
+/// When a key is unknown, or a value not of its type or out of its range.
 pub(super) fn controller(
     reader: &Reader,
     section: &Section,

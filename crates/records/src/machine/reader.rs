@@ -34,6 +34,9 @@ impl<'a> Section<'a> {
     }
 
     /// The table of a key.
+    ///
+    /// # Errors
+    /// When the value of the key is no table.
     pub fn table(&self, reader: &Reader<'a>, key: &str) -> Result<Option<Section<'a>>, MachineError> {
         self.get(key).map(|v| reader.table(v, key)).transpose()
     }
@@ -59,6 +62,9 @@ impl<'a> Reader<'a> {
     }
 
     /// The document.
+    ///
+    /// # Errors
+    /// When the text is no TOML.
     pub fn root(&self) -> Result<Section<'a>, MachineError> {
         let table = DeTable::parse(self.text).map_err(|e| {
             self.error(e.span().map(|s| line_at(self.text, s.start)), e.message().lines().next().unwrap_or("not TOML"))
@@ -71,6 +77,9 @@ impl<'a> Reader<'a> {
     }
 
     /// Refuses keys other than `allowed`, with the nearest name.
+    ///
+    /// # Errors
+    /// When the section has a key that is not allowed.
     pub fn only(&self, section: &Section, allowed: &[&str], place: &str) -> Result<(), MachineError> {
         for (key, _, line) in section.entries() {
             if !allowed.contains(&key) {
@@ -82,6 +91,10 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// A value as a table; `what` names it in the error.
+    ///
+    /// # Errors
+    /// When the value is no table.
     pub fn table(&self, value: &Value<'a>, what: &str) -> Result<Section<'a>, MachineError> {
         match value.get_ref() {
             DeValue::Table(table) => Ok(Section { table: table.clone(), own_line: self.line(value), text: self.text }),
@@ -89,6 +102,10 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// A value as a text; `what` names it in the error.
+    ///
+    /// # Errors
+    /// When the value is no text.
     pub fn text<'v>(&self, value: &'v Value<'a>, what: &str) -> Result<&'v str, MachineError> {
         match value.get_ref() {
             DeValue::String(text) => Ok(text.as_ref()),
@@ -97,6 +114,9 @@ impl<'a> Reader<'a> {
     }
 
     /// A finite number.
+    ///
+    /// # Errors
+    /// When the value is no finite number.
     pub fn number(&self, value: &Value, what: &str) -> Result<f64, MachineError> {
         let parsed = match value.get_ref() {
             DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
@@ -110,6 +130,9 @@ impl<'a> Reader<'a> {
     }
 
     /// One of several words.
+    ///
+    /// # Errors
+    /// When the value is none of the choices.
     pub fn choice<T: Copy>(&self, value: &Value, what: &str, choices: &[(&str, T)]) -> Result<T, MachineError> {
         let words = || choices.iter().map(|(w, _)| format!("{w:?}")).collect::<Vec<_>>().join(" or ");
         match value.get_ref() {

@@ -1,0 +1,131 @@
+//! Slow motions, of which averaged spectra show few lines: the balance of torque in the time domain.
+
+use super::*;
+
+#[test]
+fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_no_foreign_one() {
+    let (dt, n) = (1e-3, 3000);
+    let (mut e1, mut e2) = (noise(1, 6e-4), noise(2, 6e-4));
+    let inertia = Parameters::PAPER.i1 + Parameters::PAPER.i2;
+    let (gain, damping) = (inertia * 900.0, inertia * 42.0);
+    let wanted = |k: usize| 0.2 * ((k.min(2 * n / 3) as f64 * dt).rem_euclid(1.0) - 0.5).abs();
+    let (mut x, mut v, mut before) = (wanted(0), 0.0, wanted(0));
+    let (mut torque, mut x1, mut x2) = (vec![], vec![], vec![]);
+    for k in 0..n {
+        let seen = x + e1();
+        x1.push(seen);
+        x2.push(x + e2());
+        let t = if k < 2 * n / 3 { gain * (wanted(k) - seen) - damping * (seen - before) / dt } else { 0.0 };
+        before = seen;
+        torque.push(t);
+        v = if k < 2 * n / 3 { v + t / inertia * dt } else { 0.9 * v };
+        x += v * dt;
+    }
+    let input = Input { dt, torque: Some(&torque), theta1: Some(&x1), theta2: Some(&x2), ..Input::default() };
+    let found = examine(&input);
+    assert!(found.find("stuck").is_none() && found.find("foreign").is_none(), "{:#?}", found.findings);
+}
+
+#[test]
+fn the_inertia_of_a_pendulum_under_friction_is_read_from_a_few_slow_swings() {
+    let (dt, n) = (5e-3, 1200);
+    let (inertia, weight, friction) = (7.0, 470.0, 60.0);
+    let mut e = noise(3, 2e-4);
+    let motion =
+        |t: f64| (1.1 * (2.1 * t).sin() + 0.5 * (5.3 * t).sin(), 2.31 * (2.1 * t).cos() + 2.65 * (5.3 * t).cos());
+    let acceleration = |t: f64| -4.851 * (2.1 * t).sin() - 14.045 * (5.3 * t).sin();
+    let at = |k: usize| k as f64 * dt;
+    let x: Vec<f64> = (0..n).map(|k| motion(at(k)).0 + e()).collect();
+    let torque: Vec<f64> = (0..n)
+        .map(|k| {
+            let (x, v) = motion(at(k));
+            inertia * acceleration(at(k)) + weight * x.sin() + friction * v.signum()
+        })
+        .collect();
+    let input = Input { dt, torque: Some(&torque), theta1: Some(&x), ..Input::default() };
+    let found = examine(&input);
+    // Roughly: a weight that swings 90 degrees is no spring.
+    let told = found.inertia.expect("an inertia") / inertia;
+    assert!((0.7..1.5).contains(&told), "{told}");
+}
+
+/// Two slow moves to and fro along `s(10 - 15 s + 6 s^2)s^2`, of which averaged spectra show few lines or none, and the torque that the
+/// equation of motion gives for them beside Coulomb and viscous friction; noise on both encoders.
+pub(super) fn slow_moves() -> Columns {
+    let p = Parameters::PAPER;
+    let (dt, duration, way) = (1e-3, 0.5, 1.5);
+    let samples = (duration / dt) as usize;
+    let inertia = p.i1 + p.i2;
+    // The largest torque of acceleration; friction is half of it, the current's noise a hundredth.
+    let largest = inertia * 10.0 / 3.0_f64.sqrt() * way / (duration * duration);
+    let (mut torque, mut x1) = (Vec::new(), Vec::new());
+    let mut e = noise(17, 1e-5);
+    let mut of_current = noise(18, 0.01 * largest);
+    for (start, sense) in [(0.0, 1.0), (way, -1.0), (0.0, 1.0), (way, -1.0)] {
+        for k in 0..samples {
+            let s = k as f64 / samples as f64;
+            let x = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+            let v = 30.0 * s * s * (1.0 - s).powi(2) / duration;
+            let a = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration.powi(2);
+            let of = |y: f64| sense * way * y;
+            x1.push(start + of(x));
+            torque.push(inertia * of(a) + 0.01 * largest * of(v) + 0.5 * largest * of(v).signum() + of_current());
+        }
+    }
+    let x2 = x1.iter().map(|x| x + e()).collect();
+    let x1 = x1.iter().map(|x| x + e()).collect();
+    Columns { dt, v: [torque, x1, Vec::new(), x2, Vec::new()] }
+}
+
+#[test]
+fn a_torque_that_friction_and_inertia_explain_in_time_is_followed_and_another_is_not() {
+    // Noise of the encoder from sample to sample as large as the motion: a few lines stand above it.
+    let mut e = noise(23, 2e-3);
+    let mut columns = slow_moves();
+    columns.v[1].iter_mut().for_each(|x| *x += e());
+    assert!(rigid::explained_in_time(&columns.motor_only()));
+    let own = columns.v[0].clone();
+    columns.v[0].iter_mut().for_each(|t| *t = -*t);
+    assert!(!rigid::explained_in_time(&columns.motor_only()), "it brakes the wrong way");
+    let n = own.len();
+    columns.v[0] = (0..n).map(|k| own[(k + n / 8) % n]).collect();
+    assert!(!rigid::explained_in_time(&columns.motor_only()), "an eighth of the record late");
+}
+
+#[test]
+fn a_weight_that_pushes_away_from_rest_is_followed_without_friction_and_one_turned_round_is_not() {
+    // On a hinge, half a turn about where the weight stands above the axis.
+    let (inertia, weight) = (0.1, 2.0);
+    let parts = [(0.6, 3.0, 0.0), (0.3, 7.0, 1.0)];
+    let time = |k: usize| k as f64 * 2e-3;
+    let mut e = noise(29, 3e-4);
+    let at = |k: usize| parts.iter().map(|(a, w, p)| a * (w * time(k) + p).sin()).sum::<f64>();
+    let rate = |k: usize| -parts.iter().map(|(a, w, p)| a * w * w * (w * time(k) + p).sin()).sum::<f64>();
+    let torque = (0..1024).map(|k| inertia * rate(k) - weight * at(k).sin()).collect();
+    let x1 = (0..1024).map(|k| at(k) + e()).collect();
+    let mut columns = Columns { dt: 2e-3, v: [torque, x1, Vec::new(), Vec::new(), Vec::new()] };
+    assert!(rigid::explained_in_time(&columns.motor_only()));
+    columns.v[0].iter_mut().for_each(|t| *t = -*t);
+    assert!(!rigid::explained_in_time(&columns.motor_only()), "its inertia is none");
+}
+
+#[test]
+fn slow_moves_under_friction_tell_sign_and_unit_of_torque_and_table() {
+    let looked_at = |change: &dyn Fn(&mut Columns)| {
+        let mut columns = slow_moves();
+        change(&mut columns);
+        let two = Input { nominal: Some(NOMINAL), ..columns.positions() };
+        let rigid = Nominal { structure: Structure::Rigid, ..NOMINAL };
+        let one = Input { nominal: Some(rigid), ..columns.motor_only() };
+        [refused(&two), refused(&one)]
+    };
+    let torque = |by: f64| looked_at(&|c| c.v[0].iter_mut().for_each(|t| *t *= by));
+    let table = |by: f64| looked_at(&|c| c.v[3].iter_mut().for_each(|x| *x *= by))[0].clone();
+    assert_eq!(torque(1.0), [Vec::<&str>::new(), Vec::new()]);
+    assert_eq!(torque(-1.0), [["sign"], ["sign"]]);
+    for by in [1000.0, 1e-3, 57.3, 8.0 * std::f64::consts::PI] {
+        assert_eq!(torque(by), [["units"], ["units"]], "{by}");
+    }
+    assert_eq!(table(-1.0), ["sign"]);
+    assert_eq!(table(57.3), ["units"]);
+}

@@ -1,0 +1,146 @@
+//! The table's encoder beside the motor's: its sign, its unit, and what moves the table beside the coupling.
+
+use super::*;
+use crate::examine::motor_side::coupling_explains_torque;
+
+#[test]
+fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_period_too() {
+    let sound = axis(Kind::Schroeder, 2048, 1, &Settings::default(), 1e-4);
+    let found = |by: f64| {
+        let mut columns = sound.clone();
+        columns.v[3].iter_mut().for_each(|v| *v *= by);
+        refused(&Input { nominal: Some(NOMINAL), ..columns.positions() })
+    };
+    assert_eq!(found(1.0), [""; 0]);
+    assert!(found(-1.0).contains(&"sign"), "{:?}", found(-1.0));
+    assert!(found(57.3).contains(&"units"), "{:?}", found(57.3));
+}
+
+#[test]
+fn a_table_that_goes_five_times_as_far_as_its_motor_is_refused_and_one_that_goes_half_as_far_told() {
+    for (factor, severity) in [(5.0, Severity::Refuse), (0.5, Severity::Warn)] {
+        let mut c = plain();
+        c.v[3].iter_mut().for_each(|v| *v *= factor);
+        let found = examine(&Input { nominal: Some(NOMINAL), ..c.positions() });
+        assert_eq!(found.find("scale").map(|f| f.severity), Some(severity), "{factor}: {:#?}", found.findings);
+    }
+}
+
+#[test]
+fn the_twist_in_the_tables_place_is_found_either_way_round_and_whatever_acts_on_the_table() {
+    for settings in [
+        Settings::default(),
+        effect("coulomb_table", &[("level", 0.002)]),
+        effect("coulomb_motor", &[("level", 0.002)]),
+    ] {
+        for sign in [1.0, -1.0] {
+            let mut c = axis(Kind::RandomPhase, 4096, 2, &settings, 1e-5);
+            c.v[3] = c.v[1].iter().zip(&c.v[3]).map(|(a, b)| sign * (a - b)).collect();
+            let found = examine(&Input { nominal: Some(NOMINAL), ..c.positions() });
+            let finding = found.find("twist").unwrap_or_else(|| panic!("{sign}: {:#?}", found.findings));
+            assert_eq!(finding.severity, Severity::Refuse);
+            let way_out = if sign > 0.0 { "theta1 less it" } else { "theta1 plus it" };
+            assert!(finding.remedy.contains(way_out), "{sign}: {finding:#?}");
+        }
+    }
+}
+
+#[test]
+fn a_table_that_friction_holds_has_no_broken_encoder_and_one_that_moves_has() {
+    let held = axis(Kind::Schroeder, 4096, 4, &effect("coulomb_table", &[("level", 0.05)]), 1e-5);
+    let looked_at = |columns: &Columns| refused(&Input { nominal: Some(NOMINAL), ..columns.positions() });
+    assert_eq!(looked_at(&held), [""; 0]);
+    let mut dead = axis(Kind::Schroeder, 4096, 4, &Settings::default(), 1e-5);
+    dead.v[3].clone_from(&held.v[3]);
+    assert!(looked_at(&dead).contains(&"foreign"), "{:?}", looked_at(&dead));
+}
+
+#[test]
+fn what_moves_the_table_beside_its_coupling_is_no_unit_and_no_sign() {
+    // A light table on a soft coupling, on which a weight above its hinge pulls nearly as hard as the coupling holds it: slowly it goes
+    // seven times as far as the motor, which friction brakes.
+    let p = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5.5e-4, k: 0.0176, rho: 1.0 };
+    let nominal = Some(Nominal { structure: Structure::TwoInertia, parameters: p });
+    let looked_at = |x: &Columns| refused(&Input { nominal, ..x.positions() });
+    let (dt, far) = (2e-3, 7.0);
+    let parts: Vec<(f64, f64, f64)> =
+        (1..30).map(f64::from).map(|i| (0.02 / i.powf(1.5), 2.0 * i, 1.3 * i * i)).collect();
+    let of = |t: f64, n: i32| -> f64 { parts.iter().map(|(a, w, p)| a * w.powi(n) * (w * t + p).sin()).sum() };
+    let rate = |t: f64| -> f64 { parts.iter().map(|(a, w, p)| a * w * (w * t + p).cos()).sum() };
+    let mut e = noise(41, 1e-5);
+    let mut columns = Columns { dt, v: Default::default() };
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * dt;
+        let twisted = (1.0 - far) * (p.k * of(t, 0) + p.b * rate(t));
+        columns.v[0].push(-p.i1 * of(t, 2) + twisted + 0.002 * rate(t).signum());
+        columns.v[1].push(of(t, 0) + e());
+        columns.v[3].push(far * of(t, 0) + e());
+    }
+    assert_eq!(looked_at(&columns), [""; 0]);
+    // The same where the table goes with the motor and is logged in degrees.
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * dt;
+        columns.v[0][k as usize] -= (1.0 - far) * (p.k * of(t, 0) + p.b * rate(t));
+        columns.v[3][k as usize] = of(t, 0).to_degrees() + e();
+    }
+    assert_eq!(looked_at(&columns), ["units"]);
+}
+
+#[test]
+fn a_torque_on_the_table_that_the_drive_brakes_is_no_sign_turned_round() {
+    let p = Parameters::PAPER;
+    let (dt, inertia) = (1e-3, p.i1 + p.i2);
+    let parts: Vec<(f64, f64, f64)> = (1..30).map(f64::from).map(|i| (0.5 / i.powi(2), 2.0 * i, 1.3 * i * i)).collect();
+    let way = |t: f64| -> f64 { parts.iter().map(|(a, w, p)| a * (w * t + p).sin()).sum() };
+    let rate = |t: f64| -> f64 { -parts.iter().map(|(a, w, p)| a * w * w * (w * t + p).sin()).sum::<f64>() };
+    let logged = |foreign: f64| {
+        let mut e = noise(43, 1e-7);
+        let mut columns = Columns { dt, v: Default::default() };
+        for k in 0..8192_u32 {
+            let t = f64::from(k) * dt;
+            // The foreign torque moves so many times the axis' inertia; the drive holds the rest of it back.
+            columns.v[0].push((1.0 - foreign) * inertia * rate(t));
+            columns.v[1].push(way(t) + e());
+            columns.v[3].push(way(t) - (p.i2 - foreign * inertia) * rate(t) / p.k + e());
+        }
+        columns
+    };
+    let looked_at = |x: &Columns| refused(&Input { nominal: Some(NOMINAL), ..x.positions() });
+    assert_eq!(looked_at(&logged(0.0)), [""; 0]);
+    assert_eq!(looked_at(&logged(2.5)), [""; 0]);
+    let mut turned = logged(0.0);
+    turned.v[0].iter_mut().for_each(|t| *t = -*t);
+    assert_eq!(looked_at(&turned), ["sign"]);
+}
+
+#[test]
+fn a_motor_feels_its_own_table_whatever_swings_that_and_no_other_axis() {
+    // A soft coupling: the table hardly shows in what the torque moves.
+    let p = Parameters { k: 4.0 * Parameters::PAPER.i1, ..Parameters::PAPER };
+    let dt = 1e-3;
+    let swings = |seed: u64| -> Vec<[f64; 3]> {
+        let mut random = noise(seed, 1.0);
+        let parts: Vec<[f64; 2]> = (0..40).map(|_| [random(), random()]).collect();
+        let at = |t: f64| {
+            parts.iter().fold([0.0; 3], |[x, v, a], [frequency, phase]| {
+                let w = 20.0 + 5.0 * frequency;
+                let (sin, cos) = (w * t + 9.0 * phase).sin_cos();
+                [x + 0.01 * sin, v + 0.01 * w * cos, a - 0.01 * w * w * sin]
+            })
+        };
+        (0..16_384).map(|k| at(f64::from(k) * dt)).collect()
+    };
+    let (motor, table, another) = (swings(51), swings(52), swings(53));
+    let mut e = noise(44, 1e-9);
+    let mut columns = Columns { dt, v: Default::default() };
+    for ([x1, v1, a1], [x2, v2, _]) in motor.iter().zip(&table) {
+        columns.v[0].push(p.i1 * a1 + p.b * (v1 - v2) + p.k * (x1 - x2));
+        columns.v[1].push(x1 + e());
+        columns.v[3].push(x2 + e());
+    }
+    let nominal = Nominal { parameters: p, ..NOMINAL };
+    let feels = |x: &Columns| coupling_explains_torque(&Input { nominal: Some(nominal), ..x.positions() });
+    assert!(feels(&columns));
+    columns.v[3] = another.iter().map(|[x, ..]| x + e()).collect();
+    assert!(!feels(&columns));
+}
