@@ -387,7 +387,7 @@ impl Search<'_> {
 /// often machines have it. Friction is named that explains half of what is left without it, a spring is not.
 fn beside_remainder(effect: Effect, decisive: f64) -> f64 {
     let odds = effect.info().odds;
-    odds * decisive / (odds * decisive + 1.0 - decisive)
+    odds * decisive / (odds * decisive + (1.0 - decisive))
 }
 
 /// Whether a fit has an effect of the family of this one.
