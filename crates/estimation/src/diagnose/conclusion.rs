@@ -18,11 +18,9 @@ use crate::numerics::distribution::of_log_odds;
 const GAIN_LIKENESS: f64 = 0.25;
 /// Smallest relative change of the parameters that is called one.
 const GAIN_SEEN: f64 = 0.02;
-/// Share of the gap's power that the causes must explain together to be called its causes.
+/// Share of the gap's power that the causes must explain together to be called its causes, and of the torque beside what is left: where a
+/// quarter of it is not understood, what the rest shows is a suspect.
 const EXPLAINED: f64 = 0.75;
-/// Share of the torque that may be left beside a cause that is named: where a quarter of it is not understood, what the rest shows is a
-/// suspect.
-const LEFT: f64 = 0.25;
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
@@ -205,7 +203,7 @@ impl Search<'_> {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             return self.conclude(given, parameters, told, pool);
         }
-        let understood = left <= LEFT && (settled || explained >= EXPLAINED);
+        let understood = left <= 1.0 - EXPLAINED && (settled || explained >= EXPLAINED);
         if chosen.terms.len() > 1
             && open.is_none()
             && let Some(least) = least

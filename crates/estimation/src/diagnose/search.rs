@@ -26,7 +26,7 @@ use crate::hypothesis::starts::{Look, StartPoint};
 
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
-/// Effects whose richer forms are looked at, too.
+/// Effects whose richer forms are looked at, too, and hypotheses of each size that are gone on from beside the chosen way.
 const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
@@ -34,8 +34,6 @@ const MOST: usize = 5;
 const BUDGET: u64 = 150_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
-/// Hypotheses of each size that are gone on from beside the chosen way: as many as effects that are promising.
-const BESIDE: usize = PROMISING;
 /// Simulated steps from which no further one is: a dozen seconds on two cores.
 const BUDGET_BESIDE: u64 = 40_000_000;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
@@ -353,7 +351,7 @@ impl Search<'_> {
         of_size.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
         let mut likeliest: Vec<Fit> = Vec::new();
         for fit in of_size {
-            if likeliest.len() < BESIDE && likeliest.iter().all(|l| l.effects() != fit.effects()) {
+            if likeliest.len() < PROMISING && likeliest.iter().all(|l| l.effects() != fit.effects()) {
                 likeliest.push(fit.clone());
             }
         }

@@ -12,10 +12,12 @@ pub fn compared(c: &Comparison) -> String {
     let share = |x: f64| format!("{:.3} %", 100.0 * x);
     let mut out = format!("{}: reference results, within {} of the range\n", c.file, share(c.tolerance));
     let width = c.variables.iter().map(|v| v.name.chars().count()).max().unwrap_or(0);
+    // A time that was added up is told without its rounding.
+    let nanoseconds = |t: f64| (t * 1e9).round() / 1e9;
     for v in &c.variables {
         let verdict = if v.passes(c.tolerance) { "within" } else { "OUTSIDE" };
         let name: String = v.name.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect();
-        let _ = writeln!(out, "  {name:<width$}  {verdict:<7}  {:>10} at {} s", share(v.worst), v.at);
+        let _ = writeln!(out, "  {name:<width$}  {verdict:<7}  {:>10} at {} s", share(v.worst), nanoseconds(v.at));
     }
     for note in &c.notes {
         let _ = writeln!(out, "  note: {note}");
