@@ -319,16 +319,16 @@ impl Search<'_> {
         Some(Confusable { named: effect, other: constant, difference })
     }
 
-    /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best.
+    /// Share of the gap's power beyond the noise that the hypothesis explains, in the equation that shows it best or of all of the torque:
+    /// a table's encoder shows a little of a torque far above its noise, and what that is may be no part of the cause.
     fn explained(&self, parameters: &Fit, chosen: &Fit) -> f64 {
-        let (before, after) = (self.band().discrepancy(&parameters.rows), self.band().discrepancy(&chosen.rows));
-        let i = (0..self.band().equations())
-            .max_by(|a, b| {
-                let seen = |i: usize| before[i] / self.band().noise_power(i).max(f64::MIN_POSITIVE);
-                seen(*a).total_cmp(&seen(*b))
-            })
-            .unwrap_or(0);
-        if before[i] > 0.0 { (1.0 - after[i] / before[i]).clamp(0.0, 1.0) } else { 1.0 }
+        let band = self.band();
+        let (before, after) = (band.discrepancy(&parameters.rows), band.discrepancy(&chosen.rows));
+        let share = |before: f64, after: f64| if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 1.0 };
+        let seen = |i: &usize| before[*i] / band.noise_power(*i).max(f64::MIN_POSITIVE);
+        let best = (0..band.equations()).max_by(|a, b| seen(a).total_cmp(&seen(b))).unwrap_or(0);
+        let torque = |s| band.torque_rms(s).powi(2);
+        share(before[best], after[best]).max(share(torque(before), torque(after)))
     }
 
     /// Each set of effects once, in its best forms, best first, with its probability.
