@@ -25,7 +25,6 @@ mod lost;
 pub mod machine;
 mod mat;
 mod missing;
-pub mod numerics;
 mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;

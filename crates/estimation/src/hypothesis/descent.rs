@@ -15,7 +15,6 @@ use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scatter;
 use super::tracking::Bandwidth;
 use crate::axis::Structure;
-use crate::trace::numerics::dot;
 
 /// Steps tried, each shorter than the one before, until one is better.
 const TRIALS: usize = 7;
@@ -285,8 +284,9 @@ impl<'a> Descent<'a> {
         let residual = white(&at.rows.rows);
         let series: Vec<scatter::Series> = columns.iter().map(|c| band.whitened_in_time(c)).collect();
         let per_bin = 2 * band.equations();
+        let dot = |(a, b): (&[f64], &[f64])| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let by_bin = |a: &[f64], b: &[f64]| -> Vec<f64> {
-            a.chunks_exact(per_bin).zip(b.chunks_exact(per_bin)).map(|(a, b)| dot(a, b)).collect()
+            a.chunks_exact(per_bin).zip(b.chunks_exact(per_bin)).map(dot).collect()
         };
         let information: Vec<Vec<f64>> = columns.iter().map(|c| by_bin(c, c)).collect();
         let mut scores: Vec<Vec<f64>> = columns.iter().map(|c| by_bin(c, &residual)).collect();
@@ -407,6 +407,7 @@ impl Normal {
         let whiten = |rows: &[Vec<C>; 2]| problem.band.whiten(rows, &at.rows.weights, at.s);
         let z = whiten(&at.rows.rows);
         let j: Vec<Vec<f64>> = columns.iter().map(whiten).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut a = DMatrix::from_fn(k, k, |p, q| if p <= q { dot(&j[p], &j[q]) } else { 0.0 });
         a.fill_lower_triangle_with_upper_triangle();
         let mut g = DVector::from_fn(k, |p, _| -dot(&j[p], &z));

@@ -9,7 +9,6 @@ use super::scales::{Scales, slow};
 
 use crate::axis::Structure;
 use crate::effects::{Place, Role, Scale, Settings, Start};
-use crate::trace::numerics::dot;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -137,6 +136,9 @@ impl Regression {
     }
 }
 
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
 fn orthogonalise(q: &[Vec<f64>], v: &mut [f64]) {
     for _ in 0..2 {
         for u in q {
