@@ -58,6 +58,13 @@ pub struct Confusable {
     pub difference: f64,
 }
 
+/// A hypothesis without one of its effects.
+struct Nested {
+    fit: Fit,
+    /// Whether it was fitted for the verdict, from where the hypothesis stands.
+    refitted: bool,
+}
+
 /// The decision.
 #[derive(Debug, Clone)]
 pub struct Decision {
@@ -146,15 +153,20 @@ impl Search<'_> {
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
             return self.conclude(given, parameters, simple, pool);
         }
+        // What is below two of its standard errors, everything free, is no cause.
+        let determined = |i: usize| !is_undetermined(&finished, chosen.terms[i].0, independent);
+        let nested: Vec<Option<Nested>> = (0..chosen.terms.len())
+            .map(|i| determined(i).then(|| self.nested(&chosen, i, &parameters, &pool)).flatten())
+            .collect();
         let decisive: Vec<f64> = (0..chosen.terms.len())
             .map(|i| {
                 let effect = chosen.terms[i].0;
-                // What is below two of its standard errors, everything free, is no cause.
-                if is_undetermined(&finished, effect, independent) {
-                    return 0.0;
-                }
-                let steady = steadiness(&finished, effect, independent);
-                beside_remainder(effect, steady * self.decisive(&chosen, i, &parameters, &pool))
+                let decisive = match &nested[i] {
+                    Some(without) => self.decisive(&chosen, &without.fit),
+                    None if determined(i) => 1.0,
+                    None => 0.0,
+                };
+                beside_remainder(effect, steadiness(&finished, effect, independent) * decisive)
             })
             .collect();
         let twins: Vec<Option<Confusable>> =
@@ -203,36 +215,19 @@ impl Search<'_> {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
             return self.conclude(given, parameters, told, pool);
         }
+        let refitted = |i: usize| match &nested[i] {
+            Some(without) if without.refitted => Some(without.fit.clone()),
+            _ => self.refitted(&chosen, i),
+        };
         let understood = left <= 1.0 - EXPLAINED && (settled || explained >= EXPLAINED);
         if chosen.terms.len() > 1
             && open.is_none()
             && let Some(least) = least
             && !likely(&probabilities[least])
-            && let Some(refitted) = self.refitted(&chosen, least)
+            && let Some(refitted) = refitted(least)
         {
-            // What is named without an effect has no rival that has another such effect in it.
-            let pool: Vec<Fit> =
-                ranking.iter().map(|w| &w.fit).filter(|f| f.terms.len() < chosen.terms.len()).cloned().collect();
-            // The likeliest of the shorter: where one as good as it takes an effect's place it is another that is told, and no less explained.
-            let known = nested_fit(&chosen, least, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
-            let plain = known.cloned().unwrap_or(refitted);
-            let own = self.evidence(&plain, independent);
-            let likelier = |f: &&Fit| !f.at_bound && !f.terms.is_empty() && self.evidence(f, independent) > own;
-            let other = pool
-                .iter()
-                .filter(likelier)
-                .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)));
-            let end = |fit: Fit, pool: Vec<Fit>| self.conclude(given.clone(), parameters.clone(), fit, pool);
-            let gone = chosen.terms[least].0;
-            let has_it = |f: &Fit| f.terms.iter().any(|t| t.0 == gone);
-            let mut without = end(other.unwrap_or(&plain).clone(), pool.clone());
-            if other.is_some_and(has_it) {
-                // The likeliest of the shorter keeps what was not likely: where it loses more by it, it goes itself.
-                let told = end(plain, pool.into_iter().filter(|f| !has_it(f)).collect());
-                if told.named() > without.named() {
-                    without = told;
-                }
-            }
+            let without =
+                self.concluded_without(&chosen, least, refitted, &ranking, [&given, &parameters], independent);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
             let others = probabilities.iter().filter(|p| likely(p)).count();
             let is_its_own = inertia_off(&chosen, nominal) < MOVED_BESIDE;
@@ -273,6 +268,46 @@ impl Search<'_> {
         }
     }
 
+    /// The verdict without one of several effects, from the fit without it.
+    fn concluded_without(
+        &self,
+        chosen: &Fit,
+        gone: usize,
+        refitted: Fit,
+        ranking: &[Weighed],
+        [given, parameters]: [&Fit; 2],
+        independent: f64,
+    ) -> Decision {
+        // What is named without an effect has no rival that has another such effect in it.
+        let pool: Vec<Fit> =
+            ranking.iter().map(|w| &w.fit).filter(|f| f.terms.len() < chosen.terms.len()).cloned().collect();
+        // The likeliest of the shorter: where one as good as it takes an effect's place it is another that is told, and no less explained.
+        let known = nested_fit(chosen, gone, &pool).filter(|f| f.log_likelihood > refitted.log_likelihood);
+        let plain = known.cloned().unwrap_or(refitted);
+        let evidence = |f: &Fit| self.evidence(f, independent);
+        let likelier = |f: &&Fit| !f.at_bound && !f.terms.is_empty() && evidence(f) > evidence(&plain);
+        let other = pool.iter().filter(likelier).max_by(|a, b| evidence(a).total_cmp(&evidence(b)));
+        let end = |fit: Fit, pool: Vec<Fit>| self.conclude(given.clone(), parameters.clone(), fit, pool);
+        let effect = chosen.terms[gone].0;
+        let has_it = |f: &Fit| f.terms.iter().any(|t| t.0 == effect);
+        let without = end(other.unwrap_or(&plain).clone(), pool.clone());
+        if !other.is_some_and(has_it) {
+            return without;
+        }
+        // The likeliest of the shorter keeps what was not likely: where it loses more by it, it goes itself.
+        let named = end(plain, pool.into_iter().filter(|f| !has_it(f)).collect());
+        if named.named() > without.named() { named } else { without }
+    }
+
+    /// The fit without one of its effects: the known one, or else from where it stands.
+    fn nested(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> Option<Nested> {
+        let known = if chosen.terms.len() == 1 { Some(parameters) } else { nested_fit(chosen, i, pool) };
+        match known {
+            Some(fit) => Some(Nested { fit: fit.clone(), refitted: false }),
+            None => Some(Nested { fit: self.refitted(chosen, i)?, refitted: true }),
+        }
+    }
+
     /// Whether what a fit leaves may be the error of a measured current, or the encoders' noise.
     fn needs_no_cause(&self, fit: &Fit) -> bool {
         let left = self.left(fit);
@@ -283,14 +318,12 @@ impl Search<'_> {
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
     /// without it: what no effect explains may be what explains this one, too. Less of it where the effect hardly stands out of a
     /// remainder of any colour.
-    fn decisive(&self, chosen: &Fit, i: usize, parameters: &Fit, pool: &[Fit]) -> f64 {
-        let known = if chosen.terms.len() == 1 { Some(parameters) } else { nested_fit(chosen, i, pool) };
-        let Some(plain) = known.cloned().or_else(|| self.refitted(chosen, i)) else { return 1.0 };
+    fn decisive(&self, chosen: &Fit, plain: &Fit) -> f64 {
         let share = |e: usize| {
             let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
             if without > with { (without - with) / without } else { 0.0 }
         };
-        (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, &plain)
+        (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, plain)
     }
 
     /// The constant torque that a friction may be as well, where the motion never goes back: there the law without any shape is one, and
