@@ -454,7 +454,7 @@ impl Search<'_> {
         let mut terms = fit.terms.clone();
         terms.remove(i);
         let bare = || {
-            let at = self.problem.along(&self.bare(fit, i), fit.bandwidth)?;
+            let at = self.problem.along(&self.bare(fit, i), fit.bandwidth, &[])?;
             Some(self.band().log_likelihood(&at.rows, at.s))
         };
         let known = pool.settled(&terms).filter(|k| bare().is_none_or(|l| k.log_likelihood >= l));

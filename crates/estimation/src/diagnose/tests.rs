@@ -11,7 +11,7 @@ use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::{Fit, Problem};
 use crate::hypothesis::model::Model;
-use crate::hypothesis::tracking::{Resolution, track};
+use crate::hypothesis::tracking::{Resolution, track, track_with_perturbations};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -104,6 +104,45 @@ fn named(o: &Outcome) -> Vec<&'static str> {
     let mut ids: Vec<&str> = o.decision.chosen.terms.iter().map(|(e, _)| e.info().family.as_str()).collect();
     ids.sort_unstable();
     ids
+}
+
+#[test]
+fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation() {
+    let mut effects = Settings::default();
+    let on: [(Effect, &[f64]); 6] = [
+        (Effect::CoulombMotor, &[3.0, 0.4, 0.3, 0.1, 0.0]),
+        (Effect::ViscousMotor, &[1.5, 0.0]),
+        (Effect::PreslidingMotor, &[2.0, 0.01, 0.0]),
+        (Effect::Gravity, &[4.0, 0.5]),
+        (Effect::Saturation, &[6.0]),
+        (Effect::Delay, &[3e-3]),
+    ];
+    for (effect, values) in on {
+        effects.of_mut(effect)[..values.len()].copy_from_slice(values);
+    }
+    let record = logged(effects, 1.0, 0.0, |_| 0.0, 5);
+    let model = Model::new(parameters(INERTIA), Structure::Rigid, effects);
+    let bandwidth = [0.2 / DT; 2];
+    let simulated = |m: &Model| track(m, &record, bandwidth, Resolution::Full).expect("a run").torque;
+    let own = simulated(&model);
+    for (effect, i) in on.iter().flat_map(|(e, values)| (0..values.len()).map(|i| (*e, i))) {
+        let mut other = model;
+        let value = &mut other.effects.of_mut(effect)[i];
+        *value += 0.02 * value.abs().max(effect.info().parameters[i].nominal);
+        let (_, along) =
+            track_with_perturbations(&model, &record, bandwidth, Resolution::Full, &[(other, vec![effect])])
+                .expect("a run");
+        // As a hat over some samples sees both: where friction turns they differ by a sample.
+        let smooth = |y: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (50..record.len() - 50).step_by(10).map(|k| (k - 20..k + 20).map(y).sum::<f64>() / 40.0).collect()
+        };
+        let moved = simulated(&other);
+        let (a, b) = (smooth(&|k| along[0][0][k] + along[0][1][k]), smooth(&|k| moved[0][k] - own[0][k]));
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (size, alike) =
+            (product(&a, &b) / product(&b, &b), product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt());
+        assert!((size - 1.0).abs() < 0.05 && alike > 0.99, "{effect:?} {i}: {size} {alike}");
+    }
 }
 
 /// What was tried, for a test that fails.

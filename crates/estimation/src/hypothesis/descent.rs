@@ -13,7 +13,7 @@ use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
 use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scatter;
-use super::tracking::Bandwidth;
+use super::tracking::{Bandwidth, Torques};
 use crate::axis::Structure;
 
 /// Steps tried, each shorter than the one before, until one is better.
@@ -41,6 +41,8 @@ const SHARPENING: usize = 6;
 pub struct Along {
     pub model: Model,
     pub rows: TorqueResidual,
+    /// What a step of each coordinate changes of that, N.m, where it is told along the same motion.
+    pub changes: Vec<Option<Torques>>,
     pub s: Discrepancy,
     pub bandwidth: Bandwidth,
 }
@@ -59,6 +61,8 @@ pub struct Descent<'a> {
     leaves: bool,
     /// What is held in the first steps.
     first: First,
+    /// The bandwidth from which a looser one was no likelier.
+    tight: Option<Bandwidth>,
 }
 
 /// What a descent holds in its first steps: what its start was not found with.
@@ -85,8 +89,9 @@ impl First {
 impl<'a> Descent<'a> {
     pub fn new(problem: &'a Problem<'a>, start: &Model, terms: &'a [Term], from: Discrepancy) -> Option<Self> {
         let free = problem.free(terms);
-        let coordinates = free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
-        let at = problem.along(start, problem.bandwidth(from))?;
+        let coordinates: Vec<Coordinate> =
+            free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
+        let at = problem.along(start, problem.bandwidth(from), &coordinates)?;
         Some(Self {
             problem,
             terms,
@@ -97,6 +102,7 @@ impl<'a> Descent<'a> {
             iterations: 0,
             leaves: false,
             first: First::Sizes,
+            tight: None,
         })
     }
 
@@ -106,12 +112,19 @@ impl<'a> Descent<'a> {
             problem,
             terms: &fit.terms,
             coordinates: fit.coordinates.clone(),
-            at: Along { model: fit.model, rows: fit.rows.clone(), s: fit.discrepancy, bandwidth: fit.bandwidth },
+            at: Along {
+                model: fit.model,
+                rows: fit.rows.clone(),
+                changes: Vec::new(),
+                s: fit.discrepancy,
+                bandwidth: fit.bandwidth,
+            },
             std: fit.std.clone(),
             columns: fit.columns.clone(),
             iterations: fit.iterations,
             leaves: fit.at_bound,
             first: First::Sizes,
+            tight: None,
         }
     }
 
@@ -134,7 +147,8 @@ impl<'a> Descent<'a> {
             if !differ(bandwidth, self.at.bandwidth) {
                 break;
             }
-            let mut other = Self { at: self.problem.along(&self.at.model, bandwidth)?, ..self.clone() };
+            let mut other =
+                Self { at: self.problem.along(&self.at.model, bandwidth, &self.coordinates)?, ..self.clone() };
             other.steps(SHARPENING, false)?;
             if other.log_likelihood() <= self.log_likelihood() + WORTH {
                 break;
@@ -214,20 +228,21 @@ impl<'a> Descent<'a> {
                 }
                 continue;
             }
-            if let Some(rows) = problem.rows(&model, at.bandwidth, Some(at.rows.weighed_at)) {
+            let weighed_at = Some(at.rows.weighed_at);
+            if let Some((rows, changes)) = problem.rows_and_changes(&model, at.bandwidth, weighed_at, coordinates) {
                 let s = band.rescaled(at.s, &at.model, &model);
                 let after = cost(&rows, s, &y);
                 if after < before {
                     *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
-                    next = Some((model, rows, s, before - after));
+                    next = Some((model, rows, changes, s, before - after));
                     break;
                 }
             }
             *damping = (10.0 * *damping).max(1e-3);
         }
         self.leaves = leaves;
-        Some(next.map(|(model, rows, s, gain)| {
-            (self.at.model, self.at.rows, self.at.s) = (model, rows, s);
+        Some(next.map(|(model, rows, changes, s, gain)| {
+            self.at = Along { model, rows, changes, s, bandwidth: self.at.bandwidth };
             gain
         }))
     }
@@ -250,7 +265,7 @@ impl<'a> Descent<'a> {
     /// The same, and how the density of readings grows with each coordinate at each bin; nothing with those that no stiffness has in it.
     fn normal_with_growth(&mut self, x: &[f64], share: f64) -> Option<(Normal, Vec<Vec<f64>>)> {
         let (problem, band, coordinates, at) = (self.problem, self.problem.band, &self.coordinates, &self.at);
-        self.columns = problem.columns(&at.model, coordinates, &at.rows, at.bandwidth)?;
+        self.columns = problem.columns(at, coordinates)?;
         scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
         let stiffens = of_the_stiffness(coordinates, x);
         let grows = band.score(&at.model, &at.rows, at.s, &stiffens, &mut self.columns);
@@ -268,6 +283,8 @@ impl<'a> Descent<'a> {
     pub fn standard_errors(&mut self, independent: f64) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
+        // What a value changes of the motion counts here, too.
+        self.at.changes.clear();
         let (normal, growth) = self.normal_with_growth(&x, share)?;
         let (_, errors) = normal.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
         let scatter = self.scatter(&normal, &growth);
@@ -297,21 +314,31 @@ impl<'a> Descent<'a> {
             .map(|scores| scatter::standard_errors(scores, &normal.a))
     }
 
-    /// Follows the record at another bandwidth where that is likelier.
+    /// Follows the record at another bandwidth where that is likelier: at a looser one, tried once from each, or at that of the discrepancy.
     fn follow(&mut self) -> bool {
         let (problem, at) = (self.problem, &mut self.at);
         let least = problem.bandwidth([0.0; 2]);
         let own = problem.band.log_likelihood(&at.rows, at.s);
-        for bandwidth in [[0, 1].map(|i| (LOOSER * at.bandwidth[i]).max(least[i])), problem.bandwidth(at.s)] {
+        let looser = [0, 1].map(|i| (LOOSER * at.bandwidth[i]).max(least[i]));
+        let again = self.tight.is_none_or(|tight| differ(tight, at.bandwidth));
+        for bandwidth in again.then_some(looser).into_iter().chain([problem.bandwidth(at.s)]) {
+            let weighed_at = Some(at.rows.weighed_at);
             if differ(bandwidth, at.bandwidth)
-                && let Some(rows) = problem.rows(&at.model, bandwidth, Some(at.rows.weighed_at))
+                && let Some((rows, changes)) =
+                    problem.rows_and_changes(&at.model, bandwidth, weighed_at, &self.coordinates)
                 && problem.band.log_likelihood(&rows, at.s) > own + WORTH
             {
-                (at.rows, at.bandwidth) = (rows, bandwidth);
+                (at.rows, at.changes, at.bandwidth) = (rows, changes, bandwidth);
                 return true;
             }
         }
+        self.tight = Some(at.bandwidth);
         false
+    }
+
+    /// What each coordinate changes of what the model lacks here.
+    pub fn columns(&self) -> Option<Vec<[Vec<C>; 2]>> {
+        self.problem.columns(&self.at, &self.coordinates)
     }
 
     pub fn done(self) -> Fit {

@@ -12,7 +12,7 @@ use super::discrepancy::Discrepancy;
 use super::likelihood::{Band, C, Motion, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scales::Scales;
-use super::tracking::{Bandwidth, Resolution, Tracked, parts, track};
+use super::tracking::{Bandwidth, Resolution, Torques, Tracked, parts, track, track_with_perturbations};
 use crate::axis::Structure;
 use crate::conditioning::Record;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
@@ -199,7 +199,11 @@ impl Problem<'_> {
     /// What a model lacks, beside what hidden inertias began with as it is at a discrepancy.
     pub fn rows(&self, model: &Model, bandwidth: Bandwidth, weighed_at: Option<Discrepancy>) -> Option<TorqueResidual> {
         let tracked = self.track(model, bandwidth)?;
-        Some(PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, &tracked, weighed_at, planner)))
+        Some(self.residual(model, &tracked, weighed_at))
+    }
+
+    fn residual(&self, model: &Model, tracked: &Tracked, weighed_at: Option<Discrepancy>) -> TorqueResidual {
+        PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, tracked, weighed_at, planner))
     }
 
     /// Step of a coordinate for its column.
@@ -225,39 +229,54 @@ impl Problem<'_> {
     }
 
     /// What each coordinate changes of what a model lacks. The axis' own parameters act along the motion as measured, which is the model's
-    /// own nearly; where it is not, all is simulated.
-    pub fn columns(
-        &self,
-        model: &Model,
-        coordinates: &[Coordinate],
-        residual: &TorqueResidual,
-        bandwidth: Bandwidth,
-    ) -> Option<Vec<[Vec<C>; 2]>> {
-        let x: Vec<f64> = coordinates.iter().map(|c| c.x(model)).collect();
-        let has = |of: fn(&Effect) -> bool| EFFECTS.iter().any(|e| of(e) && model.effects.is_on(*e));
-        // A coupling with play does not pull by its twist alone.
-        let linear = !has(|e| e.info().place == Place::Coupling);
-        // What a third inertia began with is taken out of what any change lacks, too.
-        let settles = has(|e| e.is_mode());
-        let motion = self.motion.as_ref().filter(|_| !settles);
+    /// own nearly, effects along the model's own where that is told ([`Self::perturbed`]); all else is simulated.
+    pub fn columns(&self, at: &Along, coordinates: &[Coordinate]) -> Option<Vec<[Vec<C>; 2]>> {
+        let motion = self.motion.as_ref().filter(|_| !has_mode(&at.model));
         (0..coordinates.len())
             .into_par_iter()
             .map(|i| {
-                if let (Free::Base(p), Some(motion)) = (coordinates[i].free, motion)
-                    && (linear || matches!(p, BaseParameter::I1 | BaseParameter::I2))
+                let c = &coordinates[i];
+                let x = c.x(&at.model);
+                let along = at.changes.get(i).and_then(Option::as_ref).map(|change| {
+                    let by = 1.0 / self.step_within(c, &at.model);
+                    PLANNER.with_borrow_mut(|planner| self.band.rows(change, by, planner))
+                });
+                if let (Free::Base(p), Some(motion)) = (c.free, motion)
+                    && (along.is_some() || coupling_effects(&at.model).next().is_none() || is_inertia(p))
                 {
-                    return Some(self.band.base_column(p, motion, coordinates[i].slope(x[i])));
+                    let own = self.band.base_column(p, motion, c.slope(x));
+                    return Some(along.map_or_else(|| own.clone(), |along| sum(&own, &along)));
                 }
-                let mut h = self.step(&coordinates[i], model);
-                if x[i] + h > coordinates[i].bounds[1] {
-                    h = -h;
+                if along.is_some() {
+                    return along;
                 }
-                let mut y = x.clone();
-                y[i] += h;
-                let moved = self.rows(&model.at(coordinates, &y), bandwidth, Some(residual.weighed_at))?;
-                Some([0, 1].map(|e| moved.rows[e].iter().zip(&residual.rows[e]).map(|(a, b)| (a - b) / h).collect()))
+                let h = self.step_within(c, &at.model);
+                let moved = self.rows(&moved(&at.model, c, h), at.bandwidth, Some(at.rows.weighed_at))?;
+                Some([0, 1].map(|e| moved.rows[e].iter().zip(&at.rows.rows[e]).map(|(a, b)| (a - b) / h).collect()))
             })
             .collect()
+    }
+
+    /// The step of a coordinate for its column, inside its bounds.
+    fn step_within(&self, c: &Coordinate, model: &Model) -> f64 {
+        let h = self.step(c, model);
+        if c.x(model) + h > c.bounds[1] { -h } else { h }
+    }
+
+    /// The model with a coordinate a step further, and the effects that it is one of, where what that changes is told along the motion of
+    /// the model: on a rigid axis, and in looks, which go on from there. A fit of two inertias near the noise would not end by it: what an
+    /// effect does to the twist is as large as what is left.
+    fn perturbed(&self, c: &Coordinate, model: &Model) -> Option<(Model, Vec<Effect>)> {
+        let is_near = self.nominal.structure == Structure::Rigid || self.resolution == Resolution::Coarse;
+        self.motion.as_ref().filter(|_| is_near && !has_mode(model))?;
+        let effects: Vec<Effect> = match c.free {
+            Free::Base(p) if is_inertia(p) => Vec::new(),
+            Free::Base(_) => coupling_effects(model).collect(),
+            Free::Effect(e, _) | Free::Loop(e) => {
+                Some(e).filter(|e| e.info().place != Place::Sensor).into_iter().collect()
+            }
+        };
+        (!effects.is_empty()).then(|| (moved(model, c, self.step_within(c, model)), effects))
     }
 
     pub fn log_prior(&self, coordinates: &[Coordinate], x: &[f64]) -> f64 {
@@ -278,14 +297,14 @@ impl Problem<'_> {
         tracked.torque[0].copy_from_slice(&self.record.torque);
         let rows = PLANNER.with_borrow_mut(|planner| self.band.torque_residual(&self.nominal, &tracked, None, planner));
         let s = self.band.discrepancy(&rows);
-        self.unfitted(Along { model: self.nominal, rows, s, bandwidth: self.bandwidth(s) })
+        self.unfitted(Along { model: self.nominal, rows, changes: Vec::new(), s, bandwidth: self.bandwidth(s) })
     }
 
     /// The hypothesis without anything fitted.
     pub fn given(&self, model: &Model) -> Option<Fit> {
-        let mut at = self.along(model, self.bandwidth([f64::MAX; 2]))?;
+        let mut at = self.along(model, self.bandwidth([f64::MAX; 2]), &[])?;
         for _ in 0..2 {
-            at = self.along(model, self.bandwidth(at.s))?;
+            at = self.along(model, self.bandwidth(at.s), &[])?;
         }
         Some(self.unfitted(at))
     }
@@ -295,8 +314,8 @@ impl Problem<'_> {
     pub fn along_the_record(&self, fit: &Fit) -> Fit {
         let bandwidth = self.bandwidth(fit.discrepancy);
         let followed = || {
-            let at = self.along(&fit.model, bandwidth)?;
-            let columns = self.columns(&at.model, &fit.coordinates, &at.rows, bandwidth)?;
+            let at = self.along(&fit.model, bandwidth, &fit.coordinates)?;
+            let columns = self.columns(&at, &fit.coordinates)?;
             Some(Fit { discrepancy: at.s, rows: at.rows, columns, bandwidth, ..fit.clone() })
         };
         if self.resolution == Resolution::Coarse || differ(bandwidth, fit.bandwidth) {
@@ -308,9 +327,9 @@ impl Problem<'_> {
 
     /// The same model with its parameters free, which have not moved.
     pub fn freed(&self, held: &Fit) -> Option<Fit> {
-        let fit = Descent::new(self, &held.model, &held.terms, held.discrepancy)?.done();
-        let columns = self.columns(&fit.model, &fit.coordinates, &fit.rows, fit.bandwidth)?;
-        Some(Fit { columns, ..fit })
+        let descent = Descent::new(self, &held.model, &held.terms, held.discrepancy)?;
+        let columns = descent.columns()?;
+        Some(Fit { columns, ..descent.done() })
     }
 
     fn unfitted(&self, at: Along) -> Fit {
@@ -362,11 +381,30 @@ impl Problem<'_> {
     }
 
     /// A model along the record, and the discrepancy that it leaves.
-    pub fn along(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
-        let mut rows = self.rows(model, bandwidth, None)?;
+    pub fn along(&self, model: &Model, bandwidth: Bandwidth, coordinates: &[Coordinate]) -> Option<Along> {
+        let (mut rows, changes) = self.rows_and_changes(model, bandwidth, None, coordinates)?;
         let s = self.band.discrepancy(&rows);
         self.band.weigh(&mut rows, s);
-        Some(Along { model: *model, rows, s, bandwidth })
+        Some(Along { model: *model, rows, changes, s, bandwidth })
+    }
+
+    /// What a model lacks, and for each coordinate what a step of it changes of that, N.m, where it is told along the same motion.
+    pub fn rows_and_changes(
+        &self,
+        model: &Model,
+        bandwidth: Bandwidth,
+        weighed_at: Option<Discrepancy>,
+        coordinates: &[Coordinate],
+    ) -> Option<(TorqueResidual, Vec<Option<Torques>>)> {
+        let perturbed: Vec<Option<(Model, Vec<Effect>)>> =
+            coordinates.iter().map(|c| self.perturbed(c, model)).collect();
+        let others: Vec<(Model, Vec<Effect>)> = perturbed.iter().flatten().cloned().collect();
+        let steps = self.record.len() * parts(model, self.record, self.resolution);
+        self.steps.fetch_add(steps as u64, Ordering::Relaxed);
+        let (tracked, changes) = track_with_perturbations(model, self.record, bandwidth, self.resolution, &others)?;
+        let mut changes = changes.into_iter();
+        let changes = perturbed.iter().map(|p| p.as_ref().and_then(|_| changes.next())).collect();
+        Some((self.residual(model, &tracked, weighed_at), changes))
     }
 
     /// What an effect costs: one of some fifty, at one of so many lines.
@@ -390,6 +428,29 @@ impl Problem<'_> {
             - k * (k + 1.0) / (n - k - 1.0).max(FEWEST)
             - f.terms.iter().map(|t| self.price(*t)).sum::<f64>()
     }
+}
+
+/// Whether a third inertia is on: what it began with is taken out of what any change lacks, too.
+fn has_mode(model: &Model) -> bool {
+    EFFECTS.iter().any(|e| e.is_mode() && model.effects.is_on(*e))
+}
+
+/// What makes the coupling pull by more than its twist.
+fn coupling_effects(model: &Model) -> impl Iterator<Item = Effect> {
+    EFFECTS.iter().copied().filter(|e| e.info().place == Place::Coupling && model.effects.is_on(*e))
+}
+
+const fn is_inertia(p: BaseParameter) -> bool {
+    matches!(p, BaseParameter::I1 | BaseParameter::I2)
+}
+
+/// The model with a coordinate a step further.
+fn moved(model: &Model, c: &Coordinate, h: f64) -> Model {
+    model.at(std::slice::from_ref(c), &[c.x(model) + h])
+}
+
+fn sum(a: &[Vec<C>; 2], b: &[Vec<C>; 2]) -> [Vec<C>; 2] {
+    [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| a + b).collect())
 }
 
 /// Largest absolute value of a series; zero of an empty one.

@@ -19,7 +19,7 @@ use rustfft::{FftPlanner, num_complex::Complex};
 use super::discrepancy::Discrepancy;
 use super::hidden::{Hidden, Vibration, vibrations};
 use super::model::{BaseParameter, Model};
-use super::tracking::Tracked;
+use super::tracking::{Torques, Tracked};
 use crate::axis::{Parameters, Structure};
 use crate::conditioning::Record;
 use crate::numerics::level::deviation;
@@ -265,18 +265,11 @@ impl Band {
         if self.sight == Sight::Both { 2 } else { 1 }
     }
 
-    /// Spectra of the equations. What hidden inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
-    pub fn torque_residual(
-        &self,
-        model: &Model,
-        tracked: &Tracked,
-        weighed_at: Option<Discrepancy>,
-        planner: &mut FftPlanner<f64>,
-    ) -> TorqueResidual {
-        let torque = &tracked.torque;
+    /// Spectra of the equations of torques on motor and table, times a factor.
+    pub fn rows(&self, torque: &Torques, factor: f64, planner: &mut FftPlanner<f64>) -> [Vec<C>; 2] {
         let mut z: Vec<C> = (0..self.n).map(|k| C::new(torque[0][k], torque[1][k]) * self.taper[k]).collect();
         planner.plan_fft_forward(self.n).process(&mut z);
-        let scale = 1.0 / (self.n as f64).sqrt();
+        let scale = factor / (self.n as f64).sqrt();
         let count = self.omega.len();
         let mut rows = [Vec::with_capacity(count), Vec::with_capacity(count)];
         for m in 0..count {
@@ -291,6 +284,18 @@ impl Band {
                 rows[0].push(u * one + v * two);
             }
         }
+        rows
+    }
+
+    /// Spectra of the equations. What hidden inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
+    pub fn torque_residual(
+        &self,
+        model: &Model,
+        tracked: &Tracked,
+        weighed_at: Option<Discrepancy>,
+        planner: &mut FftPlanner<f64>,
+    ) -> TorqueResidual {
+        let rows = self.rows(&tracked.torque, 1.0, planner);
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };

@@ -15,6 +15,7 @@ pub(crate) mod hidden;
 pub(crate) mod likelihood;
 pub(crate) mod model;
 mod parameters;
+mod perturbation;
 pub(crate) mod scales;
 pub(crate) mod scatter;
 mod series;

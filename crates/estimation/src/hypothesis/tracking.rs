@@ -14,15 +14,19 @@
 
 use super::hidden::Hidden;
 use super::model::Model;
+use super::perturbation::Perturbation;
 use crate::axis::{Axis, Scheme, Structure, substeps_at_speed};
 use crate::conditioning::Record;
-use crate::effects::TorqueHistory;
+use crate::effects::{Effect, Memory, TorqueHistory};
+
+/// Torques at motor and table, N.m, one a sample each.
+pub type Torques = [Vec<f64>; 2];
 
 /// What the model lacks, and the motion it was lacking it along.
 #[derive(Debug, Clone)]
 pub struct Tracked {
     /// Residual torque at motor and table, N.m; the second is zero on a rigid axis.
-    pub torque: [Vec<f64>; 2],
+    pub torque: Torques,
     /// Motion of the model: `[theta1, omega1, theta2, omega2]`.
     pub motion: Vec<[f64; 4]>,
 }
@@ -67,108 +71,138 @@ pub fn parts(model: &Model, record: &Record, resolution: Resolution) -> usize {
 /// Simulates the model held to the record; `None` when it leaves the finite numbers.
 #[must_use]
 pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth, resolution: Resolution) -> Option<Tracked> {
-    Some(track_with(model, record, bandwidth, resolution, &[])?.0)
+    let held = Held { model, record, bandwidth, resolution };
+    Some(held.track(&[], &mut [])?.0)
 }
 
-/// The same, with the effects' internal states at some samples, in order.
-fn track_with(
+/// The same, with what models that differ from it in some effects lack beyond it along the same motion.
+#[must_use]
+pub fn track_with_perturbations(
     model: &Model,
     record: &Record,
     bandwidth: Bandwidth,
     resolution: Resolution,
-    kept: &[usize],
-) -> Option<(Tracked, Vec<crate::effects::Memory<f64>>)> {
-    // What a log holds early is followed with the torque to come.
-    let (model, ahead) = &model.on_time();
-    let mut memories = Vec::with_capacity(kept.len());
-    let n = record.len();
-    let dt = record.dt;
-    let rigid = model.structure == Structure::Rigid;
+    others: &[(Model, Vec<Effect>)],
+) -> Option<(Tracked, Vec<Torques>)> {
+    let held = Held { model, record, bandwidth, resolution };
     let per = parts(model, record, resolution);
-    let h = dt / per as f64;
-    let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
-    let p = &model.parameters;
-    let inertia = if rigid { [p.i1 + p.i2, 0.0] } else { [p.i1, p.i2] };
-    let position = [record.channels[0].as_deref(), record.channels[2].as_deref()];
-    // A logged speed is mostly the position's difference, late: it adds nothing where the position itself is there.
-    let speed = [record.channels[1].as_deref(), record.channels[3].as_deref()];
-    let sides: Vec<usize> = (0..2).filter(|&i| position[i].is_some() || speed[i].is_some()).collect();
-    // From a state that is little known the gain falls, as a Kalman filter's does, to what the bandwidth asks.
-    let gains_at = |k: usize| {
-        bandwidth.map(|w| {
-            let x = (w * dt).max(GROWING / (k + 1) as f64).min(0.6);
-            [x * x, 2.0 * DAMPING * x]
-        })
-    };
-    let first = initial(record);
-    let mut state = axis.resume(first, &model.memory, record.start + ahead);
-    let mut inputs = TorqueHistory::settled(*record.torque.first()?);
-    let sensed = !axis.on().sensors().is_empty();
-    let mut history = sensed.then(|| model.effects.initial_readings(axis.on(), state.reading(), dt));
-    let mut error = [vec![0.0; n], vec![0.0; n]];
-    let mut given = [vec![0.0; n], vec![0.0; n]];
-    let mut motion = Vec::with_capacity(n);
-    let mut before = [f64::NAN; 2];
-    for k in 0..n {
-        let time = record.time(k) + ahead;
-        let reading = match &history {
-            Some(history) => model.effects.transform_sensor(axis.on(), history, dt),
-            None => state.reading(),
+    let mut perturbations: Vec<Perturbation> =
+        others.iter().map(|(other, of)| Perturbation::new([model, other], of, record, per)).collect();
+    let (tracked, _) = held.track(&[], &mut perturbations)?;
+    Some((tracked, perturbations.into_iter().map(Perturbation::into_torques).collect()))
+}
+
+/// A model held to a record.
+struct Held<'a> {
+    model: &'a Model,
+    record: &'a Record,
+    bandwidth: Bandwidth,
+    resolution: Resolution,
+}
+
+impl Held<'_> {
+    /// The torque that it lacks, with the effects' internal states at some samples, in order; perturbations are taken along.
+    fn track(&self, kept: &[usize], perturbations: &mut [Perturbation]) -> Option<(Tracked, Vec<Memory<f64>>)> {
+        let &Self { model, record, bandwidth, resolution } = self;
+        // What a log holds early is followed with the torque to come.
+        let (model, ahead) = &model.on_time();
+        let mut memories = Vec::with_capacity(kept.len());
+        let n = record.len();
+        let dt = record.dt;
+        let rigid = model.structure == Structure::Rigid;
+        let per = parts(model, record, resolution);
+        let h = dt / per as f64;
+        let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
+        let p = &model.parameters;
+        let inertia = if rigid { [p.i1 + p.i2, 0.0] } else { [p.i1, p.i2] };
+        let position = [record.channels[0].as_deref(), record.channels[2].as_deref()];
+        // A logged speed is mostly the position's difference, late: it adds nothing where the position itself is there.
+        let speed = [record.channels[1].as_deref(), record.channels[3].as_deref()];
+        let sides: Vec<usize> = (0..2).filter(|&i| position[i].is_some() || speed[i].is_some()).collect();
+        // From a state that is little known the gain falls, as a Kalman filter's does, to what the bandwidth asks.
+        let gains_at = |k: usize| {
+            bandwidth.map(|w| {
+                let x = (w * dt).max(GROWING / (k + 1) as f64).min(0.6);
+                [x * x, 2.0 * DAMPING * x]
+            })
         };
-        let own = [[reading.theta1, reading.omega1], [reading.theta2, reading.omega2]];
-        let now = state.reading();
-        if kept.get(memories.len()) == Some(&k) {
-            memories.push(*state.memory());
-        }
-        motion.push([now.theta1, now.omega1, now.theta2, now.omega2]);
-        let mut push = [0.0; 2];
-        let gains = gains_at(k);
-        for &i in &sides {
-            let [g1, g2] = gains[i];
-            let d = match (position[i], speed[i]) {
-                (Some(y), _) => {
-                    let e = y[k] - own[i][0];
-                    let rate = if before[i].is_nan() { 0.0 } else { e - before[i] };
-                    before[i] = e;
-                    error[i][k] = e;
-                    g1 * e + g2 * rate
-                }
-                (None, Some(v)) => {
-                    let e = v[k] - own[i][1];
-                    error[i][k] = if k == 0 { 0.0 } else { error[i][k - 1] + before[i] * dt };
-                    before[i] = e;
-                    0.5 * g2 * e * dt
-                }
-                (None, None) => 0.0,
+        let first = initial(record);
+        let mut state = axis.resume(first, &model.memory, record.start + ahead);
+        let mut inputs = TorqueHistory::settled(*record.torque.first()?);
+        let sensed = !axis.on().sensors().is_empty();
+        let mut history = sensed.then(|| model.effects.initial_readings(axis.on(), state.reading(), dt));
+        let mut error = [vec![0.0; n], vec![0.0; n]];
+        let mut given = [vec![0.0; n], vec![0.0; n]];
+        let mut motion = Vec::with_capacity(n);
+        let mut before = [f64::NAN; 2];
+        for k in 0..n {
+            let time = record.time(k) + ahead;
+            let reading = match &history {
+                Some(history) => model.effects.transform_sensor(axis.on(), history, dt),
+                None => state.reading(),
             };
-            push[i] = inertia[i] * d / (dt * dt);
-        }
-        if push != [0.0; 2] {
-            push = axis.kick(&mut state, push.map(|d| d * dt), dt, time).map(|j| j / dt);
-        }
-        given[0][k] = push[0];
-        given[1][k] = push[1];
-        if k + 1 == n {
-            break;
-        }
-        for j in 0..per {
-            let mut ramp = record.ramp(k, j, per, *ahead);
-            if !axis.on().inputs().is_empty() {
-                ramp = model.effects.transform_input(axis.on(), ramp, h, &mut inputs);
+            let own = [[reading.theta1, reading.omega1], [reading.theta2, reading.omega2]];
+            let now = state.reading();
+            if kept.get(memories.len()) == Some(&k) {
+                memories.push(*state.memory());
             }
-            state = axis.advance(&state, ramp, time + j as f64 * h);
+            motion.push([now.theta1, now.omega1, now.theta2, now.omega2]);
+            let mut push = [0.0; 2];
+            let gains = gains_at(k);
+            for &i in &sides {
+                let [g1, g2] = gains[i];
+                let d = match (position[i], speed[i]) {
+                    (Some(y), _) => {
+                        let e = y[k] - own[i][0];
+                        let rate = if before[i].is_nan() { 0.0 } else { e - before[i] };
+                        before[i] = e;
+                        error[i][k] = e;
+                        g1 * e + g2 * rate
+                    }
+                    (None, Some(v)) => {
+                        let e = v[k] - own[i][1];
+                        error[i][k] = if k == 0 { 0.0 } else { error[i][k - 1] + before[i] * dt };
+                        before[i] = e;
+                        0.5 * g2 * e * dt
+                    }
+                    (None, None) => 0.0,
+                };
+                push[i] = inertia[i] * d / (dt * dt);
+            }
+            if push != [0.0; 2] {
+                push = axis.kick(&mut state, push.map(|d| d * dt), dt, time).map(|j| j / dt);
+            }
+            given[0][k] = push[0];
+            given[1][k] = push[1];
+            if k + 1 == n {
+                break;
+            }
+            for j in 0..per {
+                let logged = record.ramp(k, j, per, *ahead);
+                let ramp = if axis.on().inputs().is_empty() {
+                    logged
+                } else {
+                    model.effects.transform_input(axis.on(), logged, h, &mut inputs)
+                };
+                let begin = time + j as f64 * h;
+                let next = axis.advance(&state, ramp, begin);
+                for other in perturbations.iter_mut() {
+                    other.step(&axis, (k, j), [&state, &next], [logged, ramp], begin + h);
+                }
+                state = next;
+            }
+            if let Some(history) = &mut history {
+                model.effects.push_sensors(axis.on(), history, state.reading());
+            }
+            if !state.theta1().is_finite() || !state.omega2().is_finite() || state.omega1().abs() > 1e12 {
+                return None;
+            }
         }
-        if let Some(history) = &mut history {
-            model.effects.push_sensors(axis.on(), history, state.reading());
-        }
-        if !state.theta1().is_finite() || !state.omega2().is_finite() || state.omega1().abs() > 1e12 {
-            return None;
-        }
+        let torque = torque_residual(model, dt, inertia, &sides, &error, given);
+        // Squares of what is larger than this are no numbers.
+        let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
+        bounded.then_some((Tracked { torque, motion }, memories))
     }
-    let torque = torque_residual(model, dt, inertia, &sides, &error, given);
-    // Squares of what is larger than this are no numbers.
-    let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
-    bounded.then_some((Tracked { torque, motion }, memories))
 }
 
 /// Adds `D e` to what was given: along the sides that are measured, what follows them without an encoder goes along.
@@ -231,7 +265,7 @@ fn initial(record: &Record) -> [f64; 4] {
 pub struct Run {
     /// `[theta1, omega1, theta2, omega2]`.
     pub motion: [f64; 4],
-    memory: crate::effects::Memory<f64>,
+    memory: Memory<f64>,
 }
 
 /// Bandwidth of the feedback that finds the states at which runs start, as a share of the sampling rate.
@@ -240,8 +274,8 @@ const STARTING: f64 = 0.1;
 /// States of a model held to the record, at some samples.
 #[must_use]
 pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<Run> {
-    let tracked = track_with(model, record, [STARTING / record.dt; 2], Resolution::Full, samples);
-    match tracked {
+    let held = Held { model, record, bandwidth: [STARTING / record.dt; 2], resolution: Resolution::Full };
+    match held.track(samples, &mut []) {
         Some((t, memories)) => {
             samples.iter().zip(memories).map(|(&k, memory)| Run { motion: t.motion[k], memory }).collect()
         }

@@ -157,6 +157,15 @@ impl<S: Scalar> Axis<S> {
         taken
     }
 
+    /// Which inertias dry friction holds at rest: up to its level no torque shows in the motion.
+    pub fn holds(&self, s: &State<S>) -> [bool; 2] {
+        let sticks = self.full.sticks(s);
+        match self.full.structure {
+            Structure::TwoInertia => sticks,
+            Structure::Rigid => [sticks[0] || sticks[1]; 2],
+        }
+    }
+
     /// Level of dry friction of inertia `i` at rest, against `push`, N.m.
     fn rest_level(&self, i: usize, push: S, s: &State<S>, time: f64) -> S {
         self.full.rest_level(i, push.re().signum(), s, self.full.load(s, time), time)

@@ -52,11 +52,7 @@ impl<S: Scalar> Mechanics<S> {
         scheme: Scheme,
         h: f64,
     ) -> Self {
-        let base = match structure {
-            Structure::TwoInertia => Base { k: parameters.k, b: parameters.b, rigid: false },
-            // A rigid axis has no coupling for an effect to act on.
-            Structure::Rigid => Base { k: S::default(), b: S::default(), rigid: true },
-        };
+        let base = base(&parameters, structure);
         let dry = PLACES.map(|place| on.dry().iter().any(|e| e.info().place == place));
         let half_play = on.forces().iter().find_map(|e| Some(effects.of(*e)[e.play_parameter()?])).unwrap_or_default();
         let backlash = half_play.re() > 0.0;
@@ -143,6 +139,15 @@ impl<S: Scalar> Mechanics<S> {
         for i in (0..2).filter(|i| s.modes.dry[*i] != 0 && self.dry[*i]) {
             s.friction[i] = S::default();
         }
+    }
+}
+
+/// What effects must know of the axis.
+pub(super) fn base<S: Scalar>(parameters: &Parameters<S>, structure: Structure) -> Base<S> {
+    match structure {
+        Structure::TwoInertia => Base { k: parameters.k, b: parameters.b, rigid: false },
+        // A rigid axis has no coupling for an effect to act on.
+        Structure::Rigid => Base { k: S::default(), b: S::default(), rigid: true },
     }
 }
 

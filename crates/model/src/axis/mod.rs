@@ -9,6 +9,7 @@
 //! Effects of [`crate::effects`] add forces to either row, and change the torque on its way in and the positions on
 //! their way out. The linear analogue (kg, N, m) is the same model in other units.
 
+mod along;
 mod axis_model;
 mod continuation;
 mod coupled;
@@ -25,6 +26,7 @@ mod single_law;
 mod step;
 mod stick;
 
+pub use along::TorqueChange;
 pub use axis_model::{Axis, State};
 pub use criterion::{dt_criterion, period_elongation};
 pub use mechanics::Motions;

@@ -3,7 +3,7 @@
 use super::active::ActiveEffects;
 use super::info::Place;
 use super::law::slip;
-use super::settings::{Internals, Settings, memory_of};
+use super::settings::{Internals, MEMORY_OF_ONE, Memory, Settings, memory_of};
 use super::shapes::{Base, Coordinate, Internal, Modes, Moment, Motion, Reaction, Slip};
 use super::{Effect, Law, WithLaw};
 use crate::scalar::Scalar;
@@ -116,6 +116,30 @@ impl<S: Scalar> Settings<S> {
             }
         }
         sum
+    }
+
+    /// Torque of one effect against its coordinate at the end of a step, N.m, zero of a dry friction that holds; its internal states go on
+    /// to that end.
+    pub(crate) fn torque_of(&self, effect: Effect, base: &Base<S>, step: &StepMotion<S>, memory: &mut Memory<S>) -> S {
+        let coordinate = effect.info().place.coordinate();
+        let load = if self.is_loaded(effect) {
+            self.transmitted(&self.active(), base, step).torque[0].abs()
+        } else {
+            S::default()
+        };
+        let moment = step.moment(coordinate, load);
+        if effect.is_dry() && moment.slides == 0.0 {
+            return S::default();
+        }
+        let own = &mut memory[memory_of(effect)];
+        let mut internals = [Internal::default(); MEMORY_OF_ONE];
+        for (internal, start) in internals.iter_mut().zip(own.iter()) {
+            *internal = Internal::at(*start);
+        }
+        let torque =
+            effect.with_law(React { p: self.of(effect), base, moment: &moment, memory: &mut internals }).torque;
+        own.iter_mut().zip(&internals).for_each(|(state, internal)| *state = internal.end);
+        torque
     }
 
     /// The torque of one effect on the motion; it sets its internal states' end on trial.
