@@ -6,7 +6,7 @@ use std::path::Path;
 use super::clock::{Clock, Clocks, Resampling, clock};
 use super::error::{TraceError, nearest};
 use super::sampling::{resample, resample_far};
-use super::signal::{Motion, Quantity, Signal};
+use super::signal::{AxisKind, Quantity, Signal};
 use super::table::Table;
 use super::units::Unit;
 use super::wrap::unwrap;
@@ -52,7 +52,7 @@ pub struct Mapping {
     /// What the torque does between samples.
     pub hold: Hold,
     /// Rotary or linear units.
-    pub motion: Motion,
+    pub motion: AxisKind,
     /// First time used, s, as the file counts it.
     pub from: Option<f64>,
     /// Last time used, s.
@@ -68,7 +68,7 @@ impl Default for Mapping {
             dt: None,
             signals: Vec::new(),
             hold: Hold::Zoh,
-            motion: Motion::Rotary,
+            motion: AxisKind::Rotary,
             from: None,
             to: None,
             resample: None,
@@ -215,7 +215,7 @@ pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> 
 }
 
 /// That no torque constant is given: then no unit of the results is what it is called.
-pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: Motion) -> Option<String> {
+pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: AxisKind) -> Option<String> {
     let written = in_drive_units(table, column, signal)?;
     let turn = motion.unit("rad");
     Some(format!(

@@ -2,7 +2,7 @@
 
 use super::error::TraceError;
 use super::load::{Column, scale};
-use super::signal::{Motion, Quantity, Signal};
+use super::signal::{AxisKind, Quantity, Signal};
 use super::table::Table;
 
 /// Bits of the counters of positions that are known: converters of resolvers have 10, encoders up to 31.
@@ -20,7 +20,7 @@ pub(super) fn unwrap(
     table: &Table,
     column: &Column,
     signal: Signal,
-    motion: Motion,
+    motion: AxisKind,
 ) -> Result<Option<String>, TraceError> {
     let (_, factor) = scale(table, column, signal.name(), signal.quantity(motion))?;
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));

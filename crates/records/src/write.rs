@@ -8,14 +8,14 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use sha2::{Digest, Sha256};
 
 use super::error::TraceError;
-use super::signal::Motion;
+use super::signal::AxisKind;
 use super::{Signal, Trace};
 
 /// Writes a trace with units in the header, numbers with all their digits.
 ///
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
-pub fn write_csv(path: &Path, trace: &Trace, motion: Motion) -> Result<(), TraceError> {
+pub fn write_csv(path: &Path, trace: &Trace, motion: AxisKind) -> Result<(), TraceError> {
     let time: Vec<f64> = (0..trace.len()).map(|k| trace.time(k)).collect();
     let mut columns: Vec<(String, &[f64])> = vec![("time [s]".to_owned(), &time)];
     for signal in Signal::ALL {
@@ -312,7 +312,7 @@ mod tests {
             .with(Signal::T, values.clone())
             .and_then(|t| t.with(Signal::Theta2, values))
             .unwrap();
-        write_csv(&path, &trace, Motion::Rotary).unwrap();
+        write_csv(&path, &trace, AxisKind::Rotary).unwrap();
         assert_eq!(load(&path, &Mapping::default()).unwrap().trace, trace);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

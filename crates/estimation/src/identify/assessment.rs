@@ -8,7 +8,7 @@ use super::run::{Method, NOISE_FREE, torque_unit};
 use super::statistics::{spectrum, whiteness};
 use crate::axis::{Parameters, Scheme, Structure};
 use crate::numerics::level::{deviation, rms};
-use crate::trace::{Motion, Signal};
+use crate::trace::{AxisKind, Signal};
 
 /// Least samples of a record of which a part is held out.
 const LEAST_PARTED: usize = 192;
@@ -139,7 +139,7 @@ pub(super) fn output_fit(
     measured: &[f64],
     residual: &[f64],
     time: impl Fn(usize) -> f64,
-    motion: Motion,
+    motion: AxisKind,
 ) -> OutputFit {
     let size = deviation(measured);
     let error = rms(residual);

@@ -11,7 +11,7 @@
 
 use super::joined::Joined;
 use crate::axis::Structure;
-use crate::effects::{Base, EFFECTS, Effect, Law, Moment, Motion, Place, WithLaw};
+use crate::effects::{Base, EFFECTS, Effect, Kinematics, Law, Moment, Place, WithLaw};
 use crate::trace::{Machine, Signal, TraceError};
 
 /// Samples to either side over which a speed that is not measured is a difference of the angle.
@@ -92,7 +92,7 @@ impl Known {
                     },
                     |w| w[k],
                 );
-                let motion = Motion { x: theta[k], v };
+                let motion = Kinematics { x: theta[k], v };
                 let slides = if v == 0.0 { 0.0 } else { v.signum() };
                 let time = joined.time(k);
                 let moment = Moment { start: motion, end: motion, time, h: 0.0, contact: 0, slides, load: 0.0 };

@@ -7,7 +7,7 @@ use super::joined::Joined;
 use super::output_error::{Fit, Free, OutputError};
 use super::paper;
 use super::parameters::{Estimated, wider};
-use super::record::Record;
+use super::record::RegressionRecord;
 use super::regression::{RegressionError, least_squares, recursive};
 use super::result::{History, MethodResult};
 use super::run::{Method, Request, hold_name, torque_unit};
@@ -23,7 +23,7 @@ pub(super) struct Run<'a> {
     pub compared: &'a Joined<'a>,
     pub machine: &'a Machine,
     pub request: &'a Request,
-    pub record: &'a Record<'a>,
+    pub record: &'a RegressionRecord<'a>,
     pub outputs: &'a OutputError<'a>,
     pub measured: Option<&'a Measured>,
     pub estimates: Vec<(&'static str, Estimated)>,
@@ -92,7 +92,7 @@ impl Run<'_> {
         let longest = self.joined.longest_trace();
         let alone;
         let record = if self.joined.pieces().len() > 1 {
-            alone = Record::new(&longest, self.machine.parameters.rho).map_err(|e| e.to_string())?;
+            alone = RegressionRecord::new(&longest, self.machine.parameters.rho).map_err(|e| e.to_string())?;
             &alone
         } else {
             self.record

@@ -7,7 +7,7 @@ use super::levenberg::Termination;
 use super::parameters::Estimated;
 use super::run::NOISE_FREE;
 use crate::axis::Parameters;
-use crate::trace::{Motion, Signal};
+use crate::trace::{AxisKind, Signal};
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "eixo.identification/1";
@@ -269,7 +269,7 @@ impl MethodResult {
     }
 
     /// Takes the estimates in, against a reference where there is one, with what is to be said of them. `dt`: sampling interval, s.
-    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion, dt: f64) {
+    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: AxisKind, dt: f64) {
         if !estimated.is_physical() {
             return self.refuse(
                 "the estimates are not those of an axis (an inertia or the stiffness is not positive): noise or an unmodelled \

@@ -30,7 +30,7 @@ use super::result::{
 use super::run::{Request, summary};
 use super::statistics::spectrum;
 use crate::numerics::level::rms;
-use crate::trace::{Machine, Motion, Signal, TraceError};
+use crate::trace::{AxisKind, Machine, Signal, TraceError};
 
 /// Least samples of half a window.
 const LEAST_HALF: usize = 12;
@@ -100,12 +100,12 @@ pub enum RigidError {
 /// [`RigidError`].
 pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) -> Result<Rigid, RigidError> {
     let whole = std::iter::once(0..theta.len()).collect::<Vec<_>>();
-    weak_in_pieces(&Motions { torque, theta, dt, pieces: &whole, starts: &[start] })
+    weak_in_pieces(&RigidRecord { torque, theta, dt, pieces: &whole, starts: &[start] })
 }
 
 /// Torque and angle of a record in pieces.
 #[derive(Clone, Copy)]
-struct Motions<'a> {
+struct RigidRecord<'a> {
     torque: &'a [f64],
     theta: &'a [f64],
     dt: f64,
@@ -114,7 +114,7 @@ struct Motions<'a> {
     starts: &'a [f64],
 }
 
-impl<'a> Motions<'a> {
+impl<'a> RigidRecord<'a> {
     fn of(joined: &'a Joined) -> Result<Self, TraceError> {
         let trace = joined.samples();
         Ok(Self {
@@ -133,7 +133,7 @@ impl<'a> Motions<'a> {
 }
 
 /// The same of a record in pieces: no window reaches from one into the next.
-fn weak_in_pieces(motions: &Motions) -> Result<Rigid, RigidError> {
+fn weak_in_pieces(motions: &RigidRecord) -> Result<Rigid, RigidError> {
     let n = motions.longest();
     if 8 * LEAST_HALF + 2 > n {
         return Err(RigidError::TooShort { samples: n, window: 2 * LEAST_HALF + 1 });
@@ -159,8 +159,8 @@ fn weak_in_pieces(motions: &Motions) -> Result<Rigid, RigidError> {
 }
 
 /// The regression in windows of `2*half + 1` samples.
-fn in_windows(motions: &Motions, half: usize) -> Result<Rigid, RigidError> {
-    let Motions { torque, theta, dt, .. } = *motions;
+fn in_windows(motions: &RigidRecord, half: usize) -> Result<Rigid, RigidError> {
+    let RigidRecord { torque, theta, dt, .. } = *motions;
     let w = Window::new(half);
     let span = 2 * half + 1;
     let total: f64 = w.psi.iter().sum();
@@ -243,15 +243,15 @@ fn robust(rows: &[[f64; 5]], residual: &[f64], of_piece: &[usize], inverse: &DMa
     Vector4::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt())
 }
 
-fn units(motion: Motion) -> [&'static str; 4] {
+fn units(motion: AxisKind) -> [&'static str; 4] {
     match motion {
-        Motion::Rotary => ["kg.m2", "N.m.s/rad", "N.m", "N.m"],
-        Motion::Linear => ["kg", "N.s/m", "N", "N"],
+        AxisKind::Rotary => ["kg.m2", "N.m.s/rad", "N.m", "N.m"],
+        AxisKind::Linear => ["kg", "N.s/m", "N", "N"],
     }
 }
 
 /// Torques at one unit of viscous friction, dry friction and load, as shares of the torque's size.
-fn shares(motions: &Motions) -> [f64; 3] {
+fn shares(motions: &RigidRecord) -> [f64; 3] {
     let size = rms(motions.torque).max(f64::MIN_POSITIVE);
     let span = 8.min(motions.longest().saturating_sub(1)).max(1);
     let windows = motions.pieces.iter().flat_map(|p| motions.theta[p.clone()].windows(span + 1));
@@ -288,9 +288,9 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
 fn held_out(joined: &Joined) -> Option<f64> {
     let n = joined.len();
     let (first, rest) = (joined.part(0..2 * n / 3), joined.part(2 * n / 3..n));
-    let first = weak_in_pieces(&Motions::of(&first).ok()?).ok()?;
+    let first = weak_in_pieces(&RigidRecord::of(&first).ok()?).ok()?;
     // The same windows on the rest: the regression's rows there, with the first part's estimates.
-    let rest = in_windows(&Motions::of(&rest).ok()?, first.half).ok()?;
+    let rest = in_windows(&RigidRecord::of(&rest).ok()?, first.half).ok()?;
     let error: Vec<f64> =
         rest.rows.iter().map(|r| r[4] - (0..4).map(|j| r[j] * first.values[j]).sum::<f64>()).collect();
     let size = rms(&rest.fit.1);
@@ -312,7 +312,7 @@ pub(super) fn identify(
     let taken_off = known.taken_off(joined, machine)?;
     let regressed = taken_off.as_ref().unwrap_or(joined);
     let trace = joined.samples();
-    let motions = Motions::of(regressed)?;
+    let motions = RigidRecord::of(regressed)?;
     let motion = machine.signals.motion;
     progress("weak-form least squares");
     let mut result = MethodResult::empty("ls", "Least squares, weak form");

@@ -7,13 +7,13 @@ use super::joined::{Joined, noise_in_pieces};
 use super::known::Known;
 use super::methods::Run;
 use super::output_error::OutputError;
-use super::record::{Record, period};
+use super::record::{RegressionRecord, period};
 use super::result::{Identification, MethodResult, Recommendation, SCHEMA, Series, TraceSummary};
 use super::rigid;
 use super::statistics::spectrum;
 use crate::axis::{Hold, Scheme, Structure};
 use crate::numerics::level::rms;
-use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
+use crate::trace::{AxisKind, Machine, Signal, Trace, TraceError};
 
 /// An estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,7 +113,7 @@ pub const fn hold_name(hold: Hold) -> &'static str {
     }
 }
 
-pub(super) fn torque_unit(motion: Motion) -> &'static str {
+pub(super) fn torque_unit(motion: AxisKind) -> &'static str {
     Signal::T.unit(motion)
 }
 
@@ -181,7 +181,7 @@ pub fn identify_joined(
     warnings.extend(known.warnings(machine.structure));
     let taken_off = known.taken_off(joined, machine)?;
     let regressed = taken_off.as_ref().unwrap_or(joined);
-    let record = Record::of(regressed, machine.parameters.rho)?;
+    let record = RegressionRecord::of(regressed, machine.parameters.rho)?;
     if record.zero_offset != 0.0 {
         warnings.push(format!(
             "the zeros of the two encoders differ by {:.6} {}: the mean twist was taken off, and output error fits the \
@@ -212,7 +212,7 @@ pub fn identify_joined(
                 measured.as_ref().map_or(0, |m| m.periods),
                 if pieces > 1 { " of its longest piece, the other pieces have no part in it" } else { "" }
             ));
-            Record::new(average, machine.parameters.rho)?
+            RegressionRecord::new(average, machine.parameters.rho)?
         }
         _ => record,
     };

@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use super::identifiability::{Evidence, Identifiability};
 use super::lsq::BLOCK;
 use super::parameters::Estimated;
-use super::record::{DIFFERENT_ZEROS, Record};
+use super::record::{DIFFERENT_ZEROS, RegressionRecord};
 use super::regression::{LeastSquares, Moments, Recursion, RegressionError, Scales, Sums};
 use super::result::{History, Identification, MethodResult, Recommendation, SCHEMA, Series, Thinned, TraceSummary};
 use super::run::{DIFFERENT_SPEED, Method, Request, Steps, different_speed, hold_name};
@@ -54,7 +54,7 @@ impl Frame<'_> {
     }
 
     /// The rows from the first to the last: `take(record, rows of it, number of the first)`.
-    fn each(&self, mut take: impl FnMut(&Record, usize, usize)) -> Result<(), TraceError> {
+    fn each(&self, mut take: impl FnMut(&RegressionRecord, usize, usize)) -> Result<(), TraceError> {
         let mut pending = Pending::default();
         let total = self.rows();
         self.stream.each(|_, piece| {
@@ -81,9 +81,9 @@ impl Frame<'_> {
     }
 
     /// The pending samples as a record; its times are counted from the start of the whole one.
-    fn record<'a>(&self, pending: &'a Pending) -> Record<'a> {
+    fn record<'a>(&self, pending: &'a Pending) -> RegressionRecord<'a> {
         let frame = self.stream.frame();
-        Record {
+        RegressionRecord {
             torque: &pending.torque,
             theta1: &pending.theta1,
             theta2: Cow::Borrowed(&pending.theta2),
@@ -324,7 +324,7 @@ mod tests {
     use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
     use crate::effects::Settings;
     use crate::identify::excitation::{Kind, Multisine};
-    use crate::trace::{Mapping, Motion, load, write_csv};
+    use crate::trace::{AxisKind, Mapping, load, write_csv};
 
     /// A record of more than one piece of 8 MiB, noisy angles, encoders with zeros of their own.
     fn record(path: &std::path::Path, speeds: bool) {
@@ -354,7 +354,7 @@ mod tests {
             trace.set(Signal::Omega1, noisy(0.0, 1e-4, r.iter().map(|r| r.omega1).collect())).unwrap();
             trace.set(Signal::Omega2, noisy(0.0, 1e-4, r.iter().map(|r| r.omega2).collect())).unwrap();
         }
-        write_csv(path, &trace, Motion::Rotary).unwrap();
+        write_csv(path, &trace, AxisKind::Rotary).unwrap();
     }
 
     #[test]

@@ -3,12 +3,12 @@
 use super::family::Family;
 use super::info::{ParameterInfo, Place, Start};
 use super::{Effect, Length};
-use crate::axis::{Motion, Structure};
+use crate::axis::{AxisKind, Structure};
 
 impl ParameterInfo {
     /// Its unit on an axis of that motion; a phase is an angle on every one.
     #[must_use]
-    pub fn unit_on(&self, motion: Motion) -> &'static str {
+    pub fn unit_on(&self, motion: AxisKind) -> &'static str {
         if matches!(self.start, Start::Phase) { self.unit } else { motion.unit(self.unit) }
     }
 }
@@ -17,9 +17,9 @@ impl Effect {
     /// Whether the effect can be identified from a record of an axis of that structure and motion: a rigid one has no coupling and no second
     /// encoder, and of two laws that differ by their side alone the motor's stands for both; a weight on a slide pulls alike everywhere.
     #[must_use]
-    pub fn may_be_named(self, structure: Structure, motion: Motion) -> bool {
+    pub fn may_be_named(self, structure: Structure, motion: AxisKind) -> bool {
         let info = self.info();
-        if !info.named || (motion == Motion::Linear && info.family == Family::Gravity) {
+        if !info.named || (motion == AxisKind::Linear && info.family == Family::Gravity) {
             return false;
         }
         if structure == Structure::TwoInertia {
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn a_phase_is_an_angle_on_a_linear_axis_too() {
         let ripple = Effect::TorqueRipple.info();
-        let units: Vec<&str> = ripple.parameters.iter().map(|p| p.unit_on(Motion::Linear)).collect();
+        let units: Vec<&str> = ripple.parameters.iter().map(|p| p.unit_on(AxisKind::Linear)).collect();
         assert_eq!(units, ["N", "1/m", "rad"]);
     }
 }

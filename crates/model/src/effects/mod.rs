@@ -36,7 +36,7 @@ pub(crate) use settings::{Internals, MEMORY_OF_ONE};
 pub use settings::{MEMORY, Memory, PARAMETERS, Settings, memory_of};
 pub(crate) use shapes::Modes;
 pub use shapes::{
-    Base, Coordinate, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip,
+    Base, Coordinate, DryFriction, Force, Input, Internal, Kinematics, Length, Level, Moment, Reaction, Sensor, Slip,
 };
 
 use side::{Motor, Table};
