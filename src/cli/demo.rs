@@ -104,9 +104,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.finish();
 
     let layout = super::stdout::layout(super::stdout::WIDTH);
-    let mut story = vec![Block::Paragraph(format!("A machine that disagrees with its model: {PLAYED}"))];
-    story.extend(disagreement);
-    out!("{}", terminal::blocks(&story, layout))?;
+    let mut paragraphs = vec![Block::Paragraph(format!("A machine that disagrees with its model: {PLAYED}"))];
+    paragraphs.extend(disagreement);
+    out!("{}", terminal::blocks(&paragraphs, layout))?;
     out_line!("\nThe paper's experiment, from FMU to parameters:\n")?;
     out!("{}", terminal::blocks(&short(&findings), layout))?;
     out_line!()?;

@@ -43,7 +43,12 @@ pub(super) struct Clocks {
 }
 
 /// Stamps that count from a calendar's beginning, in a unit that only their size tells, brought to seconds from the first.
-fn epoch(time: &mut [f64], table: &Table, column: &Column, warnings: &mut Vec<String>) -> Result<(), TraceError> {
+fn calendar_stamps(
+    time: &mut [f64],
+    table: &Table,
+    column: &Column,
+    warnings: &mut Vec<String>,
+) -> Result<(), TraceError> {
     let given = scale(table, column, "time", Quantity::Time)?;
     let has_unit = given.1 != 1.0 || table.headers[given.0].unit.is_some() || column.unit.is_some();
     let Some(first) = time.first().copied().filter(|t| *t > 1e8 && !has_unit) else { return Ok(()) };
@@ -67,10 +72,10 @@ fn epoch(time: &mut [f64], table: &Table, column: &Column, warnings: &mut Vec<St
 }
 
 /// Share of its width beyond which a clock that starts anew has lost more than a few samples.
-const ANEW: f64 = 0.01;
+const LARGEST_LOSS: f64 = 0.01;
 
 /// Clocks that start anew go on, and says so: at midnight, and counters of 16 and 32 bits.
-fn anew(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<String>, TraceError> {
+fn unwrap_time(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<String>, TraceError> {
     let (_, factor) = scale(table, column, "time", Quantity::Time)?;
     let back: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).filter(|d| *d < 0.0).collect();
     let widths = [
@@ -78,7 +83,7 @@ fn anew(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<Strin
         (65_536.0 * factor, "a counter of 16 bits"),
         (4_294_967_296.0 * factor, "a counter of 32 bits"),
     ];
-    let of = |width: f64| !back.is_empty() && back.iter().all(|d| (0.0..ANEW * width).contains(&(d + width)));
+    let of = |width: f64| !back.is_empty() && back.iter().all(|d| (0.0..LARGEST_LOSS * width).contains(&(d + width)));
     let Some((width, name)) = widths.into_iter().find(|(w, _)| of(*w)) else { return Ok(None) };
     let (mut turns, mut before) = (0.0, time[0]);
     for t in time.iter_mut() {
@@ -107,7 +112,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
     let file = || table.file.clone();
     let count = table.rows();
     let short = |found: usize| TraceError::Cut { file: file(), found, rows: count, needed: SHORTEST };
-    let alone = |longest: Clock| Clocks { longest, others: Vec::new(), gaps: None };
+    let one_piece = |longest: Clock| Clocks { longest, others: Vec::new(), gaps: None };
     let Some(column) = time_column(table, mapping)? else {
         let dt = mapping.dt.unwrap_or(1.0);
         let index = |t: f64| (t / dt).round().clamp(0.0, count as f64) as usize;
@@ -117,12 +122,12 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         }
         let start = rows.start as f64 * dt;
         let grid = Grid { start, dt, sampling: Sampling::Uniform };
-        return Ok(alone(Clock { grid, rows, stamps: None, resampling: Resampling::None }));
+        return Ok(one_piece(Clock { grid, rows, stamps: None, resampling: Resampling::None }));
     };
     let mut time = values(table, &column, "time", Quantity::Time, &(0..count))?;
-    warnings.extend(table.position(&column.column).and_then(|k| table.mended(k)).map(str::to_owned));
-    epoch(&mut time, table, &column, warnings)?;
-    warnings.extend(anew(&mut time, table, &column)?);
+    warnings.extend(table.position(&column.column).and_then(|k| table.bridge_warning(k)).map(str::to_owned));
+    calendar_stamps(&mut time, table, &column, warnings)?;
+    warnings.extend(unwrap_time(&mut time, table, &column)?);
     let mut rows = 0..count;
     if mapping.from.is_some() || mapping.to.is_some() {
         let (from, to) = (mapping.from.unwrap_or(f64::NEG_INFINITY), mapping.to.unwrap_or(f64::INFINITY));
@@ -138,7 +143,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
     }
     let line = |k: usize| table.line(rows.start + k);
     let Err(NoGrid::Gap { row, gap, dt: middle }) = grid(&time) else {
-        return even(table, rows, time, mapping, warnings).map(alone);
+        return even(table, rows, time, mapping, warnings).map(one_piece);
     };
     // Stamps that a computer took come in clusters: the mean of the steps without lost samples is the rate.
     let steps = || time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= 2.5 * middle);
@@ -161,7 +166,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         return Err(TraceError::Gap { file: file(), line: line(row), gap, missing, dt: usual });
     }
     if pieces.len() == 1 {
-        return even(table, rows, time, mapping, warnings).map(alone);
+        return even(table, rows, time, mapping, warnings).map(one_piece);
     }
     let gaps = format!(
         "{}: the record has gaps and is {} pieces (the first ends before row {})",

@@ -4,7 +4,7 @@
 //! line a sample, each value behind the name of its channel; halsampler(1) writes the values alone, with `-t` the number of
 //! the sample first.
 
-use super::csv::cut::{last_of_words, told, word};
+use super::csv::cut::{cut_warning, excerpt, is_last_row_cut};
 use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table};
 use super::vendors;
@@ -178,7 +178,7 @@ impl Filled {
             columns: self.columns,
             faults: self.faults,
             lines: vec![(0, first_line)],
-            mended: Vec::new(),
+            bridge_warnings: Vec::new(),
             cut: None,
         }
     }
@@ -195,8 +195,8 @@ fn halscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let (numbers, mut rows): (Vec<usize>, Vec<&str>) =
         lines.filter(|(_, line)| !line.trim().is_empty()).map(|(k, line)| (k + 1, line)).unzip();
     let mut cut = None;
-    if last_of_words(&rows, text.ends_with('\n')) {
-        cut = rows.pop().map(|row| word(file, numbers[rows.len()], &told(row.trim().as_bytes())));
+    if is_last_row_cut(&rows, text.ends_with('\n')) {
+        cut = rows.pop().map(|row| cut_warning(file, numbers[rows.len()], &excerpt(row.trim().as_bytes())));
     }
     let mut filled = Filled::default();
     for (row, &line) in rows.iter().zip(&numbers) {

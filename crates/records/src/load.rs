@@ -123,14 +123,14 @@ pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError
 }
 
 /// Makes the traces of a table: the longest piece, and the others where they are `wanted`.
-fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPieces, TraceError> {
+fn pieces(table: &Table, mapping: &Mapping, with_others: bool) -> Result<LoadedPieces, TraceError> {
     let mut warnings: Vec<String> = table.cut.iter().cloned().collect();
     let wanted = wanted(table, mapping, &mut warnings)?;
     if table.rows() < SHORTEST {
         return Err(TraceError::TooShort { file: table.file.clone(), found: table.rows(), needed: SHORTEST });
     }
     let Clocks { longest: clock, others, gaps } = clock(table, mapping, &mut warnings)?;
-    let others = if together { others } else { Vec::new() };
+    let others = if with_others { others } else { Vec::new() };
     let longest = trace(table, mapping, &wanted, &clock, &mut warnings)?;
     let others: Vec<(Trace, Option<Vec<f64>>)> = others
         .into_iter()
@@ -171,9 +171,9 @@ fn trace(
     for (signal, column) in wanted {
         let mut values = values(table, column, signal.name(), signal.quantity(mapping.motion), rows)?;
         let at = table.position(&column.column);
-        warnings.extend(at.and_then(|k| table.mended(k)).map(str::to_owned));
-        if let Some(word) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
-            warnings.push(word);
+        warnings.extend(at.and_then(|k| table.bridge_warning(k)).map(str::to_owned));
+        if let Some(warning) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
+            warnings.push(warning);
         }
         warnings.extend(no_torque_constant(table, column, *signal, mapping.motion));
         let held = matches!(signal, Signal::T | Signal::Command) && mapping.hold == Hold::Zoh;
@@ -267,9 +267,9 @@ pub(super) fn wanted(
     }
     // Signals that [signals] does not speak of are found by their own names, where no other signal has the column.
     for (signal, column) in Signal::ALL.into_iter().filter_map(named) {
-        let spoken = mapping.signals.iter().any(|(s, _)| *s == signal);
+        let is_mapped = mapping.signals.iter().any(|(s, _)| *s == signal);
         let taken = there.iter().any(|(_, c)| table.position(&c.column) == table.position(&column.column));
-        if !spoken && !taken {
+        if !is_mapped && !taken {
             there.push((signal, column));
         }
     }
@@ -302,8 +302,8 @@ pub(super) fn scale(
     // A column found by the signal's own name has the unit at that name's end; one that [signals] names has none but there.
     let own = Signal::from_name(signal).is_some_and(|s| table.own(s) == Some(index))
         || (signal == "time" && time_name(&table.headers[index].name));
-    let behind = || guess::suffix(&table.headers[index].name).filter(|_| own).map(|(_, unit)| unit.symbol.to_owned());
-    let written = table.headers[index].unit.clone().or_else(|| column.unit.clone()).or_else(behind);
+    let suffixed = || guess::suffix(&table.headers[index].name).filter(|_| own).map(|(_, unit)| unit.symbol.to_owned());
+    let written = table.headers[index].unit.clone().or_else(|| column.unit.clone()).or_else(suffixed);
     let counts = matches!(quantity, Quantity::Torque | Quantity::Force) && written.as_deref() == Some(COUNTS);
     if let Some(text) = written.as_ref().filter(|_| !counts) {
         let unit = Unit::parse(text).ok_or_else(|| TraceError::UnknownUnit {
@@ -433,8 +433,8 @@ mod tests {
             let mapping = Mapping { signals: vec![(Signal::T, column)], ..Mapping::default() };
             from_table(&table, &mapping).unwrap().warnings
         };
-        let said = warnings(1.0).join("\n");
-        assert!(said.contains("column current is in A, and no torque constant is given"), "{said}");
+        let text = warnings(1.0).join("\n");
+        assert!(text.contains("column current is in A, and no torque constant is given"), "{text}");
         assert_eq!(warnings(0.5), Vec::<String>::new());
     }
 
@@ -533,8 +533,8 @@ mod tests {
         };
         let loaded = from_table(&table(&[40, 41]), &Mapping::default()).unwrap();
         assert_eq!(loaded.trace.get(Signal::T).unwrap()[39..43], [78.0, 80.0, 82.0, 84.0]);
-        let said = loaded.warnings.join("\n");
-        assert!(said.contains("column T has no number in 2 of 200 rows, the first row 42"), "{said}");
+        let text = loaded.warnings.join("\n");
+        assert!(text.contains("column T has no number in 2 of 200 rows, the first row 42"), "{text}");
         for missing in [&[0][..], &[199], &[40, 80, 120], &[40, 41, 42, 43]] {
             let error = from_table(&table(missing), &Mapping::default()).unwrap_err().to_string();
             assert!(error.contains(&format!("row {}, column T", missing[0] + 2)), "{missing:?}: {error}");
@@ -553,8 +553,8 @@ mod tests {
         assert!((loaded.trace.dt() - 1e-4).abs() < 1e-12);
         let theta = loaded.trace.get(Signal::Theta1).unwrap();
         assert!(theta.windows(2).all(|w| w[1] - w[0] == 50.0), "{theta:?}");
-        let said = loaded.warnings.join("\n");
-        assert!(said.contains("time starts anew 1 times (a counter of 16 bits)"), "{said}");
-        assert!(said.contains("theta1 starts anew 3 times (a counter of 12 bits)"), "{said}");
+        let text = loaded.warnings.join("\n");
+        assert!(text.contains("time starts anew 1 times (a counter of 16 bits)"), "{text}");
+        assert!(text.contains("theta1 starts anew 3 times (a counter of 12 bits)"), "{text}");
     }
 }

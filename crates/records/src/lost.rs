@@ -158,8 +158,8 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<Lost> {
             let agree = c.residual <= AGREE * median.max(noise);
             off > FAR * c.residual.max(median).max(noise) && (clear || agree && span < 2)
         };
-        let told = block.zip(cubics).filter(is_lost);
-        told.map(|(k, c)| (k, c.expected, c.residual)).collect::<Vec<Lost>>()
+        let estimates = block.zip(cubics).filter(is_lost);
+        estimates.map(|(k, c)| (k, c.expected, c.residual)).collect::<Vec<Lost>>()
     };
     let blocks: Vec<usize> = (neighbours..end).step_by(BLOCK).collect();
     let found: Vec<Vec<Lost>> = blocks.into_par_iter().map(of_block).collect();
@@ -178,8 +178,8 @@ fn repeated(y: &[f64], noise: f64) -> Vec<(usize, f64)> {
     if repeats.len() as f64 > MOST * y.len() as f64 {
         return Vec::new();
     }
-    let told = expected(y, &repeats).into_iter();
-    told.filter(|e| (y[e.at] - e.value).abs() > FAR * e.error.max(noise)).map(|e| (e.at, e.value)).collect()
+    let estimates = expected(y, &repeats).into_iter();
+    estimates.filter(|e| (y[e.at] - e.value).abs() > FAR * e.error.max(noise)).map(|e| (e.at, e.value)).collect()
 }
 
 /// Replaces the samples that repeat the one before by their interpolated values, whatever the noise of the position is.

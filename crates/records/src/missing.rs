@@ -150,12 +150,12 @@ impl Bridges {
     /// # Errors
     /// When a column has more missing cells than are bridged, or ends in one.
     pub fn ended(self, file: &str, name: impl Fn(usize) -> String) -> Result<Vec<String>, TraceError> {
-        let mut words = Vec::new();
+        let mut warnings = Vec::new();
         for (k, missing) in self.columns.iter().enumerate() {
             let name = name(k);
-            let word = missing.ended(file, &name).map_err(|fault| fault.named(file, &name))?;
-            words.extend(word.filter(|w| !words.contains(w)));
+            let warning = missing.ended(file, &name).map_err(|fault| fault.named(file, &name))?;
+            warnings.extend(warning.filter(|w| !warnings.contains(w)));
         }
-        Ok(words)
+        Ok(warnings)
     }
 }

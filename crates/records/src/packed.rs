@@ -48,7 +48,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         columns: Vec::new(),
         faults: Vec::new(),
         lines: Vec::new(),
-        mended: Vec::new(),
+        bridge_warnings: Vec::new(),
         cut: None,
     };
     for name in names.iter().filter(|n| n.ends_with(".npy")) {

@@ -202,7 +202,7 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
         columns,
         faults,
         lines: Vec::new(),
-        mended: Vec::new(),
+        bridge_warnings: Vec::new(),
         cut: None,
     })
 }

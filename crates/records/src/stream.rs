@@ -66,7 +66,7 @@ impl Rows {
         Ok(Self {
             path: path.to_owned(),
             kind,
-            head: Table { file, headers, columns, faults, lines: Vec::new(), mended: Vec::new(), cut: None },
+            head: Table { file, headers, columns, faults, lines: Vec::new(), bridge_warnings: Vec::new(), cut: None },
         })
     }
 
@@ -84,9 +84,9 @@ impl Rows {
             let passed = bridges.take(piece, faults).map_err(|(k, fault)| fault.named(file, &name(k)))?;
             passed.map_or(Ok(()), |piece| take(&piece))
         };
-        let mut said = Vec::new();
+        let mut notes = Vec::new();
         match self.kind {
-            Kind::Csv => said.extend(self.each_block(wanted, &mut bridged)?),
+            Kind::Csv => notes.extend(self.each_block(wanted, &mut bridged)?),
             _ => {
                 let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
                 let source = parquet::Source::open(File::open(&self.path).map_err(failed)?, file)?;
@@ -95,8 +95,8 @@ impl Rows {
                 })?;
             }
         }
-        said.extend(bridges.ended(file, name)?);
-        Ok(said)
+        notes.extend(bridges.ended(file, name)?);
+        Ok(notes)
     }
 
     fn each_block(&self, wanted: &[usize], take: &mut Take<'_>) -> Result<Option<String>, TraceError> {
@@ -133,8 +133,8 @@ impl Rows {
             let mut all: Vec<Option<Vec<f64>>> = rows.columns.into_iter().map(Some).collect();
             for (k, &column) in wanted.iter().enumerate() {
                 // The same column may serve two signals.
-                let twin = wanted[..k].iter().position(|c| *c == column);
-                let values = twin.map_or_else(|| all[column].take(), |at: usize| columns.get(at).cloned());
+                let earlier = wanted[..k].iter().position(|c| *c == column);
+                let values = earlier.map_or_else(|| all[column].take(), |at: usize| columns.get(at).cloned());
                 columns.push(values.unwrap_or_default());
             }
             if count > 0 {
@@ -145,7 +145,7 @@ impl Rows {
             line += rows.passed;
             bytes.drain(..end);
             if ended {
-                return Ok(cut.map(|text| csv::cut::word(name, line, &text)));
+                return Ok(cut.map(|text| csv::cut::cut_warning(name, line, &text)));
             }
         }
     }
@@ -204,14 +204,14 @@ impl Stream {
         let mut clock = Clock::new(rows.head.file.clone());
         // All that will be used is read, so that what has to be said of it is said before the work.
         let columns: Vec<usize> = time.iter().chain(signals.iter().map(|(_, s)| s)).map(|s| s.column).collect();
-        let said = rows.each(&columns, &mut |piece| match time {
+        let notes = rows.each(&columns, &mut |piece| match time {
             Some(t) => clock.take(&scaled(&piece.columns[0], t.scale, t.offset), piece),
             None => {
                 clock.count += piece.columns[0].len();
                 Ok(())
             }
         })?;
-        warnings.extend(said);
+        warnings.extend(notes);
         clock.finish()?;
         if clock.count < SHORTEST {
             return Err(TraceError::TooShort { file: rows.head.file, found: clock.count, needed: SHORTEST });
@@ -500,8 +500,8 @@ mod tests {
             "column theta1 has no",
             "is cut off",
         ] {
-            for said in [&whole.warnings, &stream.warnings] {
-                assert_eq!(said.iter().filter(|w| w.contains(expected)).count(), 1, "{expected}: {said:?}");
+            for notes in [&whole.warnings, &stream.warnings] {
+                assert_eq!(notes.iter().filter(|w| w.contains(expected)).count(), 1, "{expected}: {notes:?}");
             }
         }
         let mut seen = 0;

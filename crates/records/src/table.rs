@@ -151,7 +151,7 @@ pub struct Table {
     /// (row, line) where the line of a row is not one more than that of the row before.
     pub(super) lines: Vec<(usize, usize)>,
     /// Of columns whose missing values were bridged: the column, and what is to be said of it.
-    pub(super) mended: Vec<(usize, String)>,
+    pub(super) bridge_warnings: Vec<(usize, String)>,
     /// What is to be said of a last row that was left out.
     pub(super) cut: Option<String>,
 }
@@ -166,18 +166,18 @@ impl Table {
             }
             let mut missing = Missing::default();
             missing.take(&self.columns[index], self.faults[index].as_ref());
-            if let Ok(Some(word)) = missing.ended(&self.file, &self.headers[index].name) {
+            if let Ok(Some(warning)) = missing.ended(&self.file, &self.headers[index].name) {
                 missing::bridge(&mut self.columns[index]);
                 self.faults[index] = None;
-                self.mended.push((index, word));
+                self.bridge_warnings.push((index, warning));
             }
         }
         self
     }
 
     /// What was made of a column that had cells without a number.
-    pub(super) fn mended(&self, index: usize) -> Option<&str> {
-        self.mended.iter().find(|(k, _)| *k == index).map(|(_, word)| word.as_str())
+    pub(super) fn bridge_warning(&self, index: usize) -> Option<&str> {
+        self.bridge_warnings.iter().find(|(k, _)| *k == index).map(|(_, warning)| warning.as_str())
     }
 
     /// The finite values of a column, for a look at it.

@@ -9,7 +9,7 @@
 //! `%DIMENSION=`, `%COUNT=` and `%CYCLETIME=` (microseconds); behind `%[DATA]` stand rows of time and values, each closed by a
 //! semicolon. Source: the public MATLAB reader `read_tncscope_file`. No export of a control was at hand for either.
 
-use super::csv::cut::{told, word};
+use super::csv::cut::{cut_warning, excerpt};
 use super::error::TraceError;
 use super::forms::Filled;
 use super::table::{Table, header};
@@ -44,7 +44,7 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let document = Document::parse(bytes).or_else(|e| {
         closed(bytes)
             .and_then(|closed| {
-                cut = closed.begun.map(|(line, text)| word(file, line, &text));
+                cut = closed.begun.map(|(line, text)| cut_warning(file, line, &text));
                 Document::parse(&closed.whole).ok()
             })
             .ok_or_else(|| {
@@ -118,7 +118,7 @@ fn closed(bytes: &[u8]) -> Option<Closed> {
     let line = 1 + memchr::memchr_iter(b'\n', &bytes[..bytes.trim_ascii_end().len()]).count();
     // The end of an element is no sample.
     let sample = !begun.is_empty() && !begun.starts_with(b"</");
-    Some(Closed { whole, begun: sample.then(|| (line, told(begun))) })
+    Some(Closed { whole, begun: sample.then(|| (line, excerpt(begun))) })
 }
 
 /// A file of TNCscope.
@@ -174,7 +174,7 @@ pub(super) fn tncscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         let cells = |row: &str| row.matches(';').count();
         // Each row is closed by a semicolon.
         if before.ends_with(';') && cells(last) < cells(before) {
-            cut = Some(word(file, at, &told(last.as_bytes())));
+            cut = Some(cut_warning(file, at, &excerpt(last.as_bytes())));
             rows.pop();
         }
     }

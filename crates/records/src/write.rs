@@ -404,12 +404,12 @@ mod tests {
         let path = folder.path().join("no/such/folder/trace.csv");
         let error = write_columns(&path, &[("a", &[1.0])]).unwrap_err().to_string();
         let parent = path.parent().unwrap().display();
-        let said = format!(
+        let expected = format!(
             "{}: cannot write: the folder {parent} does not exist. Create the folder, or choose a folder that exists",
             path.display()
         );
-        assert_eq!(error, said);
-        assert_eq!(writable(&path).unwrap_err().to_string(), said);
+        assert_eq!(error, expected);
+        assert_eq!(writable(&path).unwrap_err().to_string(), expected);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         std::fs::write(folder.path().join("log.csv"), "x").unwrap();
         let below = write_text(&folder.path().join("log.csv/trace.csv"), b"x").unwrap_err().to_string();

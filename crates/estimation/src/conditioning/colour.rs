@@ -15,7 +15,7 @@ const LINES: usize = 3;
 /// Half octaves over which a spectrum must be a noise's for its colour to be told.
 const LEAST: usize = 6;
 /// Half octaves next to the motion that may have some of it: without them the noise must be of that colour, too.
-const BESIDE: usize = 2;
+const NEXT_TO_MOTION: usize = 2;
 /// Squared error a half octave up to which a spectrum is a noise's.
 const AGREES: f64 = 2.5;
 /// Gain in half the squared error from which a colour is one: in a band far below it is several times the noise. At 3 a white noise had a
@@ -42,7 +42,7 @@ pub fn corner(position: &[f64]) -> Option<f64> {
     if noise < LEAST || !agrees(noise) {
         return None;
     }
-    let [all, clear] = [noise, noise - BESIDE].map(|n| fitted(&levels[..n]));
+    let [all, clear] = [noise, noise - NEXT_TO_MOTION].map(|n| fitted(&levels[..n]));
     let (all, clear) = (all?, clear?);
     let corner = all.corner.min(clear.corner);
     (corner > 0.0 && clear.white - clear.squares > 2.0 * GAINED).then_some(corner)
@@ -158,8 +158,8 @@ mod tests {
     #[test]
     fn the_corner_of_a_flicker_noise_under_a_motion_is_told_to_a_factor() {
         for (corner_of, seed) in [(0.1, 1), (0.3, 2), (1.0, 3)] {
-            let told = corner(&with_motion(coloured(8192, corner_of, seed))).expect("it is coloured");
-            assert!((told / corner_of).ln().abs() < 0.7, "{corner_of} {told}");
+            let estimate = corner(&with_motion(coloured(8192, corner_of, seed))).expect("it is coloured");
+            assert!((estimate / corner_of).ln().abs() < 0.7, "{corner_of} {estimate}");
         }
     }
 
@@ -169,11 +169,11 @@ mod tests {
             assert!(corner(&with_motion(noise(8192, seed))).is_none_or(|c| c < 0.02), "{seed}");
         }
         // A random walk of the acceleration: steep up to Nyquist's frequency.
-        let mut walk = noise(8192, 9);
+        let mut random_walk = noise(8192, 9);
         (0..3).for_each(|_| {
-            (1..8192).for_each(|k| walk[k] += walk[k - 1]);
+            (1..8192).for_each(|k| random_walk[k] += random_walk[k - 1]);
         });
-        assert_eq!(corner(&walk), None);
+        assert_eq!(corner(&random_walk), None);
         assert_eq!(corner(&noise(100, 1)), None);
         assert_eq!(corner(&vec![0.0; 4096]), None);
     }

@@ -231,7 +231,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
     let mut scale: DVector<f64> = DVector::zeros(n);
     let (mut damping, mut growth) = (options.damping, 2.0);
     let mut iterations = 0;
-    let mut calm = 0;
+    let mut small_steps = 0;
     let termination = loop {
         for i in 0..n {
             scale[i] = scale[i].max(normal.curvature[(i, i)]);
@@ -259,7 +259,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
         // Inner loop: raise the damping until a step lowers the cost.
         let outcome = loop {
             if damping > 1e20 {
-                break Err(if calm > 0 || cosine < 1e-6 { Termination::Cost } else { Termination::NoProgress });
+                break Err(if small_steps > 0 || cosine < 1e-6 { Termination::Cost } else { Termination::NoProgress });
             }
             let Some(step) = step(&normal, &scale, &free, damping) else {
                 damping *= growth;
@@ -311,8 +311,8 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 }
                 // A step that is short because of the damping has a small predicted reduction anywhere.
                 let small = reduction.max(predicted) <= options.cost * before && damping <= HELD_SHORT;
-                calm = if small { calm + 1 } else { 0 };
-                if calm >= 2 {
+                small_steps = if small { small_steps + 1 } else { 0 };
+                if small_steps >= 2 {
                     break Termination::Cost;
                 }
             }

@@ -323,7 +323,7 @@ impl Serialize for Estimate {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         /// The fields in their order.
         #[derive(Serialize)]
-        struct Told {
+        struct Serialised {
             name: &'static str,
             unit: &'static str,
             value: Option<f64>,
@@ -334,9 +334,17 @@ impl Serialize for Estimate {
         }
         let &Self { name, unit, value, std, reference, error_percent } = self;
         let determined = self.is_determined();
-        let told = |v: Option<f64>| v.filter(|_| determined);
-        Told { name, unit, value: told(Some(value)), std, reference, error_percent: told(error_percent), determined }
-            .serialize(serializer)
+        let if_determined = |v: Option<f64>| v.filter(|_| determined);
+        Serialised {
+            name,
+            unit,
+            value: if_determined(Some(value)),
+            std,
+            reference,
+            error_percent: if_determined(error_percent),
+            determined,
+        }
+        .serialize(serializer)
     }
 }
 

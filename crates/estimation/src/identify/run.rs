@@ -317,10 +317,10 @@ fn speed_error(joined: &Joined, angle: Signal, speed: Signal) -> f64 {
     let (mut difference, mut size) = (0.0, 0.0);
     for piece in joined.pieces() {
         for k in (piece.start..piece.end.saturating_sub(SPAN)).step_by(SPAN) {
-            let way = x[k + SPAN] - x[k];
+            let travel = x[k + SPAN] - x[k];
             let integral = trace.dt * (v[k..k + SPAN].iter().sum::<f64>() + 0.5 * (v[k + SPAN] - v[k]));
-            difference += (way - integral).powi(2);
-            size += way * way;
+            difference += (travel - integral).powi(2);
+            size += travel * travel;
         }
     }
     if size > 0.0 { (difference / size).sqrt() } else { 0.0 }

@@ -110,7 +110,7 @@ fn table_angle(piece: &Trace, rho: f64) -> Result<Cow<'_, [f64]>, TraceError> {
 struct SpeedError {
     angle: Vec<f64>,
     speed: Vec<f64>,
-    way: f64,
+    travel: f64,
     difference: f64,
 }
 
@@ -123,10 +123,10 @@ impl SpeedError {
         let mut k = 0;
         while k + Self::SPAN < self.angle.len() {
             let (x, v) = (&self.angle[k..], &self.speed[k..]);
-            let way = x[Self::SPAN] - x[0];
+            let travel = x[Self::SPAN] - x[0];
             let integral = dt * (v[..Self::SPAN].iter().sum::<f64>() + 0.5 * (v[Self::SPAN] - v[0]));
-            self.difference += (way - integral).powi(2);
-            self.way += way * way;
+            self.difference += (travel - integral).powi(2);
+            self.travel += travel * travel;
             k += Self::SPAN;
         }
         self.angle.drain(..k);
@@ -134,7 +134,7 @@ impl SpeedError {
     }
 
     fn relative(&self) -> f64 {
-        if self.way > 0.0 { (self.difference / self.way).sqrt() } else { 0.0 }
+        if self.travel > 0.0 { (self.difference / self.travel).sqrt() } else { 0.0 }
     }
 }
 
@@ -154,7 +154,7 @@ pub fn identify(
     let wanted = METHODS.into_iter().filter(|m| request.methods.contains(m)).collect::<Vec<_>>();
     let mut steps = Steps::new(2 + wanted.iter().filter(|m| **m != Method::Ls).count(), progress);
     steps.next("zeros and speeds");
-    let (frame, notes) = survey(stream, machine)?;
+    let (frame, notes) = first_pass(stream, machine)?;
     warnings.extend(notes);
     let n = frame.rows();
 
@@ -224,7 +224,7 @@ pub fn identify(
 }
 
 /// The first pass, and what the user should know of it.
-fn survey<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<String>), TraceError> {
+fn first_pass<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<String>), TraceError> {
     let rho = machine.parameters.rho;
     let dt = stream.frame().dt;
     let (mut sum, mut squares, mut origin) = (0.0, 0.0, None);

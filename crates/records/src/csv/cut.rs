@@ -23,11 +23,11 @@ pub(in super::super) fn whole(body: &[u8], format: &Format, begins: bool) -> (us
     if !is_data(line) || (begins && before.is_empty()) || !is_cut(line, end < body.len(), &before, format) {
         return (body.len(), None);
     }
-    (start, Some(told(trim(line))))
+    (start, Some(excerpt(trim(line))))
 }
 
 /// Whether the last of some rows is cut, whose words are set apart by blanks and are as many in each. `ended`: whether its line has an end.
-pub(in super::super) fn last_of_words(rows: &[&str], ended: bool) -> bool {
+pub(in super::super) fn is_last_row_cut(rows: &[&str], ended: bool) -> bool {
     let [before @ .., last] = rows else { return false };
     let joined = |row: &&str| row.split_whitespace().collect::<Vec<_>>().join(" ").into_bytes();
     let Some(columns) = before.first().map(|row| row.split_whitespace().count()) else { return false };
@@ -70,12 +70,12 @@ fn separators(line: &[u8], format: &Format) -> usize {
 }
 
 /// The text of a row that was left out, as it is told.
-pub(in super::super) fn told(row: &[u8]) -> String {
+pub(in super::super) fn excerpt(row: &[u8]) -> String {
     String::from_utf8_lossy(row).chars().take(40).collect()
 }
 
 /// What is said of a last row that was left out.
-pub(in super::super) fn word(file: &str, line: usize, text: &str) -> String {
+pub(in super::super) fn cut_warning(file: &str, line: usize, text: &str) -> String {
     format!(
         "{file}: row {line}, the last, is cut off ({text:?}): the logger was stopped while it wrote it; it is left out"
     )

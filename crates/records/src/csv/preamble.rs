@@ -70,8 +70,8 @@ impl Preamble {
         };
         let (k, (separator, width)) = (1..found.len()).find_map(|k| {
             let one = data_at(k)?;
-            let follows = k + 1 >= found.len() || data_at(k + 1) == Some(one) || trim(found[k + 1].text) == b"EOF";
-            follows.then_some((k, one))
+            let more_data = k + 1 >= found.len() || data_at(k + 1) == Some(one) || trim(found[k + 1].text) == b"EOF";
+            more_data.then_some((k, one))
         })?;
         let fields = |k: usize| split(found[k].text, separator);
         let fits = |k: usize| {

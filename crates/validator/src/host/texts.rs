@@ -43,9 +43,9 @@ impl Given<'_> {
 #[inline(never)]
 fn read_in_use(room: &mut Room, given: Given<'_>) {
     /// Nothing that a text begins with, and an end every so often.
-    const RUBBISH: [u8; 16] = *b"\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\0";
-    let stack = std::hint::black_box([RUBBISH; 1024]);
-    let blocks: Vec<Vec<[u8; 16]>> = (1..=64).flat_map(|size| std::iter::repeat_n(vec![RUBBISH; size], 8)).collect();
+    const POISON: [u8; 16] = *b"\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\0";
+    let stack = std::hint::black_box([POISON; 1024]);
+    let blocks: Vec<Vec<[u8; 16]>> = (1..=64).flat_map(|size| std::iter::repeat_n(vec![POISON; size], 8)).collect();
     std::hint::black_box((&stack, &blocks));
     room.read(given);
     std::hint::black_box((&stack, &blocks));

@@ -19,7 +19,7 @@ pub(super) fn remove(folder: &Path) -> io::Result<()> {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {}
         _ => return Ok(()),
     }
-    tame(folder)?;
+    make_removable(folder)?;
     fs::remove_dir_all(folder)
 }
 
@@ -27,7 +27,7 @@ pub(super) fn remove(folder: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// The system's, where something stays as it is.
-pub(super) fn tame(folder: &Path) -> io::Result<()> {
+pub(super) fn make_removable(folder: &Path) -> io::Result<()> {
     let mut names = 0;
     for _ in 0..ROUNDS {
         if !raise(folder, &mut names)? {
