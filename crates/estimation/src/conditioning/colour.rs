@@ -1,6 +1,6 @@
 //! The colour of an encoder's noise: white, or growing as one over the frequency below a corner (flicker noise).
 //!
-//! Told where the motion is not: from Nyquist's frequency down as far as the spectrum is that of such a noise, `1 + corner/f`. A motion
+//! Estimated outside the band of the motion: from Nyquist's frequency down as far as the spectrum is that of such a noise, `1 + corner/f`. A motion
 //! rises far more steeply from where it begins. What holds there is taken to hold in the motion's own band.
 
 use rustfft::{FftPlanner, num_complex::Complex};
@@ -12,9 +12,9 @@ const SEGMENTS: usize = 8;
 const HIGHEST: f64 = 0.48;
 /// Fewest lines of a half octave.
 const LINES: usize = 3;
-/// Half octaves over which a spectrum must be a noise's for its colour to be told.
+/// Least number of half octaves with the spectrum of a noise for its colour to be estimated.
 const LEAST: usize = 6;
-/// Half octaves next to the motion that may have some of it: without them the noise must be of that colour, too.
+/// Half octaves next to the motion's band, into which it may extend: the noise must be coloured without them, too.
 const NEXT_TO_MOTION: usize = 2;
 /// Squared error a half octave up to which a spectrum is a noise's.
 const AGREES: f64 = 2.5;
@@ -26,7 +26,7 @@ const ERROR: f64 = 0.02;
 /// Standard deviation of the logarithm of a median of periodograms, times the root of their number: Laplace's, of an exponential.
 const OF_MEDIAN: f64 = 1.44;
 
-/// A level of the spectrum over a half octave: frequency in cycles a sample, the logarithm of its power and that's standard error.
+/// A level of the spectrum over a half octave: frequency in cycles a sample, the logarithm of the power, and its standard error.
 #[derive(Debug, Clone, Copy)]
 struct Level {
     frequency: f64,
@@ -56,7 +56,7 @@ fn levels(position: &[f64]) -> Vec<Level> {
     if n < segment + 2 {
         return Vec::new();
     }
-    // Of second differences: a motion is larger by so much that no window would hold it where it is.
+    // Of second differences: else the motion, which is far larger, would leak through any window.
     let series: Vec<f64> = position.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect();
     let window: Vec<f64> = (0..segment)
         .map(|k| {
@@ -77,7 +77,7 @@ fn levels(position: &[f64]) -> Vec<Level> {
             z[..=segment / 2].iter().map(Complex::norm_sqr).collect()
         })
         .collect();
-    // A median: a blow or a spike spoils its segment alone.
+    // A median: an impact or a spike affects its own segment alone.
     let power = |m: usize| -> f64 {
         let mut of_line: Vec<f64> = periodograms.iter().map(|p| p[m]).collect();
         let middle = of_line.len() / 2;

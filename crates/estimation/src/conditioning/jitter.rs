@@ -1,13 +1,13 @@
-//! Noise that grows with the speed: samples taken early or late by a time that no stamp tells.
+//! Noise that grows with the speed: samples taken early or late by a time that no stamp shows.
 //!
 //! A position read `e` too late is off by `e*omega`, so the variance of a channel's noise is `s0^2 + st^2*omega^2`: where the axis stands
-//! it is the encoder's alone. Both are told by how the differences that are free of the motion vary with the speed from stretch to
+//! it is the encoder's alone. Both are estimated from how the differences that are free of the motion vary with the speed from stretch to
 //! stretch, each stretch by the logarithm of its power, so that an impact or a jump of friction affects its own stretch alone.
 
 /// Samples in a stretch: short beside a move, with some ten degrees of freedom in its differences.
 const STRETCH: usize = 32;
-/// Variances of the growth over that at rest that are looked at: powers of this, a step about as large as what a record of some
-/// stretches tells.
+/// The growths that are tried, as variances over that at rest, are powers of this: a step of about the accuracy that a record of some
+/// stretches gives.
 const STEP: f64 = 1.4;
 const POWERS: std::ops::RangeInclusive<i32> = -20..=30;
 /// Largest deviation of a stretch that counts, as the logarithm of its power over that of the law: an impact counts as no more.
@@ -26,7 +26,7 @@ pub struct Growth {
     pub mean: f64,
 }
 
-/// The growth of the noise in `differences` of some order of a position `y`, whole stretches of them; `None` where they tell of none.
+/// The growth of the noise in `differences` of some order of a position `y`, whole stretches of them; `None` where there is none.
 pub fn growth(y: &[f64], differences: &[f64]) -> Option<Growth> {
     let order = y.len().checked_sub(differences.len())?;
     let of = |chunk: &[f64]| chunk.iter().map(|v| v * v).sum::<f64>() / STRETCH as f64;

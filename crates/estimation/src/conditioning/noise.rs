@@ -3,8 +3,8 @@
 //! The `n`-th difference of a smooth signal vanishes while that of white noise keeps the variance
 //! `C(2n, n)*sigma^2`; so `sigma` is the level at which the scaled differences of rising order settle (difference
 //! table of Hamming, Numerical Methods for Scientists and Engineers, 1973, ch. 10; More & Wild, Estimating computational
-//! noise, SIAM J. Sci. Comput. 33, 2011). Levels are medians over blocks: a jump of friction or contact spoils its block
-//! alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
+//! noise, SIAM J. Sci. Comput. 33, 2011). Levels are medians over blocks: a jump of friction or contact affects its own
+//! block alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
 //! start, and serves as one more candidate. What stays of the signal can only raise a level.
 //!
 //! Assumed: the noise is white at the sampling rate, or grows below a corner ([`super::colour`]). Where the levels never settle, the
@@ -34,12 +34,12 @@ const SEEN: f64 = 2.58;
 pub enum NoiseMethod {
     /// Not measured.
     Absent,
-    /// Differences of the channel settled at this order.
+    /// Differences of the channel converged at this order.
     Differences {
         /// The order.
         order: usize,
     },
-    /// Differences of period less period settled at this order.
+    /// Differences between periods converged at this order.
     Periods {
         /// The order.
         order: usize,

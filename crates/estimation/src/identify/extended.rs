@@ -175,7 +175,7 @@ impl<const P: usize> Filter<P> {
 }
 
 /// Extended least squares in batches: LS, its residuals, LS with the past residuals as regressors, repeated until the
-/// estimates rest.
+/// estimates converge.
 ///
 /// # Errors
 /// When the record is too short, does not excite a direction, or the rounds do not converge.

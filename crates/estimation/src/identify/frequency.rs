@@ -66,7 +66,7 @@ pub struct Fit {
     pub iterations: usize,
 }
 
-/// Column of a reading and whether the output drifts freely.
+/// The column of a reading that a signal is measured by.
 const fn column(signal: Signal) -> Option<usize> {
     match signal {
         Signal::Theta1 => Some(0),
@@ -152,7 +152,7 @@ pub fn measure(trace: &Trace, period: usize) -> Option<Measured> {
 /// not linear and most of the noise is gone from it.
 ///
 /// # Errors
-/// None in fact: the signals have one length.
+/// Never, as all signals have one length.
 pub fn average(trace: &Trace, measured: &Measured) -> Result<Trace, TraceError> {
     let n = measured.period;
     let mut out = Trace::new(trace.start, trace.dt, trace.hold);

@@ -109,7 +109,7 @@ impl Known {
     }
 }
 
-/// The torque of a law along a motion, against it.
+/// The torque of a law along a measured motion, which it resists.
 struct Along<'a> {
     p: &'a [f64],
     base: &'a Base<f64>,

@@ -24,7 +24,7 @@ pub const EULER_NOTE: &str = "Euler's rule is first order: on data of any better
                               several to several hundred per cent, whatever the estimator; leave --paper out for the \
                               consistent regression";
 
-/// The rule that carries the state over a sample.
+/// The integration rule over a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rule {
     /// The paper's.

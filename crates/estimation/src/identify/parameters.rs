@@ -99,7 +99,7 @@ pub struct Rows {
     pub table: SVector<f64, 2>,
     /// Their covariance.
     pub table_covariance: SMatrix<f64, 2, 2>,
-    /// Covariance of all five where the residuals may be coloured and go together; None where it is not known.
+    /// Covariance of all five that allows for coloured residuals, correlated between the rows; None where it is not known.
     pub coloured: Option<SMatrix<f64, 5, 5>>,
 }
 
@@ -163,7 +163,7 @@ struct Reconciliation<'a> {
 }
 
 impl Reconciliation<'_> {
-    /// The covariance of the five ratios carried to the four parameters (over their units): `A*five*A'` with
+    /// The covariance of the five ratios propagated to the four parameters (over their units): `A*five*A'` with
     /// `A = inv(J'J)*J'*W`, which is how the parameters move with the ratios.
     fn propagated(&self, q: &DVector<f64>, relative: &DMatrix<f64>, five: &SMatrix<f64, 5, 5>) -> Option<DMatrix<f64>> {
         let jacobian = DMatrix::from_fn(5, 4, {

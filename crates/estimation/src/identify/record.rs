@@ -17,7 +17,7 @@ pub struct RegressionRecord<'a> {
     pub torque: &'a [f64],
     /// Motor angle, rad.
     pub theta1: &'a [f64],
-    /// Table angle, rad; the encoders' zeros brought together.
+    /// Table angle, rad, without the difference of the encoders' zeros.
     pub theta2: Cow<'a, [f64]>,
     /// Speeds of motor and table, where both are measured, rad/s.
     pub omega: Option<(&'a [f64], &'a [f64])>,
@@ -27,7 +27,7 @@ pub struct RegressionRecord<'a> {
     pub start: f64,
     /// What the torque does between samples.
     pub hold: Hold,
-    /// What was added to theta2 to bring the encoders' zeros together, rad: the largest of the pieces'.
+    /// What was added to theta2 for the difference of the encoders' zeros, rad: the largest of the pieces'.
     pub zero_offset: f64,
     /// The pieces, each with the time of its first sample, s; none: the record has no gaps.
     pub pieces: Cow<'a, [(Range<usize>, f64)]>,
@@ -68,7 +68,7 @@ impl<'a> RegressionRecord<'a> {
             _ => Cow::Borrowed(trace.require(Signal::Theta2)?),
         };
         let n = theta1.len() as f64;
-        // A counter that was set between two pieces has another zero in each; how much the twist moves is one for all.
+        // A counter that was set between two pieces has its own zero in each; the deviation of the twist is that of all.
         let means: Vec<f64> = ranges
             .iter()
             .map(|r| {

@@ -1,5 +1,5 @@
-//! The regressions that need no model run, on the rows of [`RegressionRecord`] in the form F5: LS and RLS, and what ELS
-//! ([`super::extended`]) has of them.
+//! The regressions that need no simulation, on the rows of [`RegressionRecord`] in the form F5: LS and RLS, and what they share with ELS
+//! ([`super::extended`]).
 //!
 //! ```text
 //! F5   a1 = -(K/I1)*twist - (B/I1)*rate + (1/I1)*torque      motor
@@ -25,7 +25,7 @@ use super::result::History;
 /// Points of a parameter history.
 const HISTORY: usize = 400;
 
-/// A regression that the data cannot carry.
+/// Why a regression has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegressionError {
@@ -221,7 +221,7 @@ impl LeastSquares {
         self.count += count;
     }
 
-    /// What the standard errors are made of.
+    /// The moments of the rows, for the standard errors.
     pub const fn moments(&self) -> &Moments {
         &self.moments
     }

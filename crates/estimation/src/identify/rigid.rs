@@ -221,7 +221,7 @@ fn longest_run(of_piece: &[usize]) -> Range<usize> {
     runs.max_by_key(ExactSizeIterator::len).unwrap_or(0..0)
 }
 
-/// Standard errors that allow for windows that overlap and residuals that last: Newey-West with a lag of eight windows
+/// Standard errors that allow for overlapping windows and autocorrelated residuals: Newey-West with a lag of eight windows
 /// (W. K. Newey, K. D. West, Econometrica 55, 1987).
 fn robust(rows: &[[f64; 5]], residual: &[f64], of_piece: &[usize], inverse: &DMatrix<f64>) -> Vector4<f64> {
     const LAGS: usize = 8;
@@ -259,7 +259,7 @@ fn shares(motions: &RigidRecord) -> [f64; 3] {
     [rms(&speed) / size, 1.0 / size, 1.0 / size]
 }
 
-/// The estimates, where they are those of an axis. A friction that is negative within its error is none.
+/// The estimates, where an axis can have them. A friction that is negative within its error is set to zero.
 fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
     let (v, s) = (&found.values, &found.std);
     if !v.iter().chain(s.iter()).all(|v| v.is_finite()) || v[0] <= 0.0 {
@@ -284,7 +284,7 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
     Ok(found)
 }
 
-/// How well a fit to the first two thirds makes the torque of the last third, per cent.
+/// Fit of the torque of the last third of the record with the estimates from the first two thirds, per cent.
 fn held_out(joined: &Joined) -> Option<f64> {
     let n = joined.len();
     let (first, rest) = (joined.part(0..2 * n / 3), joined.part(2 * n / 3..n));

@@ -117,7 +117,7 @@ pub(super) fn torque_unit(motion: AxisKind) -> &'static str {
     Signal::T.unit(motion)
 }
 
-/// The steps of a work whose number is known: each is told as "n of N".
+/// Progress over a known number of steps: each is reported as "n of N".
 pub(super) struct Steps<'a> {
     done: usize,
     all: usize,
@@ -125,7 +125,7 @@ pub(super) struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    /// `all` steps to come, told to `progress`.
+    /// Of `all` steps, reported to `progress`.
     pub(super) fn new(all: usize, progress: &'a mut dyn FnMut(&str)) -> Self {
         Self { done: 0, all, progress }
     }
@@ -176,7 +176,7 @@ pub fn identify_joined(
         }
     }
     let joined = &joined;
-    // The regressions have no term for what the axis file knows beside the parameters.
+    // The regressions have no term for the effects that the axis file gives.
     let known = Known::of(machine);
     warnings.extend(known.warnings(machine.structure));
     let taken_off = known.taken_off(joined, machine)?;
@@ -230,7 +230,7 @@ pub fn identify_joined(
                 .to_owned(),
         );
     }
-    // The derived speeds say nothing that the angles do not.
+    // The derived speeds add nothing to the angles.
     let angles = averaged.as_ref().map(|average| {
         let mut angles = average.clone();
         angles.remove(Signal::Omega1);
@@ -299,7 +299,7 @@ pub fn identify_joined(
     })
 }
 
-/// What to tell of a speed that is left out.
+/// Warning of a speed that is left out; `off` is its relative difference from the derivative of the angle.
 pub(super) fn different_speed(speed: Signal, angle: Signal, off: f64) -> String {
     format!(
         "{speed} is not the derivative of {angle} (they differ by {:.0} %): a filtered, delayed or differently scaled \
@@ -308,7 +308,7 @@ pub(super) fn different_speed(speed: Signal, angle: Signal, off: f64) -> String 
     )
 }
 
-/// How far a logged speed is from the derivative of its angle, relative root mean square: the angle's way over eight
+/// How far a logged speed is from the derivative of its angle, relative root mean square: the travel of the angle over eight
 /// samples against the integral of the speed. Zero where one of them is not logged.
 fn speed_error(joined: &Joined, angle: Signal, speed: Signal) -> f64 {
     const SPAN: usize = 8;

@@ -35,11 +35,14 @@ struct Pending {
     rows: usize,
 }
 
-/// What is known of the record before it is worked on.
+/// The record, and what the first pass found.
 struct Frame<'a> {
     stream: &'a Stream,
+    /// Travel of the table per angle, m/rad.
     rho: f64,
+    /// Added to theta2, rad.
     zero_offset: f64,
+    /// Whether the rows use the logged speeds.
     speeds: bool,
 }
 
@@ -53,7 +56,11 @@ impl Frame<'_> {
         self.stream.len().saturating_sub(self.span())
     }
 
-    /// The rows from the first to the last: `take(record, rows of it, number of the first)`.
+    /// Passes the rows to `take(record, count, first)`, from the first to the last: the first `count` rows of `record` are those from
+    /// number `first` on.
+    ///
+    /// # Errors
+    /// As [`Stream::each`].
     fn each(&self, mut take: impl FnMut(&RegressionRecord, usize, usize)) -> Result<(), TraceError> {
         let mut pending = Pending::default();
         let total = self.rows();
@@ -97,6 +104,10 @@ impl Frame<'_> {
     }
 }
 
+/// Angle of the table in a piece, rad: theta2, or x2 over `rho` (m/rad).
+///
+/// # Errors
+/// When neither is measured.
 fn table_angle(piece: &Trace, rho: f64) -> Result<Cow<'_, [f64]>, TraceError> {
     match (piece.get(Signal::Theta2), piece.get(Signal::X2)) {
         (Some(theta2), _) => Ok(Cow::Borrowed(theta2)),
@@ -105,7 +116,7 @@ fn table_angle(piece: &Trace, rho: f64) -> Result<Cow<'_, [f64]>, TraceError> {
     }
 }
 
-/// The angle's way over eight samples against the integral of the speed, as sums: see `run::speed_error`.
+/// Compares the travel of an angle over eight samples with the integral of the speed, in running sums: see `run::speed_error`.
 #[derive(Default)]
 struct SpeedError {
     angle: Vec<f64>,
@@ -223,7 +234,10 @@ pub fn identify(
     })
 }
 
-/// The first pass, and what the user should know of it.
+/// Makes the first pass; gives its warnings, too.
+///
+/// # Errors
+/// When a signal is missing or the record cannot be read.
 fn first_pass<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<String>), TraceError> {
     let rho = machine.parameters.rho;
     let dt = stream.frame().dt;
@@ -237,7 +251,7 @@ fn first_pass<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, V
             let twist = a - b;
             let origin = *origin.get_or_insert(twist);
             sum += twist;
-            // About the first one, so that encoders with far zeros cancel nothing.
+            // About the first twist: no cancellation where the encoders' zeros are far apart.
             squares += (twist - origin).powi(2);
         }
         for (error, (angle, speed)) in speeds.iter_mut().zip(both) {

@@ -1,4 +1,4 @@
-//! Tables 1 to 5 of the paper, computed again beside the paper's own figures, with what agrees and what cannot.
+//! Tables 1 to 5 of the paper, computed again and compared with the paper's own figures: what agrees, and what cannot.
 
 use serde::Serialize;
 
