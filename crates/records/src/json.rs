@@ -39,7 +39,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
                 row(&mut filled, value, k + 1)?;
             }
         }
-        // An array of objects beside what the logger says of itself.
+        // An array of objects, next to metadata of the logger.
         Ok(Value::Object(object)) if object.values().filter(|v| is_rows(v)).count() == 1 => {
             for value in object.values().filter(|v| is_rows(v)).filter_map(Value::as_array) {
                 for (k, value) in value.iter().enumerate() {
@@ -85,7 +85,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     Ok(Table { cut, ..filled.table(file, 1) })
 }
 
-/// An array of objects that ends in the middle, closed behind its last whole object; the text of what was begun behind that.
+/// An array of objects that was cut off, closed after its last complete object, and the text after that.
 fn closed(bytes: &[u8]) -> Option<(Vec<u8>, Option<String>)> {
     let mut open: Vec<u8> = Vec::new();
     let (mut quoted, mut escaped) = (false, false);

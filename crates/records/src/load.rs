@@ -83,13 +83,13 @@ pub struct Loaded {
     pub trace: Trace,
     /// The time stamps of its samples as they were logged, s; None where the file has none.
     pub stamps: Option<Vec<f64>>,
-    /// Each a sentence that says what to do.
+    /// Warnings for the user: each is a sentence that says what to do.
     pub warnings: Vec<String>,
     /// Unit of a current, a voltage or a percentage that stands for the torque one to one.
     pub drive: Option<String>,
 }
 
-/// A record as its gaps have left it.
+/// A record, cut at its gaps.
 #[derive(Debug, Clone)]
 pub struct LoadedPieces {
     /// The longest piece, and what the user should know about the whole.
@@ -122,7 +122,10 @@ pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError
     pieces(table, mapping, false).map(|p| p.longest)
 }
 
-/// Makes the traces of a table: the longest piece, and the others where they are `wanted`.
+/// Makes the traces of a table: the longest piece, and `with_others` the other pieces, too.
+///
+/// # Errors
+/// [`TraceError`], naming file, row and column.
 fn pieces(table: &Table, mapping: &Mapping, with_others: bool) -> Result<LoadedPieces, TraceError> {
     let mut warnings: Vec<String> = table.cut.iter().cloned().collect();
     let wanted = wanted(table, mapping, &mut warnings)?;
@@ -158,7 +161,10 @@ fn pieces(table: &Table, mapping: &Mapping, with_others: bool) -> Result<LoadedP
     Ok(LoadedPieces { longest, others })
 }
 
-/// The signals on a clock.
+/// The trace of the `wanted` columns, in SI units, on the grid of `clock`.
+///
+/// # Errors
+/// As [`values`] and [`unwrap`]; and when no column is a signal.
 fn trace(
     table: &Table,
     mapping: &Mapping,
@@ -180,7 +186,7 @@ fn trace(
         if let Some(time) = stamps {
             values = match *resampling {
                 Resampling::None => values,
-                // The torque belongs to its sample under either hold: only the motion is read off at the grid's times.
+                // The torque stays as sampled under either hold: only the motion is interpolated to the grid's times.
                 Resampling::Near if matches!(signal, Signal::T | Signal::Command) => values,
                 Resampling::Near => resample(time, &values, grid),
                 Resampling::Far { samples } => resample_far(time, &values, grid, samples, held),
@@ -197,7 +203,8 @@ fn trace(
 /// The unit that `[signals]` gives to a drive's number of no unit, as a servo's bus or a controller's trace has it.
 pub const COUNTS: &str = "counts";
 
-/// The unit of a current, a voltage or a percentage that stands for the torque one to one; it may be all that the column's name ends in.
+/// Unit of the torque where its column is a drive's quantity (current, voltage, percentage, counts) and `[signals]` gives no factor to
+/// N.m; `None` otherwise. The unit is that of the header, of `[signals]`, or the one that the column's name ends in.
 pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> Option<String> {
     let index = table.position(&column.column)?;
     let header = &table.headers[index];
@@ -214,7 +221,7 @@ pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> 
     (signal == Signal::T && unit.quantity == Quantity::Drive && plain).then(|| base.to_owned())
 }
 
-/// That no torque constant is given: then no unit of the results is what it is called.
+/// Warning where the torque is in a drive's unit and no torque constant is given: inertia and stiffness then come out in that unit.
 pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: AxisKind) -> Option<String> {
     let written = in_drive_units(table, column, signal)?;
     let turn = motion.unit("rad");
@@ -225,7 +232,8 @@ pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal,
     ))
 }
 
-/// The signals that the file has, and where.
+/// The signals of the file, each with its column: what `[signals]` maps, and what has a signal's own name. Appends a warning where
+/// `[signals]` does not fit the file and is not used.
 ///
 /// # Errors
 /// When a column of `[signals]` is not in the table.
@@ -244,7 +252,7 @@ pub(super) fn wanted(
         }
         return Ok(all);
     }
-    // The log of the axis file, or a trace this program wrote: one or the other, never a mixture.
+    // Either the columns that [signals] maps, or those of a trace that this program wrote: never some of both.
     let mapped = |c: &Column| table.position(&c.column).is_some();
     let own = |s: Signal| table.own(s).is_some();
     if !mapping.signals.iter().any(|(s, c)| !s.is_of_the_loop() && mapped(c))
@@ -265,7 +273,7 @@ pub(super) fn wanted(
             return Err(missing(table, signal.name(), &column.column));
         }
     }
-    // Signals that [signals] does not speak of are found by their own names, where no other signal has the column.
+    // Signals that [signals] does not name are found by their own names, where no other signal has the column.
     for (signal, column) in Signal::ALL.into_iter().filter_map(named) {
         let is_mapped = mapping.signals.iter().any(|(s, _)| *s == signal);
         let taken = there.iter().any(|(_, c)| table.position(&c.column) == table.position(&column.column));
@@ -287,7 +295,7 @@ fn missing(table: &Table, signal: &'static str, wanted: &str) -> TraceError {
     }
 }
 
-/// Which column it is, and the factor that brings it to SI.
+/// Index of a column in the table, and the factor from its numbers to SI units: the scale of `[signals]` times the factor of its unit.
 ///
 /// # Errors
 /// When the column is missing, or its unit is unknown or of another quantity.
@@ -299,7 +307,7 @@ pub(super) fn scale(
 ) -> Result<(usize, f64), TraceError> {
     let index = table.position(&column.column).ok_or_else(|| missing(table, signal, &column.column))?;
     let mut scale = column.scale;
-    // A column found by the signal's own name has the unit at that name's end; one that [signals] names has none but there.
+    // A unit at the end of a column's name counts only where the column was found by the signal's own name, not by [signals].
     let own = Signal::from_name(signal).is_some_and(|s| table.own(s) == Some(index))
         || (signal == "time" && time_name(&table.headers[index].name));
     let suffixed = || guess::suffix(&table.headers[index].name).filter(|_| own).map(|(_, unit)| unit.symbol.to_owned());
@@ -329,7 +337,7 @@ pub(super) fn scale(
     Ok((index, scale))
 }
 
-/// Raw values scaled.
+/// `scale*raw + offset` for each value.
 pub(super) fn scaled(raw: &[f64], scale: f64, offset: f64) -> Vec<f64> {
     if scale == 1.0 && offset == 0.0 { raw.to_vec() } else { raw.iter().map(|v| v * scale + offset).collect() }
 }
@@ -389,7 +397,7 @@ pub(super) fn time_column(table: &Table, mapping: &Mapping) -> Result<Option<Col
     Ok(Some(column))
 }
 
-/// No column is a signal.
+/// The error where no column is a signal.
 pub(super) fn no_signal(table: &Table) -> TraceError {
     TraceError::NoTable {
         file: table.file.clone(),

@@ -176,7 +176,7 @@ struct Reader {
     elements: usize,
 }
 
-/// One element: its type, its data, and what stands behind it.
+/// One element: its type, its data, and the bytes after it.
 struct Element<'a> {
     kind: u32,
     data: &'a [u8],

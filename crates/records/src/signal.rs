@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::axis::AxisKind;
 
-/// A physical quantity, as far as a trace needs to tell one unit from another.
+/// A physical quantity, by which the units of a trace are checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// s
@@ -81,7 +81,7 @@ impl Signal {
         Self::Command,
     ];
 
-    /// Whether the signal is of the drive's loop: it says nothing of the axis itself, and a trace may lack it.
+    /// Whether the signal belongs to the drive's control loop, not to the axis: a trace may be without it.
     #[must_use]
     pub const fn is_of_the_loop(self) -> bool {
         matches!(self, Self::Reference | Self::Command)

@@ -16,7 +16,7 @@ use super::table::{Table, header};
 use super::units::Unit;
 use crate::xml::{Document, Element};
 
-/// Whether XML is what the text begins as.
+/// Whether the text begins as XML does.
 pub(super) fn is_xml(text: &[u8]) -> bool {
     let first = text.trim_ascii_start();
     first.starts_with(b"<?xml") || first.starts_with(b"<trace")
@@ -66,7 +66,7 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         let Some(id) = signal.get("id") else { continue };
         let key = signal.get("key").unwrap_or(id);
         let name = signal.get("name").filter(|n| !n.trim().is_empty()).unwrap_or(key);
-        // Two signals of one name are told apart by their ids.
+        // Two signals of one name are distinguished by their ids.
         let taken = signals.iter().any(|(_, other)| header(other).name == header(name).name);
         let name = if taken { format!("{name} ({id})") } else { name.to_owned() };
         signals.push((id, named(&name, signal.get("unitsType").unwrap_or_default())));
@@ -97,14 +97,14 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     Ok(Table { cut, ..filled.table(file, 1) })
 }
 
-/// A trace of Sinumerik that was closed behind its last whole sample.
+/// A trace of Sinumerik that was cut off, closed after its last complete sample.
 struct Closed {
     whole: Vec<u8>,
-    /// Line and text of the sample that was begun behind that.
+    /// Line and text of the incomplete sample after it.
     begun: Option<(usize, String)>,
 }
 
-/// Closes a trace of Sinumerik that ends in the middle; None where it has no whole sample.
+/// Closes a trace of Sinumerik that is cut off; None where it has no complete sample.
 fn closed(bytes: &[u8]) -> Option<Closed> {
     let end = memchr::memmem::rfind(bytes, b"/>")? + 2;
     let begun = bytes[end..].trim_ascii();

@@ -53,7 +53,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
         self.state(force, force, memory)
     }
 
-    /// The end that the torques `led` lead to, and the torques `found` that the laws give there, N.m.
+    /// The state at the end under the torques `led`, N.m; `found` are the torques that the laws give there, N.m.
     fn state(&self, led: [S; 2], found: [S; 2], memory: Memory<S>) -> State<S> {
         let (linear, friction) = self.end(led);
         State { linear, friction, force: found, memory, ..*self.from }

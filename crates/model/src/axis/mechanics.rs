@@ -41,7 +41,7 @@ pub(super) struct Length<S> {
     pub step: Propagator<S>,
     /// Prepared for the step that nothing ends early.
     pub compliance: Option<Compliance>,
-    /// Response of the end of the step to a unit of the single law's torque there, against it.
+    /// What one N.m less of the single law's torque at the end of the step adds to the state there, rad and rad/s.
     pub response: Linear<S>,
 }
 
@@ -130,7 +130,7 @@ impl<S: Scalar> Mechanics<S> {
         if pull.re() > gap.re() { pull } else { gap }
     }
 
-    /// The side of contact that belongs to the twist: the one beyond whose end it is, if that side pushes.
+    /// Sets the side of contact by the twist: the end of the gap that the twist is beyond, if the contact pushes there.
     pub fn set_contact(&self, s: &mut State<S>) {
         if self.backlash {
             let side = s.linear[2].re().signum() as i8;

@@ -40,7 +40,7 @@ pub enum AxisKind {
 }
 
 impl AxisKind {
-    /// The unit that stands for one of the rotary axis: an angle becomes a length, a torque a force, an inertia a mass.
+    /// The unit on this kind of axis in place of one of the rotary axis: an angle becomes a length, a torque a force, an inertia a mass.
     #[must_use]
     pub fn unit(self, rotary: &'static str) -> &'static str {
         const LINEAR: [(&str, &str); 11] = [

@@ -85,7 +85,7 @@ impl<'a, S: Scalar, L: Law> SingleLaw<'a, S, L> {
         Self { mechanics, effect, from, segment, free, end, per_torque, law: PhantomData }
     }
 
-    /// The end that the torque `led` leads to, and the torque `found` that the law gives there, N.m.
+    /// The state at the end under the torque `led`, N.m; `found` is the torque that the law gives there, N.m.
     #[inline]
     fn state(&self, led: S, found: S, memory: Memory<S>) -> State<S> {
         let linear = std::array::from_fn(|i| self.free[i] - self.segment.length.response[i] * led);

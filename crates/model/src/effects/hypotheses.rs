@@ -6,7 +6,7 @@ use super::{Effect, Length};
 use crate::axis::{AxisKind, Structure};
 
 impl ParameterInfo {
-    /// Its unit on an axis of that motion; a phase is an angle on every one.
+    /// Its unit on that kind of axis; a phase is an angle on both.
     #[must_use]
     pub fn unit_on(&self, motion: AxisKind) -> &'static str {
         if matches!(self.start, Start::Phase) { self.unit } else { motion.unit(self.unit) }
@@ -33,13 +33,13 @@ impl Effect {
         }
     }
 
-    /// The effect that a common factor of every parameter of the axis comes to, and its parameter.
+    /// The effect that scales every parameter of the axis by one factor, and its parameter: a wrong torque constant.
     #[must_use]
     pub fn of_gain() -> Option<(Self, usize)> {
         super::EFFECTS.iter().find_map(|e| Some((*e, e.gain_parameter()?)))
     }
 
-    /// Radians of its torque's phase in a radian of its place, of a torque that repeats with the angle.
+    /// Order of a torque that is periodic in the angle: radians of its phase per radian at its place. `None` of any other.
     #[must_use]
     pub fn order(self, values: &[f64]) -> Option<f64> {
         match self.length()? {

@@ -80,8 +80,8 @@ impl Head {
     }
 }
 
-/// Refuses a name that two columns have. Of a quantity that stands in several units, each in a column of its own, as in the summary of
-/// rotary and linear machines, every column keeps its unit in its name; of a signal one is meant, and which is not guessed.
+/// Refuses a name that two columns have. A quantity may be given in several units, one column for each, as in the summary of rotary and
+/// linear machines: each of these columns gets its unit into its name. Two columns with the name of a signal are always refused.
 ///
 /// # Errors
 /// [`TraceError::TwiceNamed`] when two columns have one name.

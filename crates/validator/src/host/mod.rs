@@ -194,7 +194,7 @@ pub(crate) fn note(call: Call) {
     }
 }
 
-/// Notes that from now on the FMU has values that it did not choose itself, until the guard goes.
+/// Marks, until the guard is dropped, that the FMU has values that the validator chose.
 pub(crate) fn chosen_values() -> ChosenValues {
     mark_chosen_values(1);
     ChosenValues

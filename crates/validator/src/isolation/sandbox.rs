@@ -272,7 +272,7 @@ mod linux {
     }
 
     /// Calls that change rights, look at or leave things behind in the kernel, or slow others down; libraries make them in
-    /// passing and live with a no. Which processors a younger process runs on stays open: a thread of this one is bound by the
+    /// passing and work without. Which processors a younger process runs on stays open: a thread of this one is bound by the
     /// same call, under a number that cannot be distinguished from those of others.
     fn quiet() -> seccompiler::Result<Rules> {
         let mut all = vec![

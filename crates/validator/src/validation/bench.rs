@@ -1,4 +1,4 @@
-//! Testing the behavioural rules: each in a child process, the first ones in order, the rest side by side.
+//! Tests the behavioural rules: each in a child process, the first ones in order, the rest in parallel.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -218,7 +218,7 @@ impl<'a> Bench<'a> {
             outcome = isolation::run(&place, job(learned))?;
         }
         if rule.is(id::INSTANCES_REPEATED) && outcome.chosen_values && outcome.ended != Ended::Well {
-            // It does not bear inputs that vary; without them it can be tested all the same.
+            // It fails with inputs that vary; with constant ones it can be tested all the same.
             let tame = Learned { tame: true, ..learned.clone() };
             outcome = isolation::run(&place, job(&tame))?;
         }
