@@ -137,8 +137,8 @@ fn pseudolinear(
     if lambda >= 1.0 {
         // A recursion whose first steps still have weight need not end where the sum of its scores is zero: the remaining distance is an
         // error, too.
-        let way = inverse * SVector::<f64, ALL>::from(scores.total::<ALL>());
-        covariance += way * way.transpose();
+        let remaining = inverse * SVector::<f64, ALL>::from(scores.total::<ALL>());
+        covariance += remaining * remaining.transpose();
     }
     let kept = [0, 1, 2, MOTOR_ELS, MOTOR_ELS + 1];
     let five = SMatrix::<f64, 5, 5>::from_fn(|i, j| covariance[(kept[i], kept[j])]);

@@ -201,7 +201,8 @@ impl<'a> OutputError<'a> {
     }
 
     /// Overrides the weights with known noise levels, one for each output, in its unit.
-    pub fn weigh(&mut self, sigma: &[f64]) {
+    #[cfg(test)]
+    pub(super) fn weigh(&mut self, sigma: &[f64]) {
         self.sigma = sigma.to_vec();
     }
 
@@ -315,8 +316,8 @@ impl<'a> OutputError<'a> {
     }
 
     /// Fits with the weights as given and no re-weighting: the covariance is for those weights.
-    #[must_use]
-    pub fn fit_weighted(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
+    #[cfg(test)]
+    pub(super) fn fit_weighted(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
         let mut problem = self.clone();
         problem.options.scheme = scheme;
         problem.damping_unit = if start.b > 0.0 { start.b } else { 1.0 };

@@ -94,21 +94,16 @@ pub enum RigidError {
     Unexcited(String),
 }
 
-/// Identifies a rigid axis from torque and angle (rad or m), sampled every `dt` s.
-///
-/// # Errors
-/// [`RigidError`].
-pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) -> Result<Rigid, RigidError> {
-    let whole = std::iter::once(0..theta.len()).collect::<Vec<_>>();
-    weak_in_pieces(&RigidRecord { torque, theta, dt, pieces: &whole, starts: &[start] })
-}
-
 /// Torque and angle of a record in pieces.
 #[derive(Clone, Copy)]
 struct RigidRecord<'a> {
+    /// N.m (or N), one value a sample.
     torque: &'a [f64],
+    /// rad (or m), one value a sample.
     theta: &'a [f64],
+    /// Interval, s.
     dt: f64,
+    /// Samples of each piece.
     pieces: &'a [Range<usize>],
     /// Time of each piece's first sample, s.
     starts: &'a [f64],
@@ -132,9 +127,12 @@ impl<'a> RigidRecord<'a> {
     }
 }
 
-/// The same of a record in pieces: no window reaches from one into the next.
-fn weak_in_pieces(motions: &RigidRecord) -> Result<Rigid, RigidError> {
-    let n = motions.longest();
+/// Identifies a rigid axis. No window reaches from one piece into the next.
+///
+/// # Errors
+/// When the record is too short or a direction is not excited.
+fn weak_in_pieces(record: &RigidRecord) -> Result<Rigid, RigidError> {
+    let n = record.longest();
     if 8 * LEAST_HALF + 2 > n {
         return Err(RigidError::TooShort { samples: n, window: 2 * LEAST_HALF + 1 });
     }
@@ -144,7 +142,7 @@ fn weak_in_pieces(motions: &RigidRecord) -> Result<Rigid, RigidError> {
     let mut half = LEAST_HALF;
     let mut failure = None;
     while 8 * half + 2 <= n {
-        match in_windows(motions, half) {
+        match in_windows(record, half) {
             Ok(found) => {
                 let share = |r: &Rigid| r.std[0] / r.values[0].abs();
                 if best.as_ref().is_none_or(|b| share(&found) < share(b)) {
@@ -159,14 +157,14 @@ fn weak_in_pieces(motions: &RigidRecord) -> Result<Rigid, RigidError> {
 }
 
 /// The regression in windows of `2*half + 1` samples.
-fn in_windows(motions: &RigidRecord, half: usize) -> Result<Rigid, RigidError> {
-    let RigidRecord { torque, theta, dt, .. } = *motions;
+fn in_windows(record: &RigidRecord, half: usize) -> Result<Rigid, RigidError> {
+    let RigidRecord { torque, theta, dt, .. } = *record;
     let w = Window::new(half);
     let span = 2 * half + 1;
     let total: f64 = w.psi.iter().sum();
     // Speed smoothed by the same test function, for the sign of the dry friction.
     let mut speed = vec![0.0; theta.len()];
-    for piece in motions.pieces.iter().filter(|p| p.len() >= span) {
+    for piece in record.pieces.iter().filter(|p| p.len() >= span) {
         for k in piece.clone() {
             let first = k.saturating_sub(half).clamp(piece.start, piece.end - span);
             speed[k] = -Window::apply(&w.first, &theta[first..first + span]) / (total * dt);
@@ -177,7 +175,7 @@ fn in_windows(motions: &RigidRecord, half: usize) -> Result<Rigid, RigidError> {
     let step = (half / 2).max(1);
     let mut centres = Vec::new();
     let (mut times, mut of_piece) = (Vec::new(), Vec::new());
-    let pieces = motions.pieces.iter().zip(motions.starts).enumerate();
+    let pieces = record.pieces.iter().zip(record.starts).enumerate();
     for (number, (piece, start)) in pieces.filter(|(_, (p, _))| p.len() >= span) {
         let own = (piece.start + half..piece.end - half).step_by(step);
         times.extend(own.clone().map(|k| start + (k - piece.start) as f64 * dt));
@@ -251,11 +249,11 @@ fn units(motion: AxisKind) -> [&'static str; 4] {
 }
 
 /// Torques at one unit of viscous friction, dry friction and load, as shares of the torque's size.
-fn shares(motions: &RigidRecord) -> [f64; 3] {
-    let size = rms(motions.torque).max(f64::MIN_POSITIVE);
-    let span = 8.min(motions.longest().saturating_sub(1)).max(1);
-    let windows = motions.pieces.iter().flat_map(|p| motions.theta[p.clone()].windows(span + 1));
-    let speed: Vec<f64> = windows.map(|w| (w[span] - w[0]) / (span as f64 * motions.dt)).collect();
+fn shares(record: &RigidRecord) -> [f64; 3] {
+    let size = rms(record.torque).max(f64::MIN_POSITIVE);
+    let span = 8.min(record.longest().saturating_sub(1)).max(1);
+    let windows = record.pieces.iter().flat_map(|p| record.theta[p.clone()].windows(span + 1));
+    let speed: Vec<f64> = windows.map(|w| (w[span] - w[0]) / (span as f64 * record.dt)).collect();
     [rms(&speed) / size, 1.0 / size, 1.0 / size]
 }
 
@@ -312,7 +310,7 @@ pub(super) fn identify(
     let taken_off = known.taken_off(joined, machine)?;
     let regressed = taken_off.as_ref().unwrap_or(joined);
     let trace = joined.samples();
-    let motions = RigidRecord::of(regressed)?;
+    let record = RigidRecord::of(regressed)?;
     let motion = machine.signals.motion;
     progress("weak-form least squares");
     let mut result = MethodResult::empty("ls", "Least squares, weak form");
@@ -320,16 +318,15 @@ pub(super) fn identify(
     let unit = Signal::T.unit(motion);
     let mut recommended = None;
     let mut evidence = Evidence::default();
-    let found = weak_in_pieces(&motions).map_err(|e| e.to_string());
-    match found.and_then(|f| physical(f, &shares(&motions))) {
+    let found = weak_in_pieces(&record).map_err(|e| e.to_string());
+    match found.and_then(|f| physical(f, &shares(&record))) {
         Ok(found) => {
             let window = (2 * found.half + 1) as f64 * trace.dt;
             result.formulation =
                 format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
-            evidence =
-                Evidence { held_out: held_out(regressed), shares: Some(shares(&motions)), ..Evidence::default() };
+            evidence = Evidence { held_out: held_out(regressed), shares: Some(shares(&record)), ..Evidence::default() };
             for (i, name) in names.into_iter().enumerate() {
                 let r = if i == 0 { reference } else { None };
                 result.parameters.push(Estimate::new(name, units(motion)[i], found.values[i], Some(found.std[i]), r));
@@ -382,6 +379,12 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
+    /// Of a record in one piece that starts at zero.
+    fn identified(torque: &[f64], theta: &[f64], dt: f64) -> Result<Rigid, RigidError> {
+        let pieces = std::iter::once(0..theta.len()).collect::<Vec<_>>();
+        weak_in_pieces(&RigidRecord { torque, theta, dt, pieces: &pieces, starts: &[0.0] })
+    }
+
     #[test]
     fn inertia_and_friction_of_a_rigid_axis_are_found_within_their_standard_errors() {
         // theta given in closed form, so that the torque follows from it exactly: no simulator is involved.
@@ -403,7 +406,7 @@ mod tests {
             let e: f64 = StandardNormal.sample(&mut rng);
             torque.push(i * a + d * v + f * v.signum() + l + 2.0 * e);
         }
-        let found = weak_least_squares(&torque, &theta, dt, 0.0).unwrap();
+        let found = identified(&torque, &theta, dt).unwrap();
         for (k, truth) in [i, d, f, l].into_iter().enumerate() {
             let error = (found.values[k] - truth).abs();
             assert!(error < 4.0 * found.std[k] + 1e-3 * truth.abs(), "{k}: {} +- {}", found.values[k], found.std[k]);
@@ -413,7 +416,7 @@ mod tests {
 
     #[test]
     fn an_axis_that_only_stands_is_refused_by_name() {
-        let error = weak_least_squares(&[1.0; 500], &[0.5; 500], 1e-3, 0.0).unwrap_err().to_string();
+        let error = identified(&[1.0; 500], &[0.5; 500], 1e-3).unwrap_err().to_string();
         assert!(error.contains("the inertia"), "{error}");
     }
 }
