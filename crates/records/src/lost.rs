@@ -228,14 +228,14 @@ fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
 
 /// Change of the position after a sample that was held, in steps of the encoder, from which on the axis was moving: a slow position, which
 /// repeats as well, changes by one step.
-const GOES_ON: f64 = 1.5;
+const MOVING: f64 = 1.5;
 
 /// Indices of those samples that [`bridge`] replaces that repeat the one before, in order: the log held them while the axis moved.
 #[must_use]
 pub fn held(y: &[f64], noise: f64) -> Vec<usize> {
     // Most records have none: nothing is fitted there.
     let step = (1..y.len()).filter(|k| !repeats(y, *k)).map(|k| (y[k] - y[k - 1]).abs()).fold(f64::INFINITY, f64::min);
-    if !(1..y.len().saturating_sub(1)).any(|k| repeats(y, k) && (y[k + 1] - y[k]).abs() >= GOES_ON * step) {
+    if !(1..y.len().saturating_sub(1)).any(|k| repeats(y, k) && (y[k + 1] - y[k]).abs() >= MOVING * step) {
         return Vec::new();
     }
     let mut held = bridged(&mut y.to_vec(), noise);

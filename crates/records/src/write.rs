@@ -182,12 +182,12 @@ fn folder_of(path: &Path) -> &Path {
 /// Why no file can be made in a folder, without the temporary name, which the user did not give.
 fn refused(folder: &Path, error: &std::io::Error) -> std::io::Error {
     let there = folder.display();
-    let words = match std::fs::metadata(folder) {
+    let reason = match std::fs::metadata(folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => format!("the folder {there} does not exist"),
         Ok(found) if !found.is_dir() => format!("{there} is no folder"),
         _ => error.get_ref().and_then(std::error::Error::source).map_or_else(|| error.to_string(), ToString::to_string),
     };
-    std::io::Error::new(error.kind(), words)
+    std::io::Error::new(error.kind(), reason)
 }
 
 /// How the names of temporary files begin.

@@ -79,8 +79,8 @@ mod tests {
         spoilt.set(Signal::Theta1, y).unwrap();
         let pieces = [spoilt.slice(0..1500), spoilt.slice(1500..4096)];
         let mut joined = Joined::of(&pieces).unwrap();
-        let words = lost(&mut joined);
-        assert!(words.len() == 1 && words[0].starts_with("4 samples of theta1"), "{words:?}");
+        let warnings = lost(&mut joined);
+        assert!(warnings.len() == 1 && warnings[0].starts_with("4 samples of theta1"), "{warnings:?}");
         let (repaired, truth) = (joined.samples().get(Signal::Theta1).unwrap(), sound.get(Signal::Theta1).unwrap());
         for k in 0..4096 {
             let off = (repaired[k] - truth[k]).abs();

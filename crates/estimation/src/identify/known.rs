@@ -167,11 +167,11 @@ mod tests {
             let value = found.methods[0].parameters.iter().find(|e| e.name == "I").map(|e| e.value);
             (value, found.warnings.join(" "))
         };
-        let (known, words) = inertia(&machine);
+        let (known, warnings) = inertia(&machine);
         assert!((known.unwrap() / 0.02 - 1.0).abs() < 0.01, "{known:?}");
-        assert!(words.contains("gravity") && words.contains("taken off"), "{words}");
-        let (unknown, words) = inertia(&Machine { effects: Settings::default(), ..machine });
+        assert!(warnings.contains("gravity") && warnings.contains("taken off"), "{warnings}");
+        let (unknown, warnings) = inertia(&Machine { effects: Settings::default(), ..machine });
         assert!(unknown.is_none_or(|i| (i / 0.02 - 1.0).abs() > 0.2), "{unknown:?}");
-        assert!(words.is_empty(), "{words}");
+        assert!(warnings.is_empty(), "{warnings}");
     }
 }

@@ -43,7 +43,7 @@ impl Run<'_> {
         let (lambda, p0) = (self.request.forgetting, self.request.p0);
         let mut result = MethodResult::empty(method.name(), method.title());
         let plain = format!("F5, {}", self.record.equations());
-        let recursive_words = format!("forgetting factor {lambda}, P(0) = {p0:e}");
+        let recursion = format!("forgetting factor {lambda}, P(0) = {p0:e}");
         let found: Result<Found, String> = match method {
             _ if self.request.paper && matches!(method, Method::Ls | Method::Rls | Method::Els | Method::ElsBatch) => {
                 result.formulation = "Euler 5x4 (paper, eq. 6)".to_owned();
@@ -58,11 +58,11 @@ impl Run<'_> {
                 least_squares(self.record).map(|e| (e, None)).map_err(|e| e.to_string())
             }
             Method::Rls => {
-                result.formulation = format!("{plain}; {recursive_words}");
+                result.formulation = format!("{plain}; {recursion}");
                 recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
             }
             Method::Els => {
-                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}; {recursive_words}");
+                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}; {recursion}");
                 extended_recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
             }
             Method::ElsBatch => {

@@ -427,7 +427,7 @@ mod tests {
         assert_eq!(machine.signals.signals[0].0, Signal::Reference);
         let text = machine.to_toml();
         assert_eq!(Machine::parse(&text, "axis.toml").unwrap_or_else(|e| panic!("{e}\n{text}")), machine, "{text}");
-        for (wrong, says) in [
+        for (wrong, expected) in [
             ("kp = 1\nkv = 1\n", "names no column of the reference"),
             ("reference = \"r\"\nkp = 1\n", "has no kv"),
             ("reference = \"r\"\nkp = 1\nkv = -1\n", "kv is -1"),
@@ -435,7 +435,7 @@ mod tests {
             ("reference = \"r\"\nkp = 1\nkv = 1\nspeed = \"fast\"\n", "\"difference\" or \"measured\""),
         ] {
             let message = error(&format!("{PARAMETERS}[controller]\n{wrong}"));
-            assert!(message.contains(says), "{message}");
+            assert!(message.contains(expected), "{message}");
         }
     }
 
