@@ -7,7 +7,7 @@ use std::process::Command;
 
 use eixo::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use eixo::effects::Settings;
-use eixo::trace::{Mapping, Motion, Signal, Trace, load, write_csv};
+use eixo::trace::{AxisKind, Mapping, Signal, Trace, load, write_csv};
 
 #[path = "program/run.rs"]
 mod run;
@@ -56,7 +56,7 @@ fn experiment_under(folder: &Path, hold: Hold) -> PathBuf {
     trace.set(Signal::Theta2, column(|r| r.theta2)).expect("theta2");
     trace.set(Signal::Omega2, column(|r| r.omega2)).expect("omega2");
     let path = folder.join("trace.csv");
-    write_csv(&path, &trace, Motion::Rotary).expect("the trace");
+    write_csv(&path, &trace, AxisKind::Rotary).expect("the trace");
     path
 }
 
@@ -300,7 +300,7 @@ fn what_no_torque_moves_and_what_no_sample_shows_is_not_identified_even_where_it
             .with(Signal::T, torque)
             .and_then(|t| t.with(Signal::Theta1, one))
             .and_then(|t| t.with(Signal::Theta2, two));
-        write_csv(&path, &odd.expect("a trace"), Motion::Rotary).expect("written");
+        write_csv(&path, &odd.expect("a trace"), AxisKind::Rotary).expect("written");
         let [json, page] = ["odd.json", "odd.html"].map(|name| folder.path().join(name));
         let out = eixo(&["identify", text(&path), "--trust", "--json", text(&json), "--report", text(&page)]);
         let said = String::from_utf8_lossy(&out.stdout).split_whitespace().collect::<Vec<_>>().join(" ");

@@ -1,7 +1,7 @@
 //! Real machines under the diagnosis: traces from `EIXO_DATA` (default `../shared/data`); without them each test says so
 //! and passes.
 
-use eixo::axis::{Motion, Parameters, Structure};
+use eixo::axis::{AxisKind, Parameters, Structure};
 use eixo::diagnose::{Case, Model, NoiseEstimate, Record, diagnose, estimate_noise};
 use eixo::effects::{EFFECTS, Settings};
 use eixo::trace::{Hold, Table};
@@ -50,7 +50,7 @@ fn bench(torque: &str) -> Option<eixo::diagnose::Diagnosis> {
     let case = Case {
         machine: "bench".to_owned(),
         nominal: Model::new(parameters, Structure::TwoInertia, Settings::default()),
-        motion: Motion::Rotary,
+        motion: AxisKind::Rotary,
         train: &record,
         noise: &noise,
         holdout: None,
@@ -100,7 +100,7 @@ fn on_emps_and_on_its_parts_friction_and_viscosity_are_named_with_their_publishe
                 Structure::Rigid,
                 Settings::default(),
             ),
-            motion: Motion::Linear,
+            motion: AxisKind::Linear,
             train: &record,
             noise: &noise,
             holdout: None,

@@ -367,14 +367,17 @@ mod tests {
 
     #[test]
     fn an_unstable_loop_and_senseless_numbers_are_refused() {
-        let mut wild = axis(Settings::default());
-        wild.servo = Servo::tuned(&wild.parameters, 1e5, None);
-        let calm = axis(Settings::default());
-        assert!(matches!(run(&wild, &calm, &TEST), Err(CircleError::Unstable { axis: "X", .. })));
+        let mut unstable_axis = axis(Settings::default());
+        unstable_axis.servo = Servo::tuned(&unstable_axis.parameters, 1e5, None);
+        let stable_axis = axis(Settings::default());
+        assert!(matches!(run(&unstable_axis, &stable_axis, &TEST), Err(CircleError::Unstable { axis: "X", .. })));
         assert!(matches!(
-            run(&calm, &calm, &CircleTest { feed: f64::NAN, ..TEST }),
+            run(&stable_axis, &stable_axis, &CircleTest { feed: f64::NAN, ..TEST }),
             Err(CircleError::NotPositive { name: "feed", .. })
         ));
-        assert!(matches!(run(&calm, &calm, &CircleTest { feed: 100.0, ..TEST }), Err(CircleError::Samples { .. })));
+        assert!(matches!(
+            run(&stable_axis, &stable_axis, &CircleTest { feed: 100.0, ..TEST }),
+            Err(CircleError::Samples { .. })
+        ));
     }
 }

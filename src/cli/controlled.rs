@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use super::examined::Part;
-use crate::diagnose::{Model, Record as Logged, UnderControl};
+use crate::diagnose::{Model, Record, UnderControl};
 use crate::fmu::simulate::{Column, Setting, SimulationResult};
 use crate::report::Block;
 use crate::report::diagnose::errors_in_the_loop;
@@ -18,9 +18,9 @@ fn model(machine: &Machine) -> Model {
 }
 
 /// A trace as the loop sees it: what the drive controls, without noise.
-fn logged(trace: &Trace) -> Logged {
+fn logged(trace: &Trace) -> Record {
     let channel = |s| trace.get(s).map(<[f64]>::to_vec);
-    Logged {
+    Record {
         start: trace.start,
         dt: trace.dt,
         hold: trace.hold,

@@ -28,7 +28,7 @@ use crate::identify::run::{Method, Request, identify};
 use crate::identify::tables::reproduce;
 use crate::report::demo::{Findings, PLAYED, linked, report, short};
 use crate::report::{Block, Report, diagnose as diagnosis, html, terminal};
-use crate::trace::{Hold, Machine, Motion, Signal, Trace, write_csv, write_text};
+use crate::trace::{AxisKind, Hold, Machine, Signal, Trace, write_csv, write_text};
 
 /// Arguments of `eixo demo`.
 #[derive(Debug, clap::Args)]
@@ -65,7 +65,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let dt = dt_criterion(KAPPA, SAMPLES, Parameters::PAPER.modal().wn);
     let excitation = Multisine::new(Kind::Schroeder, SAMPLES, 1, LINES, RMS, 0.0, 0)?;
     let torque = Trace::new(0.0, dt, Hold::Linear).with(Signal::T, excitation.period())?;
-    write_csv(&file("excitation.csv"), &torque, Motion::Rotary)?;
+    write_csv(&file("excitation.csv"), &torque, AxisKind::Rotary)?;
 
     steps.next("simulating the FMU");
     let host = Host::new().context("cannot find this program's own file")?;
@@ -73,7 +73,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let record =
         simulate(&fmu_file, &Inputs::of(&torque)?, &options, &host).with_context(|| fmu_file.display().to_string())?;
     let trace = record.trace(Hold::Linear)?;
-    write_csv(&file("trace.csv"), &trace, Motion::Rotary)?;
+    write_csv(&file("trace.csv"), &trace, AxisKind::Rotary)?;
 
     let machine = Machine { name: "the paper's X axis".to_owned(), ..Machine::default() };
     let methods = [Method::Ls, Method::Rls, Method::Els, Method::Iv, Method::Oe];
@@ -104,9 +104,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     steps.finish();
 
     let layout = super::stdout::layout(super::stdout::WIDTH);
-    let mut story = vec![Block::Paragraph(format!("A machine that disagrees with its model: {PLAYED}"))];
-    story.extend(disagreement);
-    out!("{}", terminal::blocks(&story, layout))?;
+    let mut paragraphs = vec![Block::Paragraph(format!("A machine that disagrees with its model: {PLAYED}"))];
+    paragraphs.extend(disagreement);
+    out!("{}", terminal::blocks(&paragraphs, layout))?;
     out_line!("\nThe paper's experiment, from FMU to parameters:\n")?;
     out!("{}", terminal::blocks(&short(&findings), layout))?;
     out_line!()?;
@@ -168,7 +168,7 @@ fn disagreement(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) 
     for signal in [Signal::Theta1, Signal::Theta2] {
         log.set(signal, run.require(signal)?.iter().map(|v| v + NOISE * draw()).collect())?;
     }
-    write_csv(&file("machine.csv"), &log, Motion::Rotary)?;
+    write_csv(&file("machine.csv"), &log, AxisKind::Rotary)?;
     // The data sheet is off by a few per cent, as data sheets are.
     let paper = Parameters::PAPER;
     let parameters = Parameters { i1: 0.97 * paper.i1, i2: 1.04 * paper.i2, ..paper };
@@ -192,7 +192,7 @@ fn disagreement(fmu: &Path, host: &Host, folder: &Path, dt: f64, steps: &Steps) 
         diagnosis: &outcome.diagnosis,
         overlays: &outcome.overlays,
         trace: "machine.csv",
-        motion: Motion::Rotary,
+        motion: AxisKind::Rotary,
         warnings: &[],
     };
     let report = diagnosis::report(&findings);

@@ -66,8 +66,8 @@ fn detail(e: &EffectInfo) -> String {
     }
     for p in e.parameters {
         let unit = if p.unit.is_empty() { "1" } else { p.unit };
-        let word = if p.role == Role::Size { "off at" } else { "default" };
-        let text = format!("{}; {word} {}, from {} to {}", p.doc, p.off, p.min, p.max);
+        let meaning = if p.role == Role::Size { "off at" } else { "default" };
+        let text = format!("{}; {meaning} {}, from {} to {}", p.doc, p.off, p.min, p.max);
         let text = terminal::wrapped(&text, room.saturating_sub(4), "    ");
         let _ = writeln!(out, "\n{}.{} [{unit}]\n    {text}", e.id, p.name);
     }

@@ -296,11 +296,11 @@ fn seen(mut trace: Trace, stamps: Option<&[f64]>, machine: &Machine, known: bool
     Ok(Seen { trace, examination })
 }
 
-/// What no estimate of a model without a delay gets over.
+/// Why no estimate of a model without a delay is reliable on this record.
 fn doubts(examination: &Examination, trust: bool) -> Vec<String> {
     let apart = examination.find("misaligned").filter(|_| !trust);
-    let word = "Inertia, damping and stiffness would make up for that: their errors do not tell by how much.";
-    apart.map(|found| format!("{} {word}", found.seen)).into_iter().collect()
+    let consequence = "Inertia, damping and stiffness would make up for that: their errors do not tell by how much.";
+    apart.map(|found| format!("{} {consequence}", found.seen)).into_iter().collect()
 }
 
 /// The warnings about a record that is used.

@@ -10,7 +10,7 @@ use super::outputs;
 use super::stdout::out_line;
 use crate::identify::excitation::{Kind, Multisine};
 use crate::report::format::{Medium, number};
-use crate::trace::{Hold, Motion, Signal, Trace, write_csv};
+use crate::trace::{AxisKind, Hold, Signal, Trace, write_csv};
 
 /// Samples of a period of the paper's experiment (Table 1).
 const PAPER_SAMPLES: usize = 2048;
@@ -112,7 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let period = signal.period();
     let torque: Vec<f64> = (0..total).map(|k| period[k % args.samples] + args.offset).collect();
     let trace = Trace::new(0.0, args.dt, Hold::Zoh).with(Signal::T, torque)?;
-    write_csv(&args.output, &trace, if args.linear { Motion::Linear } else { Motion::Rotary })?;
+    write_csv(&args.output, &trace, if args.linear { AxisKind::Linear } else { AxisKind::Rotary })?;
 
     let resolution = 1.0 / (args.samples as f64 * args.dt);
     let harmonic = |k: Option<&crate::identify::excitation::Line>| k.map_or(0.0, |l| l.harmonic as f64 * resolution);

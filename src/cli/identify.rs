@@ -13,6 +13,7 @@ use serde_json::json;
 use super::FINDINGS;
 use super::examined::{Believed, ExaminedPieces, Extent, Refused, examined_log, examined_pieces};
 use super::many::Many;
+use super::names;
 use super::outputs;
 use super::stdout::out;
 use crate::axis::{Scheme, Structure};
@@ -57,15 +58,6 @@ pub enum Integration {
     Newmark,
 }
 
-/// Holds on offer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Holds {
-    /// The torque keeps its value over the sample
-    Zoh,
-    /// The torque runs straight from sample to sample
-    Linear,
-}
-
 /// Arguments of `eixo identify`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -101,8 +93,8 @@ pub struct Args {
     #[arg(long)]
     period: Option<usize>,
     /// What the torque does between samples; the axis file's word if not given
-    #[arg(long, value_enum)]
-    hold: Option<Holds>,
+    #[arg(long, value_parser = names::hold("The torque keeps its value over the sample", "The torque runs straight from sample to sample"))]
+    hold: Option<Hold>,
     /// Integration of the simulations
     #[arg(long, value_enum, default_value_t = Integration::Auto)]
     integration: Integration,
@@ -204,10 +196,8 @@ fn examine(
         Some(axis) => Machine::read(axis)?,
         None => Machine { name: "axis".to_owned(), ..Machine::default() },
     };
-    match args.hold {
-        Some(Holds::Zoh) => machine.signals.hold = Hold::Zoh,
-        Some(Holds::Linear) => machine.signals.hold = Hold::Linear,
-        None => {}
+    if let Some(hold) = args.hold {
+        machine.signals.hold = hold;
     }
     let file = path.display().to_string();
     progress("reading the trace");

@@ -1,4 +1,4 @@
-//! Requests that the machine cannot bear are refused at once, not after an hour.
+//! Requests that need more than the free memory, or more than an hour, are refused before the work.
 
 /// Bytes of a number in memory and as text of a file that is made of it.
 const BYTES: f64 = 8.0 + 20.0;

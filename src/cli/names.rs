@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use crate::effects::EFFECTS;
-use crate::trace::Signal;
+use crate::trace::{Hold, Signal};
 
 /// One of the effects.
 pub fn effect() -> PossibleValuesParser {
@@ -43,6 +43,12 @@ pub fn signals_equal() -> &'static [String] {
 pub struct Offering<P> {
     parser: P,
     offered: Offered,
+}
+
+/// What a signal does between samples: `zoh` or `linear`, each with its line of the help.
+pub fn hold(zoh: &'static str, linear: &'static str) -> impl TypedValueParser<Value = Hold> {
+    let values = [PossibleValue::new("zoh").help(zoh), PossibleValue::new("linear").help(linear)];
+    PossibleValuesParser::new(values).map(|name| if name == "linear" { Hold::Linear } else { Hold::Zoh })
 }
 
 /// Offers names beside what a parser takes.

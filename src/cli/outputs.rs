@@ -35,7 +35,7 @@ fn identity(path: &Path) -> Option<Identity> {
     }
 }
 
-/// Endings of forms that are not written: a text under such a name is taken for a damaged file.
+/// Extensions of formats that are not written: a text of such a name would be taken for a damaged file.
 const FOREIGN: [&str; 12] =
     ["xlsx", "xlsm", "xls", "ods", "mat", "h5", "hdf5", "npz", "npy", "feather", "arrow", "pdf"];
 

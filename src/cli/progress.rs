@@ -37,7 +37,7 @@ pub struct Steps {
 }
 
 impl Progress {
-    /// The place where the steps of a work are told.
+    /// A callback that reports the steps of a task.
     pub fn steps(self) -> Steps {
         let lines = self.progress == How::Lines;
         if self.progress != How::Auto || super::stdout::is_quiet() || !std::io::stderr().is_terminal() {
@@ -61,8 +61,8 @@ impl Steps {
         self.bar.set_message(format!("{what}{}", self.left(what)));
     }
 
-    /// How long a step of the form `n of N ...` still takes, as its part behind took: `, 3 s left`; nothing of another step or of less than
-    /// two seconds.
+    /// Time that a step of the form `n of N ...` still takes, from the time of the part that is done: `, 3 s left`; empty for another step
+    /// or less than two seconds.
     fn left(&self, what: &str) -> String {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         let Some((done, all)) = count(what) else {

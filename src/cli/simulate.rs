@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::examined::Part;
 use super::limits;
-use super::names::{offering, settings, signals, signals_equal, text};
+use super::names::{hold, offering, settings, signals, signals_equal, text};
 use super::outputs;
 use super::stdout::out_line;
 use crate::fmu::contained::{self, Host, simulate};
@@ -48,8 +48,8 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// What the inputs do between samples; by default what the axis.toml says, else zoh
-    #[arg(long, value_enum)]
-    pub hold: Option<HoldArg>,
+    #[arg(long, value_parser = hold("Held over the sample", "A straight line between samples"))]
+    pub hold: Option<Hold>,
     /// Start, s; by default the input's
     #[arg(long, visible_alias = "start-time", allow_negative_numbers = true)]
     pub start: Option<f64>,
@@ -79,24 +79,6 @@ pub struct Args {
     /// Longest time a call of an FMI function may take, s; no limit by default
     #[arg(long, value_name = "SECONDS")]
     pub timeout: Option<f64>,
-}
-
-/// What the inputs do between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum HoldArg {
-    /// Held over the sample
-    Zoh,
-    /// A straight line between samples
-    Linear,
-}
-
-impl From<HoldArg> for Hold {
-    fn from(hold: HoldArg) -> Self {
-        match hold {
-            HoldArg::Zoh => Self::Zoh,
-            HoldArg::Linear => Self::Linear,
-        }
-    }
 }
 
 /// Noise to add.
@@ -194,7 +176,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(timeout) = args.timeout {
         anyhow::ensure!(timeout > 0.0 && timeout < 1e9, "--timeout {timeout}: must be above 0");
     }
-    let mut hold = args.hold.map(Hold::from);
+    let mut hold = args.hold;
     let inputs = match (&args.input, &machine) {
         (None, _) => Inputs::default(),
         // The axis file says how its own log's columns are named.

@@ -1,4 +1,4 @@
-//! Which traces: files, folders and patterns to a list without doubles, in an order of its own.
+//! Which traces: files, folders and patterns to a list without duplicates, in the order of their names.
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;

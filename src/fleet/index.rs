@@ -84,8 +84,11 @@ fn verdict(rows: &[Placed], trends: &[Trend]) -> Summary {
         *counts.entry(verdict_of(p)).or_default() += 1;
     }
     let failed = rows.iter().filter(|p| !p.row.done).count();
-    let out: Vec<String> =
-        trends.iter().filter(|t| t.stands_out()).map(|t| format!("{} of {}", t.parameter.name, t.machine)).collect();
+    let out: Vec<String> = trends
+        .iter()
+        .filter(|t| t.is_significant())
+        .map(|t| format!("{} of {}", t.parameter.name, t.machine))
+        .collect();
     let (tone, sentence) = match (failed, out.len()) {
         (0, 0) => (Tone::Neutral, "Every trace was used.".to_owned()),
         (0, n) => (Tone::Finding, format!("Every trace was used; {}.", drifting(n))),
@@ -154,7 +157,7 @@ fn names<'a>(trends: &'a [Trend]) -> Vec<&'a str> {
     if all.len() <= COLUMNS {
         return all;
     }
-    let mut drifting = named(&mut trends.iter().filter(|t| t.stands_out()));
+    let mut drifting = named(&mut trends.iter().filter(|t| t.is_significant()));
     drifting.truncate(COLUMNS);
     drifting
 }
@@ -189,7 +192,7 @@ fn machines(plan: &Plan, rows: &[Placed], trends: &[Trend], wide: bool) -> Table
                 Moved::WithinItsError => Cell::text(WITHIN),
             })
         }));
-        if trends.iter().any(|t| t.machine == first.machine && t.stands_out()) {
+        if trends.iter().any(|t| t.machine == first.machine && t.is_significant()) {
             table.strong_row(cells);
         } else {
             table.row(cells);
@@ -255,10 +258,10 @@ fn drifts(trends: &[Trend]) -> Vec<Block> {
             estimate(t.values.first()),
             estimate(t.values.last()),
         ];
-        if t.stands_out() { table.strong_row(cells) } else { table.row(cells) }
+        if t.is_significant() { table.strong_row(cells) } else { table.row(cells) }
     }
     let mut order: Vec<&Trend> = trends.iter().filter(|t| t.at.len() > 2).collect();
-    order.sort_by_key(|t| !t.stands_out());
+    order.sort_by_key(|t| !t.is_significant());
     let left_out = order.len().saturating_sub(PLOTS);
     let figures: Vec<Figure> = order.into_iter().take(PLOTS).map(|t| Figure::new(plot(t), "")).collect();
     let mut blocks = vec![Block::Table(table)];

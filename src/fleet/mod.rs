@@ -281,8 +281,8 @@ fn place<'a>(items: &'a [Item], rows: &'a [Row]) -> Vec<Placed<'a>> {
         Some(_) if names.len() == 1 && folders.len() > 1 => find::folder(&item.path),
         Some(axis) => {
             let name = names.get(axis).cloned().unwrap_or_default();
-            let namesakes = names.values().filter(|n| **n == name).count();
-            if namesakes > 1 { format!("{name} ({})", find::folder(axis)) } else { name }
+            let same_name = names.values().filter(|n| **n == name).count();
+            if same_name > 1 { format!("{name} ({})", find::folder(axis)) } else { name }
         }
     };
     let mut placed: Vec<Placed> = items

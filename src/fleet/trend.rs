@@ -122,7 +122,7 @@ impl<'a> Trend<'a> {
     }
 
     /// Whether the drift stands out of the scatter: four standard errors.
-    pub fn stands_out(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.drift().is_some_and(|(drift, std)| drift.abs() > 4.0 * std && drift.abs() > LEAST)
     }
 }
@@ -157,7 +157,7 @@ mod tests {
     }
 
     fn drifts(values: [f64; 3], std: Option<f64>) -> bool {
-        of(&values, std, |t| t.stands_out())
+        of(&values, std, |t| t.is_significant())
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::units;
-use crate::axis::Motion;
+use crate::axis::AxisKind;
 use crate::effects::{EFFECTS, Effect, Place};
 use crate::fmu::description::Fmi;
 use crate::variables::{Causality, FIXED, Model, Starts, Type, Variable, at, first_of};
@@ -159,7 +159,7 @@ fn late_readings() -> impl Iterator<Item = Effect> {
     EFFECTS.iter().copied().filter(|e| e.info().place == Place::Sensor && e.delay_parameter().is_some())
 }
 
-fn table(rows: impl Iterator<Item = (Variable, f64)>, motion: Motion) -> Markup {
+fn table(rows: impl Iterator<Item = (Variable, f64)>, motion: AxisKind) -> Markup {
     html! {
         table {
             thead { tr { th { "Name" } th { "Unit" } th { "Start" } th { "From" } th { "To" } th { "Meaning" } } }

@@ -19,7 +19,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use crate::drive::Gains;
 use crate::fmi2::bake;
 use crate::fmu::description::Fmi;
-use crate::trace::{Machine, Motion, TraceError, write_text};
+use crate::trace::{AxisKind, Machine, TraceError, write_text};
 use crate::variables::{Model, Starts};
 
 pub use table::XyTable;
@@ -114,7 +114,7 @@ impl Package {
     ///
     /// # Errors
     /// [`PackageError::Bounds`] when a gain is out of the bounds of the FMU's variable.
-    pub fn drive(name: &str, gains: &Gains, rho: f64, dt: f64, motion: Motion) -> Result<Self, PackageError> {
+    pub fn drive(name: &str, gains: &Gains, rho: f64, dt: f64, motion: AxisKind) -> Result<Self, PackageError> {
         Self::checked(name, Starts::drive(gains, rho, dt, motion))
     }
 

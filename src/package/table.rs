@@ -13,7 +13,7 @@ use zip::ZipWriter;
 use super::{Package, PackageError, add, units};
 use crate::axis::substeps;
 use crate::circle::{Feedback, ServoAxis};
-use crate::trace::{Motion, write_text};
+use crate::trace::{AxisKind, write_text};
 use crate::variables::{Causality, Model, Slot, Starts, Variable};
 
 type Xml = Writer<Vec<u8>>;
@@ -28,7 +28,7 @@ pub struct XyTable {
     /// Name of the system.
     pub name: String,
     /// X, with the mass of Y in its inertia, and Y; each with its units.
-    pub axes: [(ServoAxis, Motion); 2],
+    pub axes: [(ServoAxis, AxisKind); 2],
     /// Sampling interval of the drives, s: the communication step that the system is made for.
     pub dt: f64,
     /// Whether the system has connectors of its own; without them, the drives' references are fed by name.
@@ -220,7 +220,7 @@ mod tests {
         let parameters = Parameters::PAPER;
         let servo = Servo { feedback, ..Servo::tuned(&parameters, 80.0, None) };
         let axis = ServoAxis { parameters, structure: Structure::TwoInertia, effects: Settings::default(), servo };
-        XyTable { name: "a < b".into(), axes: [(axis, Motion::Rotary); 2], dt: 1e-3, connectors: true }
+        XyTable { name: "a < b".into(), axes: [(axis, AxisKind::Rotary); 2], dt: 1e-3, connectors: true }
     }
 
     #[test]

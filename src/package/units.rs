@@ -5,7 +5,7 @@ use std::io;
 
 use quick_xml::Writer;
 
-use crate::axis::Motion;
+use crate::axis::AxisKind;
 
 /// A unit with another scale for people: `displayed = factor*value`.
 pub(super) struct Display {
@@ -36,11 +36,11 @@ pub(super) fn display(unit: &str) -> Option<Display> {
 ///
 /// Every torque is a force times a metre per radian and every inertia a mass times its square, so each `rad` becomes a
 /// metre and each metre or its square that goes with them goes away.
-pub(super) fn of(unit: &'static str, motion: Motion) -> Cow<'static, str> {
+pub(super) fn of(unit: &'static str, motion: AxisKind) -> Cow<'static, str> {
     match (motion, unit) {
-        (Motion::Rotary, _) => unit.into(),
-        (Motion::Linear, "m/rad") => "1".into(),
-        (Motion::Linear, _) => unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m").into(),
+        (AxisKind::Rotary, _) => unit.into(),
+        (AxisKind::Linear, "m/rad") => "1".into(),
+        (AxisKind::Linear, _) => unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m").into(),
     }
 }
 
@@ -91,7 +91,7 @@ mod tests {
     fn every_unit_of_the_table_has_base_units_and_its_linear_analogue_no_radian() {
         for v in all().filter(|v| !v.unit.is_empty()) {
             assert!(base(v.unit).is_some(), "{v} {}", v.unit);
-            let linear = base(&of(v.unit, Motion::Linear)).unwrap();
+            let linear = base(&of(v.unit, AxisKind::Linear)).unwrap();
             assert_eq!(linear[3], 0, "{v} {}", v.unit);
         }
         for (rotary, linear) in [
@@ -103,8 +103,8 @@ mod tests {
             ("m/rad", "1"),
             ("Hz", "Hz"),
         ] {
-            assert_eq!(of(rotary, Motion::Linear), linear);
-            assert_eq!(of(rotary, Motion::Rotary), rotary);
+            assert_eq!(of(rotary, AxisKind::Linear), linear);
+            assert_eq!(of(rotary, AxisKind::Rotary), rotary);
         }
         assert_eq!(base("N.m.s2/rad2"), Some([1, 2, 0, -2]));
         assert_eq!(base("1"), Some([0; 4]));

@@ -10,7 +10,7 @@ use super::{Block, Cell, Figure, Report, Section, Summary, Table, Tone};
 use crate::circle::roundness::{Roundness, SHOWN, deviations};
 use crate::circle::trace::Analysis;
 use crate::circle::{CircleTest, Feedback, Path, Servo};
-use crate::trace::Motion;
+use crate::trace::AxisKind;
 
 /// A pair of axes turned through the circle in both directions.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ pub struct Findings {
     /// The drives of X and Y.
     pub servos: [Servo; 2],
     /// How X and Y move: the units of their gains.
-    pub motion: [Motion; 2],
+    pub motion: [AxisKind; 2],
     /// Runs to be compared; the last is what the verdict speaks of.
     pub runs: Vec<Run>,
     /// The last run without one of what it has beyond the first, for each such thing.
@@ -257,11 +257,11 @@ fn drives(f: &Findings) -> Table {
         ("limit of torque or force", |s| s.gains.limit, ["N.m", "N"]),
     ];
     for (name, value, units) in rows {
-        let cell = |(s, motion): (&Servo, &Motion)| {
+        let cell = |(s, motion): (&Servo, &AxisKind)| {
             let value = value(s);
             // A drive without a limit shows none.
             if value.is_finite() {
-                Cell::quantity(value, units[usize::from(*motion == Motion::Linear)])
+                Cell::quantity(value, units[usize::from(*motion == AxisKind::Linear)])
             } else {
                 Cell::text("none")
             }

@@ -4,13 +4,13 @@
 use serde_json::Value;
 
 use super::{Block, Cell, Drawing, Figure, Report, Table};
-use crate::trace::Motion;
+use crate::trace::AxisKind;
 
 /// What a record calls the torque.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Driven {
     /// Rotary or linear: a torque or a force.
-    pub motion: Motion,
+    pub motion: AxisKind,
     /// Unit that stands for N.m (or N) one to one, where the log is of a current, a voltage or a percentage.
     pub unit: Option<String>,
 }
@@ -19,7 +19,7 @@ impl Driven {
     /// The blocks in these words.
     #[must_use]
     pub fn blocks(&self, mut blocks: Vec<Block>) -> Vec<Block> {
-        if self.motion == Motion::Linear || self.unit.is_some() {
+        if self.motion == AxisKind::Linear || self.unit.is_some() {
             blocks.iter_mut().for_each(|b| self.block(b));
         }
         blocks
@@ -46,7 +46,7 @@ impl Driven {
                             Value::String(unit) if key == "unit" => *unit = driven.convert(unit),
                             Value::String(unit) if key == "against_unit" => {
                                 *unit = driven.convert(unit);
-                                if driven.motion == Motion::Linear {
+                                if driven.motion == AxisKind::Linear {
                                     *unit = unit.replacen("rad", "m", 1);
                                 }
                             }
@@ -58,7 +58,7 @@ impl Driven {
                 _ => {}
             }
         }
-        if self.unit.is_some() || self.motion == Motion::Linear {
+        if self.unit.is_some() || self.motion == AxisKind::Linear {
             convert_units(self, &mut result);
         }
         result
@@ -68,7 +68,7 @@ impl Driven {
     #[must_use]
     pub fn convert(&self, text: &str) -> String {
         let mut text = text.to_owned();
-        if self.motion == Motion::Linear || self.unit.is_some() {
+        if self.motion == AxisKind::Linear || self.unit.is_some() {
             self.text(&mut text);
         }
         text
@@ -151,7 +151,7 @@ impl Driven {
 
     /// The replacement of a word or a unit, where there is one.
     fn replacement(&self, word: &str) -> Option<String> {
-        if self.motion == Motion::Linear {
+        if self.motion == AxisKind::Linear {
             for (rotary, linear) in
                 [("torque", "force"), ("torques", "forces"), ("Torque", "Force"), ("Torques", "Forces")]
             {
@@ -167,13 +167,13 @@ impl Driven {
         let typeset = word.contains(['·', '²', '³']);
         let plain = word.replace('·', ".").replace('²', "2").replace('³', "3");
         let new = match self.motion {
-            Motion::Rotary if plain == "kg.m2" => format!("{unit}.s2/rad"),
-            Motion::Rotary => {
+            AxisKind::Rotary if plain == "kg.m2" => format!("{unit}.s2/rad"),
+            AxisKind::Rotary => {
                 let per = plain.strip_prefix("N.m").filter(|p| p.is_empty() || p.starts_with(['.', '/']))?;
                 format!("{unit}{per}")
             }
-            Motion::Linear if plain == "kg" => format!("{unit}.s2/m"),
-            Motion::Linear => {
+            AxisKind::Linear if plain == "kg" => format!("{unit}.s2/m"),
+            AxisKind::Linear => {
                 let per = plain.strip_prefix('N').filter(|p| p.is_empty() || p.starts_with(['.', '/']))?;
                 format!("{unit}{per}")
             }
@@ -186,7 +186,7 @@ impl Driven {
 mod tests {
     use super::*;
 
-    fn converted(motion: Motion, unit: Option<&str>, text: &str) -> String {
+    fn converted(motion: AxisKind, unit: Option<&str>, text: &str) -> String {
         let driven = Driven { motion, unit: unit.map(str::to_owned) };
         match driven.blocks(vec![Block::Paragraph(text.to_owned())]).remove(0) {
             Block::Paragraph(text) => text,
@@ -196,12 +196,12 @@ mod tests {
 
     #[test]
     fn a_result_for_programs_has_the_units_of_the_log_and_the_names_of_the_contract() {
-        let driven = Driven { motion: Motion::Rotary, unit: Some("A".into()) };
+        let driven = Driven { motion: AxisKind::Rotary, unit: Some("A".into()) };
         let result = serde_json::json!({ "closure_of": "torque", "all": [{ "name": "K", "unit": "N.m/rad" }, { "unit": "rad/s" }] });
         let own = serde_json::json!({ "closure_of": "torque", "all": [{ "name": "K", "unit": "A/rad" }, { "unit": "rad/s" }] });
         assert_eq!(driven.units(result.clone()), own);
-        assert_eq!(Driven { motion: Motion::Rotary, unit: None }.units(result.clone()), result);
-        let linear = Driven { motion: Motion::Linear, unit: None };
+        assert_eq!(Driven { motion: AxisKind::Rotary, unit: None }.units(result.clone()), result);
+        let linear = Driven { motion: AxisKind::Linear, unit: None };
         let curve = serde_json::json!({ "unit": "N.m", "against_unit": "rad/s" });
         assert_eq!(linear.units(curve), serde_json::json!({ "unit": "N", "against_unit": "m/s" }));
     }
@@ -210,29 +210,29 @@ mod tests {
     fn a_linear_axis_is_driven_by_a_force_and_names_of_parameters_stay() {
         assert_eq!(
             converted(
-                Motion::Linear,
+                AxisKind::Linear,
                 None,
                 "Torque: 3 N of torque; load_motor.torque, the torques. See torque.csv, `torque`."
             ),
             "Force: 3 N of force; load_motor.torque, the forces. See torque.csv, `torque`."
         );
-        assert_eq!(converted(Motion::Rotary, None, "the torque in N.m"), "the torque in N.m");
+        assert_eq!(converted(AxisKind::Rotary, None, "the torque in N.m"), "the torque in N.m");
     }
 
     #[test]
     fn a_current_without_a_torque_constant_keeps_its_unit() {
-        let amperes = |text| converted(Motion::Rotary, Some("A"), text);
+        let amperes = |text| converted(AxisKind::Rotary, Some("A"), text);
         assert_eq!(
             amperes("0.3 N.m, I1 [kg.m2], B [N·m·s/rad]; 2 N.m/rad."),
             "0.3 A, I1 [A.s2/rad], B [A·s/rad]; 2 A/rad."
         );
         assert_eq!(amperes("I2 [kg·m²] and K in N.m/rad3"), "I2 [A·s²/rad] and K in A/rad3");
-        assert_eq!(converted(Motion::Linear, Some("V"), "95 kg, 2 N.s/m, 3 N"), "95 V.s2/m, 2 V.s/m, 3 V");
+        assert_eq!(converted(AxisKind::Linear, Some("V"), "95 kg, 2 N.s/m, 3 N"), "95 V.s2/m, 2 V.s/m, 3 V");
     }
 
     #[test]
     fn tables_figures_and_folded_blocks_are_reached() {
-        let driven = Driven { motion: Motion::Linear, unit: Some("A".into()) };
+        let driven = Driven { motion: AxisKind::Linear, unit: Some("A".into()) };
         let mut table = Table::new("rms torque", ["mass [kg]"]);
         table.row(vec![Cell::Estimate(1.0, 0.1, "kg".into())]);
         let chart = super::super::Chart::new(

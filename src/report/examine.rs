@@ -5,7 +5,7 @@ use super::format::{self, Medium};
 use super::{Block, Cell, Figure, Report, Section, Summary, Table, Tone};
 use crate::examine::{Examination, Finding, Severity};
 use crate::identify::result::Series as Curve;
-use crate::trace::{Motion, Signal, Trace};
+use crate::trace::{AxisKind, Signal, Trace};
 
 /// Most stretches of one finding that are marked in a plot, and most rows of the table of pieces.
 const MARKS: usize = 12;
@@ -20,7 +20,7 @@ pub struct Inspected<'a> {
     /// The file.
     pub file: &'a str,
     /// Rotary or linear.
-    pub motion: Motion,
+    pub motion: AxisKind,
     /// The warnings of reading the file.
     pub warnings: &'a [String],
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use eixo::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use eixo::effects::{Effect, Settings};
 use eixo::identify::excitation::{Kind, Multisine};
-use eixo::trace::{Machine, Motion, Signal, Trace, write_csv};
+use eixo::trace::{AxisKind, Machine, Signal, Trace, write_csv};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -36,7 +36,7 @@ fn log(path: &Path, stiffness: f64, friction: f64, seed: u64) {
         .and_then(|t| t.with(Signal::Theta1, noisy(response.readings.iter().map(|r| r.theta1).collect())))
         .and_then(|t| t.with(Signal::Theta2, noisy(response.readings.iter().map(|r| r.theta2).collect())))
         .expect("the trace");
-    write_csv(path, &trace, Motion::Rotary).expect("the file");
+    write_csv(path, &trace, AxisKind::Rotary).expect("the file");
 }
 
 /// Two machines of three days each: the first one's stiffness falls by 2 % a day, the second has friction; and two files that

@@ -11,11 +11,11 @@ use eixo::effects::{Effect, Place};
 use eixo::report::diagnose::{Findings, json, report, short};
 use eixo::report::terminal::{self, Layout};
 use eixo::report::{Report, html};
-use eixo::trace::Motion;
+use eixo::trace::AxisKind;
 use fixture::{friction, overlay};
 
 fn made(diagnosis: &Diagnosis) -> Report {
-    report(&Findings { diagnosis, overlays: &[overlay()], trace: "log.csv", motion: Motion::Rotary, warnings: &[] })
+    report(&Findings { diagnosis, overlays: &[overlay()], trace: "log.csv", motion: AxisKind::Rotary, warnings: &[] })
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn an_effect_is_named_with_its_place_its_size_and_what_it_means() {
         assert!(page.contains(needle), "{needle}");
     }
     assert!(!page.contains("NaN"));
-    let findings = Findings { diagnosis: &d, overlays: &[], trace: "log.csv", motion: Motion::Rotary, warnings: &[] };
+    let findings = Findings { diagnosis: &d, overlays: &[], trace: "log.csv", motion: AxisKind::Rotary, warnings: &[] };
     let text = terminal::blocks(&short(&findings), Layout::default());
     assert!(text.contains("coulomb_motor.level") && text.contains("4.003e-3 ± 1.3e-5 N.m"), "{text}");
     assert!(text.lines().all(|l| l.chars().count() <= 100), "{text}");

@@ -7,7 +7,7 @@ use eixo::report::diagnose::json::value;
 use eixo::report::diagnose::{Findings, report, short};
 use eixo::report::html;
 use eixo::report::terminal::{self, Layout};
-use eixo::trace::Motion;
+use eixo::trace::AxisKind;
 
 use crate::fixture::friction;
 
@@ -95,7 +95,7 @@ fn every_effect_is_told_with_its_name_its_place_and_what_it_means_on_a_machine()
             diagnosis: &d,
             overlays: &[],
             trace: "",
-            motion: Motion::Rotary,
+            motion: AxisKind::Rotary,
             warnings: &[],
         }));
         assert!(page.contains("On a machine: "), "{}", info.id);
@@ -166,13 +166,13 @@ fn a_remainder_is_told_where_it_is_more_than_noise_in_the_units_of_the_axis() {
         terminal::blocks(&blocks, Layout::default()).split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let large = |d: &mut Diagnosis| d.remainder.noise_multiple = 20.0;
-    let quiet = text(&friction(""), Motion::Rotary);
+    let quiet = text(&friction(""), AxisKind::Rotary);
     assert!(!quiet.contains("o cause explains"), "{quiet}");
-    let beside = text(&with(large), Motion::Linear);
+    let beside = text(&with(large), AxisKind::Linear);
     assert!(beside.contains("Beside that no cause explains") && beside.contains(" N rms of torque"), "{beside}");
     let mut none = without_cause(Verdict::NoGap);
     large(&mut none);
-    let none = text(&none, Motion::Rotary);
+    let none = text(&none, AxisKind::Rotary);
     assert!(none.contains("No cause explains") && none.contains(" N.m rms"), "{none}");
     assert!(none.contains("no cause stands out in the 0.1"), "{none}");
 }
@@ -186,7 +186,7 @@ fn what_is_to_be_known_of_the_record_stands_in_the_file_and_on_the_page() {
     let own = value(&d, &[]);
     let own = own["warnings"].as_array().expect("warnings");
     assert_eq!(told["warnings"].as_array().expect("warnings")[1..], own[..]);
-    let of = |warnings| Findings { diagnosis: &d, overlays: &[], trace: "", motion: Motion::Rotary, warnings };
+    let of = |warnings| Findings { diagnosis: &d, overlays: &[], trace: "", motion: AxisKind::Rotary, warnings };
     assert!(html::page(&report(&of(&known))).contains(&known[0]));
     assert!(!html::page(&report(&of(&[]))).contains(&known[0]));
 }
@@ -195,7 +195,13 @@ fn what_is_to_be_known_of_the_record_stands_in_the_file_and_on_the_page() {
 fn the_step_that_tells_rivals_apart_names_them() {
     let rivals = vec![Confusable { named: Effect::ViscousMotor, other: Effect::ViscousTable, difference: 1.04 }];
     let page = |d: &Diagnosis| {
-        html::page(&report(&Findings { diagnosis: d, overlays: &[], trace: "", motion: Motion::Rotary, warnings: &[] }))
+        html::page(&report(&Findings {
+            diagnosis: d,
+            overlays: &[],
+            trace: "",
+            motion: AxisKind::Rotary,
+            warnings: &[],
+        }))
     };
     let names = "do not tell: viscous friction of motor and screw or viscous friction of table and guideways.";
     assert!(page(&with(|d| d.confusable = rivals)).contains(names));
@@ -208,7 +214,7 @@ fn a_linear_axis_is_drawn_in_metres_and_newtons() {
     let page =
         |motion| html::page(&report(&Findings { diagnosis: &d, overlays: &[], trace: "", motion, warnings: &[] }));
     let head = |against: &str| format!("Against {against}");
-    assert!(page(Motion::Rotary).contains(&head("omega1")), "the fixture has no curve against omega1");
-    assert!(page(Motion::Rotary).contains("omega1 [rad/s]"));
-    assert!(page(Motion::Linear).contains("omega1 [m/s]") && !page(Motion::Linear).contains("omega1 [rad/s]"));
+    assert!(page(AxisKind::Rotary).contains(&head("omega1")), "the fixture has no curve against omega1");
+    assert!(page(AxisKind::Rotary).contains("omega1 [rad/s]"));
+    assert!(page(AxisKind::Linear).contains("omega1 [m/s]") && !page(AxisKind::Linear).contains("omega1 [rad/s]"));
 }

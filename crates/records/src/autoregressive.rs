@@ -297,19 +297,19 @@ mod tests {
         let lost = [1, 3, 700, 701, 2000, 2009, 4095, 4096, 5990];
         let mut y = sound.clone();
         lost.iter().for_each(|k| y[*k] = f64::MAX.sqrt());
-        let told = expected(&y, &lost);
-        assert_eq!(told.iter().map(|e| e.at).collect::<Vec<_>>(), lost);
-        let off: Vec<f64> = told.iter().map(|e| (e.value - sound[e.at]) / e.error).collect();
+        let estimate = expected(&y, &lost);
+        assert_eq!(estimate.iter().map(|e| e.at).collect::<Vec<_>>(), lost);
+        let off: Vec<f64> = estimate.iter().map(|e| (e.value - sound[e.at]) / e.error).collect();
         assert!(off.iter().all(|z| z.abs() < 3.5), "{off:?}");
         let inside = |e: &&Expected| (ORDER..sound.len() - ORDER).contains(&e.at);
-        let errors: Vec<f64> = told.iter().filter(inside).map(|e| e.error / noise).collect();
+        let errors: Vec<f64> = estimate.iter().filter(inside).map(|e| e.error / noise).collect();
         assert!(errors.iter().all(|e| *e < 5.0), "{errors:?}");
     }
 
     #[test]
     fn the_noise_under_a_motion_near_nyquists_frequency_is_told() {
-        let told = floor(&signal(1e-3)).expect("long enough");
-        assert!((told / 1e-3 - 1.0).abs() < 0.2, "{told}");
+        let estimate = floor(&signal(1e-3)).expect("long enough");
+        assert!((estimate / 1e-3 - 1.0).abs() < 0.2, "{estimate}");
         assert!(floor(&signal(1e-3)[..200]).is_none());
     }
 

@@ -1,5 +1,5 @@
-//! Readers that others wrote, on files that may be damaged in any way: a panic of theirs is an error of the file, and nothing
-//! is printed of it.
+//! Runs readers of other crates on files that may be damaged in any way: a panic in one of them becomes an error of the file, and its
+//! message is not printed.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -10,7 +10,7 @@ thread_local! {
     static WITHIN: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What a reader gives; its error or its panic as a text. Panics elsewhere are printed as ever.
+/// Runs a reader. Panics outside of it are printed as usual.
 ///
 /// # Errors
 /// The error of `run` as a text, or that the reader panicked.

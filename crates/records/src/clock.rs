@@ -1,4 +1,4 @@
-//! The time of a record: which rows of the file it is, and on which grid.
+//! The time of a record: which rows of the file are used, and on which uniform grid.
 
 use std::ops::Range;
 
@@ -12,15 +12,15 @@ use super::table::Table;
 /// How the columns are brought to the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Resampling {
-    /// They lie on it.
+    /// The samples lie on it.
     None,
     /// Each sample is moved by less than half an interval.
     Near,
-    /// The grid has its own samples: stamps that a computer took, some samples lost, or an interval that was asked for.
+    /// The grid has another number of samples than the rows: a computer took the stamps, samples are lost, or an interval was asked for.
     Far { samples: usize },
 }
 
-/// The grid of a record, and the rows of the file that it is.
+/// The grid of one piece of a record, and the rows of the file that are in it.
 pub(super) struct Clock {
     /// The grid.
     pub grid: Grid,
@@ -38,12 +38,20 @@ pub(super) struct Clocks {
     pub longest: Clock,
     /// Of the others, in the order of the file.
     pub others: Vec<Clock>,
-    /// What is to be said of the gaps, where there are any: the pieces, without what becomes of them.
+    /// Warning of the gaps, where there are any: how many pieces they leave. The caller adds which pieces it uses.
     pub gaps: Option<String>,
 }
 
-/// Stamps that count from a calendar's beginning, in a unit that only their size tells, brought to seconds from the first.
-fn epoch(time: &mut [f64], table: &Table, column: &Column, warnings: &mut Vec<String>) -> Result<(), TraceError> {
+/// Converts stamps that count from a calendar's epoch to seconds from the first stamp. They have no unit: it is found by their size.
+///
+/// # Errors
+/// As [`scale`].
+fn calendar_stamps(
+    time: &mut [f64],
+    table: &Table,
+    column: &Column,
+    warnings: &mut Vec<String>,
+) -> Result<(), TraceError> {
     let given = scale(table, column, "time", Quantity::Time)?;
     let has_unit = given.1 != 1.0 || table.headers[given.0].unit.is_some() || column.unit.is_some();
     let Some(first) = time.first().copied().filter(|t| *t > 1e8 && !has_unit) else { return Ok(()) };
@@ -66,11 +74,15 @@ fn epoch(time: &mut [f64], table: &Table, column: &Column, warnings: &mut Vec<St
     Ok(())
 }
 
-/// Share of its width beyond which a clock that starts anew has lost more than a few samples.
-const ANEW: f64 = 0.01;
+/// Largest step over the overflow of a clock, as a share of the clock's range: a larger one means that many samples are lost.
+const LARGEST_LOSS: f64 = 0.01;
 
-/// Clocks that start anew go on, and says so: at midnight, and counters of 16 and 32 bits.
-fn anew(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<String>, TraceError> {
+/// Unwraps a clock that overflows: a time of day at midnight, a counter of 16 or 32 bits. Gives the warning; `None` where the stamps
+/// do not overflow.
+///
+/// # Errors
+/// As [`scale`].
+fn unwrap_time(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<String>, TraceError> {
     let (_, factor) = scale(table, column, "time", Quantity::Time)?;
     let back: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).filter(|d| *d < 0.0).collect();
     let widths = [
@@ -78,7 +90,7 @@ fn anew(time: &mut [f64], table: &Table, column: &Column) -> Result<Option<Strin
         (65_536.0 * factor, "a counter of 16 bits"),
         (4_294_967_296.0 * factor, "a counter of 32 bits"),
     ];
-    let of = |width: f64| !back.is_empty() && back.iter().all(|d| (0.0..ANEW * width).contains(&(d + width)));
+    let of = |width: f64| !back.is_empty() && back.iter().all(|d| (0.0..LARGEST_LOSS * width).contains(&(d + width)));
     let Some((width, name)) = widths.into_iter().find(|(w, _)| of(*w)) else { return Ok(None) };
     let (mut turns, mut before) = (0.0, time[0]);
     for t in time.iter_mut() {
@@ -99,7 +111,7 @@ const BRIDGED: f64 = 6.0;
 /// Share of the samples that may be missing in bridged gaps.
 const MISSING: f64 = 0.05;
 
-/// The grid: cut by `from` and `to`, at gaps, and brought to even steps where the stamps are not.
+/// The grids of a record: cut by `from` and `to` and at gaps, with even steps where those of the stamps are not.
 ///
 /// # Errors
 /// When the time column is missing, has a cell that is no number or a wrong unit, gives no sampling interval, or too few rows are left.
@@ -107,7 +119,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
     let file = || table.file.clone();
     let count = table.rows();
     let short = |found: usize| TraceError::Cut { file: file(), found, rows: count, needed: SHORTEST };
-    let alone = |longest: Clock| Clocks { longest, others: Vec::new(), gaps: None };
+    let one_piece = |longest: Clock| Clocks { longest, others: Vec::new(), gaps: None };
     let Some(column) = time_column(table, mapping)? else {
         let dt = mapping.dt.unwrap_or(1.0);
         let index = |t: f64| (t / dt).round().clamp(0.0, count as f64) as usize;
@@ -117,12 +129,12 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         }
         let start = rows.start as f64 * dt;
         let grid = Grid { start, dt, sampling: Sampling::Uniform };
-        return Ok(alone(Clock { grid, rows, stamps: None, resampling: Resampling::None }));
+        return Ok(one_piece(Clock { grid, rows, stamps: None, resampling: Resampling::None }));
     };
     let mut time = values(table, &column, "time", Quantity::Time, &(0..count))?;
-    warnings.extend(table.position(&column.column).and_then(|k| table.mended(k)).map(str::to_owned));
-    epoch(&mut time, table, &column, warnings)?;
-    warnings.extend(anew(&mut time, table, &column)?);
+    warnings.extend(table.position(&column.column).and_then(|k| table.bridge_warning(k)).map(str::to_owned));
+    calendar_stamps(&mut time, table, &column, warnings)?;
+    warnings.extend(unwrap_time(&mut time, table, &column)?);
     let mut rows = 0..count;
     if mapping.from.is_some() || mapping.to.is_some() {
         let (from, to) = (mapping.from.unwrap_or(f64::NEG_INFINITY), mapping.to.unwrap_or(f64::INFINITY));
@@ -138,7 +150,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
     }
     let line = |k: usize| table.line(rows.start + k);
     let Err(NoGrid::Gap { row, gap, dt: middle }) = grid(&time) else {
-        return even(table, rows, time, mapping, warnings).map(alone);
+        return even(table, rows, time, mapping, warnings).map(one_piece);
     };
     // Stamps that a computer took come in clusters: the mean of the steps without lost samples is the rate.
     let steps = || time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= 2.5 * middle);
@@ -153,7 +165,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
             start = k;
         }
     }
-    // Of pieces of one length the first.
+    // Of pieces of equal length the first is taken.
     let best = pieces.iter().fold(0..0, |best: Range<usize>, p| if p.len() > best.len() { p.clone() } else { best });
     let bridges = missing <= MISSING * time.len() as f64;
     if best.len() < SHORTEST || (best.len() == time.len() && !bridges) {
@@ -161,7 +173,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         return Err(TraceError::Gap { file: file(), line: line(row), gap, missing, dt: usual });
     }
     if pieces.len() == 1 {
-        return even(table, rows, time, mapping, warnings).map(alone);
+        return even(table, rows, time, mapping, warnings).map(one_piece);
     }
     let gaps = format!(
         "{}: the record has gaps and is {} pieces (the first ends before row {})",
@@ -174,7 +186,7 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
         even(table, part, time[piece.clone()].to_vec(), mapping, warnings)
     };
     let longest = of(&best, warnings)?;
-    // What holds for the longest piece is said of it; another that cannot be used is left out.
+    // Warnings are given for the longest piece alone; another piece that cannot be used is left out.
     let mut others: Vec<Clock> = pieces
         .iter()
         .filter(|p| **p != best && p.len() >= LEAST_PIECE)
@@ -184,12 +196,15 @@ pub(super) fn clock(table: &Table, mapping: &Mapping, warnings: &mut Vec<String>
     Ok(Clocks { longest, others, gaps: Some(gaps) })
 }
 
-/// Least samples of a piece beside the longest.
+/// Least samples of a piece other than the longest.
 const LEAST_PIECE: usize = 64;
 /// Relative difference of the sampling intervals of pieces of one record.
 const SAME_RATE: f64 = 1e-3;
 
-/// The grid of rows without gaps; their stamps are `time`.
+/// The grid of rows without gaps; `time` holds the stamp of each row, s.
+///
+/// # Errors
+/// When the stamps do not increase or are too few, and as [`resampled`].
 fn even(
     table: &Table,
     rows: Range<usize>,
@@ -261,7 +276,10 @@ fn even(
     Ok(Clock { grid, rows, stamps: Some(time), resampling })
 }
 
-/// The grid that is asked for, whatever the stamps.
+/// The grid of interval `dt` (s) that was asked for, from the first to the last of the stamps `time` (s).
+///
+/// # Errors
+/// [`TraceError::Resample`] when it has fewer than [`SHORTEST`] samples or more than [`MOST_SAMPLES`].
 fn resampled(
     table: &Table,
     rows: Range<usize>,

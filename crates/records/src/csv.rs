@@ -35,8 +35,8 @@ pub(super) fn parse(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let (end, cut) = cut::whole(body, &format, true);
     let rows = rows(&body[..end], &format, 0, head.lines + 1).map_err(|r| r.named(file, &format))?;
     Ok(Table {
-        mended: Vec::new(),
-        cut: cut.map(|text| cut::word(file, head.lines + rows.passed + 1, &text)),
+        bridge_warnings: Vec::new(),
+        cut: cut.map(|text| cut::cut_warning(file, head.lines + rows.passed + 1, &text)),
         file: file.to_owned(),
         headers: head.headers,
         columns: rows.columns,

@@ -1,4 +1,4 @@
-//! What can be wrong with a trace, each with the place and the way out.
+//! The errors of a trace. Each names the place and what to do.
 
 use std::path::PathBuf;
 

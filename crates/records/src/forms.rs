@@ -1,10 +1,10 @@
-//! Text that is no plain CSV, brought to it: UTF-16, the logs of LinuxCNC, columns set apart by blanks; and which reader it is for.
+//! Finds the form of a text, and converts what is no plain CSV: UTF-16, the logs of LinuxCNC, columns separated by blanks.
 //!
 //! Sources: halscope's `write_log_file` (LinuxCNC, src/hal/utils/scope_files.c) writes the period in nanoseconds and then a
 //! line a sample, each value behind the name of its channel; halsampler(1) writes the values alone, with `-t` the number of
 //! the sample first.
 
-use super::csv::cut::{last_of_words, told, word};
+use super::csv::cut::{cut_warning, excerpt, is_last_row_cut};
 use super::error::TraceError;
 use super::table::{Fault, Header, MAX_CELLS, MAX_COLUMNS, Table};
 use super::vendors;
@@ -19,7 +19,7 @@ pub(super) enum Form {
     Plain,
 }
 
-/// Tells what the text is, and brings it to a table or to CSV where it is neither.
+/// Finds the form of a text, and converts it to a table or to CSV where it is neither.
 ///
 /// # Errors
 /// When the bytes are no text of a known encoding, or are of a known form and damaged.
@@ -40,7 +40,7 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
     if head.len() >= 16 && zeros(0) * 10 > head.len() / 2 * 9 {
         return utf16(text, u16::from_be_bytes, file);
     }
-    // A few zeros are what a logger leaves that lost its power, and stand in cells that are named; many are no text.
+    // A logger that lost its power leaves a few zeros, which errors of their cells name; with many of them it is no text.
     if (zeros(0) + zeros(1)) * 20 > head.len() {
         return Err(TraceError::Format {
             file: file.to_owned(),
@@ -79,7 +79,7 @@ pub(super) fn of(bytes: &[u8], file: &str) -> Result<Form, TraceError> {
     Ok(blanks(text).map_or(Form::Plain, Form::Csv))
 }
 
-/// Bytes of a text that tell how its letters are written.
+/// Bytes of a text by which its encoding is found.
 const HEAD: usize = 1 << 16;
 
 /// CSV in other bytes than the file's.
@@ -178,7 +178,7 @@ impl Filled {
             columns: self.columns,
             faults: self.faults,
             lines: vec![(0, first_line)],
-            mended: Vec::new(),
+            bridge_warnings: Vec::new(),
             cut: None,
         }
     }
@@ -195,8 +195,8 @@ fn halscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let (numbers, mut rows): (Vec<usize>, Vec<&str>) =
         lines.filter(|(_, line)| !line.trim().is_empty()).map(|(k, line)| (k + 1, line)).unzip();
     let mut cut = None;
-    if last_of_words(&rows, text.ends_with('\n')) {
-        cut = rows.pop().map(|row| word(file, numbers[rows.len()], &told(row.trim().as_bytes())));
+    if is_last_row_cut(&rows, text.ends_with('\n')) {
+        cut = rows.pop().map(|row| cut_warning(file, numbers[rows.len()], &excerpt(row.trim().as_bytes())));
     }
     let mut filled = Filled::default();
     for (row, &line) in rows.iter().zip(&numbers) {
@@ -215,7 +215,7 @@ fn halscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     Ok(Table { cut, ..filled.table(file, numbers.first().copied().unwrap_or(1)) })
 }
 
-/// Columns set apart by blanks, made CSV; None where a comma, a semicolon or a tab separates, or there is one column. Without
+/// Columns separated by blanks, as CSV; None where a comma, a semicolon or a tab separates, or there is one column. Without
 /// a header (halsampler) the columns are `column 1`, `column 2`, ...
 fn blanks(text: &[u8]) -> Option<Vec<u8>> {
     let content = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.trim_ascii().starts_with(b"#");

@@ -1,7 +1,8 @@
-//! Which column of a foreign log is which signal: by its name, its unit and its numbers.
+//! Which column of a log is which signal: by its name, its unit and its values.
 //!
-//! Names are cut into words at everything that is no letter or digit, at `camelCase` and before trailing digits; each role
-//! knows words that speak for it and words that speak against it. The best column of each role is taken, each column once.
+//! A name is split into words where a character is no letter or digit, at `camelCase`, and between letters and digits. Each role has a
+//! score for a column: some words, units and values add to it, others take from it. The pairs of role and column are taken from the
+//! highest score down, each role and each column once.
 
 use super::signal::{Quantity, Signal};
 use super::table::Table;
@@ -16,7 +17,7 @@ pub enum Role {
     Signal(Signal),
 }
 
-/// A column with what was made of it.
+/// A column, and the role that it is taken for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guess {
     /// What it is taken for.
@@ -25,14 +26,15 @@ pub struct Guess {
     pub column: String,
     /// Its unit, from the header or the end of its name.
     pub unit: Option<&'static Unit>,
-    /// How sure that is: names and units that fit add up; below [`SURE`] a person should look.
+    /// Score of the role for this column; below [`SURE`] the user should check the guess.
     pub score: i32,
 }
 
-/// From here on a guess is sure.
+/// Score from which a guess needs no check.
 pub const SURE: i32 = 6;
 
-/// The unit at the end of a name: `theta_rad`, `speed_rad_s`, `force_cmd_N`.
+/// A name without the unit at its end, and that unit: `theta_rad` is `theta` in rad, `speed_rad_s` is `speed` in rad/s. `None` where
+/// the name ends in no unit.
 #[must_use]
 pub fn suffix(name: &str) -> Option<(&str, &'static Unit)> {
     let cuts: Vec<usize> = name.match_indices('_').map(|(k, _)| k).collect();
@@ -49,7 +51,7 @@ pub fn suffix(name: &str) -> Option<(&str, &'static Unit)> {
     None
 }
 
-/// Words of a name, in small letters.
+/// Words of a name, in lower case.
 fn words(name: &str) -> Vec<String> {
     let mut out: Vec<String> = vec![String::new()];
     let mut before = ' ';
@@ -139,12 +141,12 @@ const TABLE: &[&str] =
 const ACCELERATION: &[&str] =
     &["acc", "accel", "acceleration", "alpha", "ddq", "jerk", "error", "err", "deviation", "lag"];
 
-/// What the columns of a log are taken for, the time first, then the signals in their order.
+/// The roles of a log's columns: the time first, then the signals in their order.
 #[must_use]
 pub fn guess(table: &Table) -> Vec<Guess> {
     let mut candidates: Vec<(Guess, usize)> = Vec::new();
     for (index, header) in table.headers.iter().enumerate() {
-        // A column with some cells that are no number is one all the same: what reads it names the cell.
+        // A column where a few cells are no numbers is a candidate, too: an error of reading it names the cell.
         let values = table.finite(index);
         if values.is_empty() || 2 * values.len() < table.rows() {
             continue;
@@ -160,7 +162,7 @@ pub fn guess(table: &Table) -> Vec<Guess> {
             candidates.push((Guess { role, column: header.name.clone(), unit, score }, index));
         }
     }
-    // The best pairing first; of equals the column further to the left.
+    // The highest score first; of equal scores the column further to the left.
     candidates.sort_by(|a, b| b.0.score.cmp(&a.0.score).then(a.1.cmp(&b.1)));
     let mut found: Vec<Guess> = Vec::new();
     for (candidate, _) in candidates {
@@ -168,7 +170,6 @@ pub fn guess(table: &Table) -> Vec<Guess> {
             found.push(candidate);
         }
     }
-    // A table's encoder alone, where nothing says that it is the table's, is the motor's.
     let order = |role: &Role| match role {
         Role::Time => 0,
         Role::Signal(s) => 1 + s.index(),
@@ -177,7 +178,7 @@ pub fn guess(table: &Table) -> Vec<Guess> {
     found
 }
 
-/// The first column that is called as times are, or in a unit of time, whatever its numbers.
+/// The first column whose name or unit is that of a time, whatever its values.
 #[must_use]
 pub fn time_by_name(table: &Table) -> Option<Guess> {
     table.headers.iter().find_map(|header| {
@@ -188,7 +189,7 @@ pub fn time_by_name(table: &Table) -> Option<Guess> {
     })
 }
 
-/// The roles that a column may have, each with what speaks for it.
+/// The roles that a column may have, each with its score.
 fn scores(name: &str, words: &[String], quantity: Option<Quantity>, values: &[f64]) -> Vec<(Role, i32)> {
     let has = |list: &[&str]| words.iter().any(|w| list.contains(&w.as_str()));
     let rises = values.len() > 2 && values.windows(2).all(|w| w[1] > w[0]);
@@ -199,7 +200,7 @@ fn scores(name: &str, words: &[String], quantity: Option<Quantity>, values: &[f6
             out.push((role, score + if moves { 1 } else { -4 }));
         }
     };
-    // Its own name says all.
+    // A signal's own name decides.
     if let Some(signal) = Signal::from_name(name).or_else(|| suffix(name).and_then(|(stem, _)| Signal::from_name(stem)))
     {
         add(Role::Signal(signal), 20);
@@ -251,7 +252,7 @@ fn scores(name: &str, words: &[String], quantity: Option<Quantity>, values: &[f6
         + i32::from(has(&["input", "plant"]))
         - 2 * i32::from(reference > 0 && !force)
         - 20 * i32::from(wrong);
-    // A supply's voltage hardly moves; a drive's does.
+    // The voltage of a supply is nearly constant; that of a drive is not.
     let steady = {
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         low > 0.0 && high < 2.0 * low

@@ -43,7 +43,7 @@ fn vectors(bytes: &[u8]) -> Result<Vec<Vector>, String> {
     Ok(reader.vectors)
 }
 
-/// The crate's error without the words that the message around it has already.
+/// The crate's error without the part that repeats the message around it.
 fn plain(error: &hdf5_pure::Error) -> String {
     let text = error.to_string();
     text.strip_prefix("HDF5 format error: ").map_or_else(|| text.clone(), str::to_owned)

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::csv::cut::{told, word};
+use super::csv::cut::{cut_warning, excerpt};
 use super::error::TraceError;
 use super::forms::Filled;
 use super::table::Table;
@@ -39,7 +39,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
                 row(&mut filled, value, k + 1)?;
             }
         }
-        // An array of objects beside what the logger says of itself.
+        // An array of objects, next to metadata of the logger.
         Ok(Value::Object(object)) if object.values().filter(|v| is_rows(v)).count() == 1 => {
             for value in object.values().filter(|v| is_rows(v)).filter_map(Value::as_array) {
                 for (k, value) in value.iter().enumerate() {
@@ -68,7 +68,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
                     Ok(value) => row(&mut filled, &value, k + 1)?,
                     // An object that ends before it is closed, behind whole ones.
                     Err(e) if e.is_eof() && k + 1 == last && filled.rows() > 0 => {
-                        cut = Some(word(file, last, &told(line)));
+                        cut = Some(cut_warning(file, last, &excerpt(line)));
                     }
                     Err(e) => {
                         return Err(wrong(format!("row {}: not JSON ({e}); a record is one object a line", k + 1)));
@@ -78,14 +78,14 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         }
     }
     // Rows of an array are numbered from the first.
-    cut = cut.or_else(|| begun.map(|text| word(file, filled.rows() + 1, &text)));
+    cut = cut.or_else(|| begun.map(|text| cut_warning(file, filled.rows() + 1, &text)));
     if filled.is_empty() {
         return Err(wrong("the file holds no columns; a record is one object of numbers a line".to_owned()));
     }
     Ok(Table { cut, ..filled.table(file, 1) })
 }
 
-/// An array of objects that ends in the middle, closed behind its last whole object; the text of what was begun behind that.
+/// An array of objects that was cut off, closed after its last complete object, and the text after that.
 fn closed(bytes: &[u8]) -> Option<(Vec<u8>, Option<String>)> {
     let mut open: Vec<u8> = Vec::new();
     let (mut quoted, mut escaped) = (false, false);
@@ -111,7 +111,7 @@ fn closed(bytes: &[u8]) -> Option<(Vec<u8>, Option<String>)> {
     closed.extend(open.iter().rev().map(|b| if *b == b'[' { b']' } else { b'}' }));
     let begun = bytes[end..].trim_ascii();
     let begun = begun.strip_prefix(b",").unwrap_or(begun).trim_ascii();
-    Some((closed, (!begun.is_empty()).then(|| told(begun))))
+    Some((closed, (!begun.is_empty()).then(|| excerpt(begun))))
 }
 
 /// Whether a value is an array of objects.

@@ -58,7 +58,7 @@ pub use load::{COUNTS, Column, Loaded, LoadedPieces, Mapping, from_table, load, 
 pub use lost::{bridge, held, restore};
 pub use machine::{Controller, Machine, MachineError};
 pub use sampling::{Grid, Sampling, grid};
-pub use signal::{Motion, Quantity, Signal};
+pub use signal::{AxisKind, Quantity, Signal};
 pub use table::{Header, Table};
 pub use units::Unit;
 pub use write::{append_number, number, writable, write_columns, write_csv, write_text};

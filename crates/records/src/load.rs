@@ -6,7 +6,7 @@ use std::path::Path;
 use super::clock::{Clock, Clocks, Resampling, clock};
 use super::error::{TraceError, nearest};
 use super::sampling::{resample, resample_far};
-use super::signal::{Motion, Quantity, Signal};
+use super::signal::{AxisKind, Quantity, Signal};
 use super::table::Table;
 use super::units::Unit;
 use super::wrap::unwrap;
@@ -52,7 +52,7 @@ pub struct Mapping {
     /// What the torque does between samples.
     pub hold: Hold,
     /// Rotary or linear units.
-    pub motion: Motion,
+    pub motion: AxisKind,
     /// First time used, s, as the file counts it.
     pub from: Option<f64>,
     /// Last time used, s.
@@ -68,7 +68,7 @@ impl Default for Mapping {
             dt: None,
             signals: Vec::new(),
             hold: Hold::Zoh,
-            motion: Motion::Rotary,
+            motion: AxisKind::Rotary,
             from: None,
             to: None,
             resample: None,
@@ -83,13 +83,13 @@ pub struct Loaded {
     pub trace: Trace,
     /// The time stamps of its samples as they were logged, s; None where the file has none.
     pub stamps: Option<Vec<f64>>,
-    /// Each a sentence that says what to do.
+    /// Warnings for the user: each is a sentence that says what to do.
     pub warnings: Vec<String>,
     /// Unit of a current, a voltage or a percentage that stands for the torque one to one.
     pub drive: Option<String>,
 }
 
-/// A record as its gaps have left it.
+/// A record, cut at its gaps.
 #[derive(Debug, Clone)]
 pub struct LoadedPieces {
     /// The longest piece, and what the user should know about the whole.
@@ -122,15 +122,18 @@ pub fn from_table(table: &Table, mapping: &Mapping) -> Result<Loaded, TraceError
     pieces(table, mapping, false).map(|p| p.longest)
 }
 
-/// Makes the traces of a table: the longest piece, and the others where they are `wanted`.
-fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPieces, TraceError> {
+/// Makes the traces of a table: the longest piece, and `with_others` the other pieces, too.
+///
+/// # Errors
+/// [`TraceError`], naming file, row and column.
+fn pieces(table: &Table, mapping: &Mapping, with_others: bool) -> Result<LoadedPieces, TraceError> {
     let mut warnings: Vec<String> = table.cut.iter().cloned().collect();
     let wanted = wanted(table, mapping, &mut warnings)?;
     if table.rows() < SHORTEST {
         return Err(TraceError::TooShort { file: table.file.clone(), found: table.rows(), needed: SHORTEST });
     }
     let Clocks { longest: clock, others, gaps } = clock(table, mapping, &mut warnings)?;
-    let others = if together { others } else { Vec::new() };
+    let others = if with_others { others } else { Vec::new() };
     let longest = trace(table, mapping, &wanted, &clock, &mut warnings)?;
     let others: Vec<(Trace, Option<Vec<f64>>)> = others
         .into_iter()
@@ -158,7 +161,10 @@ fn pieces(table: &Table, mapping: &Mapping, together: bool) -> Result<LoadedPiec
     Ok(LoadedPieces { longest, others })
 }
 
-/// The signals on a clock.
+/// The trace of the `wanted` columns, in SI units, on the grid of `clock`.
+///
+/// # Errors
+/// As [`values`] and [`unwrap`]; and when no column is a signal.
 fn trace(
     table: &Table,
     mapping: &Mapping,
@@ -171,16 +177,16 @@ fn trace(
     for (signal, column) in wanted {
         let mut values = values(table, column, signal.name(), signal.quantity(mapping.motion), rows)?;
         let at = table.position(&column.column);
-        warnings.extend(at.and_then(|k| table.mended(k)).map(str::to_owned));
-        if let Some(word) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
-            warnings.push(word);
+        warnings.extend(at.and_then(|k| table.bridge_warning(k)).map(str::to_owned));
+        if let Some(warning) = unwrap(&mut values, table, column, *signal, mapping.motion)? {
+            warnings.push(warning);
         }
         warnings.extend(no_torque_constant(table, column, *signal, mapping.motion));
         let held = matches!(signal, Signal::T | Signal::Command) && mapping.hold == Hold::Zoh;
         if let Some(time) = stamps {
             values = match *resampling {
                 Resampling::None => values,
-                // The torque belongs to its sample under either hold: only the motion is read off at the grid's times.
+                // The torque stays as sampled under either hold: only the motion is interpolated to the grid's times.
                 Resampling::Near if matches!(signal, Signal::T | Signal::Command) => values,
                 Resampling::Near => resample(time, &values, grid),
                 Resampling::Far { samples } => resample_far(time, &values, grid, samples, held),
@@ -197,7 +203,8 @@ fn trace(
 /// The unit that `[signals]` gives to a drive's number of no unit, as a servo's bus or a controller's trace has it.
 pub const COUNTS: &str = "counts";
 
-/// The unit of a current, a voltage or a percentage that stands for the torque one to one; it may be all that the column's name ends in.
+/// Unit of the torque where its column is a drive's quantity (current, voltage, percentage, counts) and `[signals]` gives no factor to
+/// N.m; `None` otherwise. The unit is that of the header, of `[signals]`, or the one that the column's name ends in.
 pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> Option<String> {
     let index = table.position(&column.column)?;
     let header = &table.headers[index];
@@ -214,8 +221,8 @@ pub(super) fn in_drive_units(table: &Table, column: &Column, signal: Signal) -> 
     (signal == Signal::T && unit.quantity == Quantity::Drive && plain).then(|| base.to_owned())
 }
 
-/// That no torque constant is given: then no unit of the results is what it is called.
-pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: Motion) -> Option<String> {
+/// Warning where the torque is in a drive's unit and no torque constant is given: inertia and stiffness then come out in that unit.
+pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal, motion: AxisKind) -> Option<String> {
     let written = in_drive_units(table, column, signal)?;
     let turn = motion.unit("rad");
     Some(format!(
@@ -225,7 +232,8 @@ pub(super) fn no_torque_constant(table: &Table, column: &Column, signal: Signal,
     ))
 }
 
-/// The signals that the file has, and where.
+/// The signals of the file, each with its column: what `[signals]` maps, and what has a signal's own name. Appends a warning where
+/// `[signals]` does not fit the file and is not used.
 ///
 /// # Errors
 /// When a column of `[signals]` is not in the table.
@@ -244,7 +252,7 @@ pub(super) fn wanted(
         }
         return Ok(all);
     }
-    // The log of the axis file, or a trace this program wrote: one or the other, never a mixture.
+    // Either the columns that [signals] maps, or those of a trace that this program wrote: never some of both.
     let mapped = |c: &Column| table.position(&c.column).is_some();
     let own = |s: Signal| table.own(s).is_some();
     if !mapping.signals.iter().any(|(s, c)| !s.is_of_the_loop() && mapped(c))
@@ -265,11 +273,11 @@ pub(super) fn wanted(
             return Err(missing(table, signal.name(), &column.column));
         }
     }
-    // Signals that [signals] does not speak of are found by their own names, where no other signal has the column.
+    // Signals that [signals] does not name are found by their own names, where no other signal has the column.
     for (signal, column) in Signal::ALL.into_iter().filter_map(named) {
-        let spoken = mapping.signals.iter().any(|(s, _)| *s == signal);
+        let is_mapped = mapping.signals.iter().any(|(s, _)| *s == signal);
         let taken = there.iter().any(|(_, c)| table.position(&c.column) == table.position(&column.column));
-        if !spoken && !taken {
+        if !is_mapped && !taken {
             there.push((signal, column));
         }
     }
@@ -287,7 +295,7 @@ fn missing(table: &Table, signal: &'static str, wanted: &str) -> TraceError {
     }
 }
 
-/// Which column it is, and the factor that brings it to SI.
+/// Index of a column in the table, and the factor from its numbers to SI units: the scale of `[signals]` times the factor of its unit.
 ///
 /// # Errors
 /// When the column is missing, or its unit is unknown or of another quantity.
@@ -299,11 +307,11 @@ pub(super) fn scale(
 ) -> Result<(usize, f64), TraceError> {
     let index = table.position(&column.column).ok_or_else(|| missing(table, signal, &column.column))?;
     let mut scale = column.scale;
-    // A column found by the signal's own name has the unit at that name's end; one that [signals] names has none but there.
+    // A unit at the end of a column's name counts only where the column was found by the signal's own name, not by [signals].
     let own = Signal::from_name(signal).is_some_and(|s| table.own(s) == Some(index))
         || (signal == "time" && time_name(&table.headers[index].name));
-    let behind = || guess::suffix(&table.headers[index].name).filter(|_| own).map(|(_, unit)| unit.symbol.to_owned());
-    let written = table.headers[index].unit.clone().or_else(|| column.unit.clone()).or_else(behind);
+    let suffixed = || guess::suffix(&table.headers[index].name).filter(|_| own).map(|(_, unit)| unit.symbol.to_owned());
+    let written = table.headers[index].unit.clone().or_else(|| column.unit.clone()).or_else(suffixed);
     let counts = matches!(quantity, Quantity::Torque | Quantity::Force) && written.as_deref() == Some(COUNTS);
     if let Some(text) = written.as_ref().filter(|_| !counts) {
         let unit = Unit::parse(text).ok_or_else(|| TraceError::UnknownUnit {
@@ -329,7 +337,7 @@ pub(super) fn scale(
     Ok((index, scale))
 }
 
-/// Raw values scaled.
+/// `scale*raw + offset` for each value.
 pub(super) fn scaled(raw: &[f64], scale: f64, offset: f64) -> Vec<f64> {
     if scale == 1.0 && offset == 0.0 { raw.to_vec() } else { raw.iter().map(|v| v * scale + offset).collect() }
 }
@@ -389,7 +397,7 @@ pub(super) fn time_column(table: &Table, mapping: &Mapping) -> Result<Option<Col
     Ok(Some(column))
 }
 
-/// No column is a signal.
+/// The error where no column is a signal.
 pub(super) fn no_signal(table: &Table) -> TraceError {
     TraceError::NoTable {
         file: table.file.clone(),
@@ -433,8 +441,8 @@ mod tests {
             let mapping = Mapping { signals: vec![(Signal::T, column)], ..Mapping::default() };
             from_table(&table, &mapping).unwrap().warnings
         };
-        let said = warnings(1.0).join("\n");
-        assert!(said.contains("column current is in A, and no torque constant is given"), "{said}");
+        let text = warnings(1.0).join("\n");
+        assert!(text.contains("column current is in A, and no torque constant is given"), "{text}");
         assert_eq!(warnings(0.5), Vec::<String>::new());
     }
 
@@ -533,8 +541,8 @@ mod tests {
         };
         let loaded = from_table(&table(&[40, 41]), &Mapping::default()).unwrap();
         assert_eq!(loaded.trace.get(Signal::T).unwrap()[39..43], [78.0, 80.0, 82.0, 84.0]);
-        let said = loaded.warnings.join("\n");
-        assert!(said.contains("column T has no number in 2 of 200 rows, the first row 42"), "{said}");
+        let text = loaded.warnings.join("\n");
+        assert!(text.contains("column T has no number in 2 of 200 rows, the first row 42"), "{text}");
         for missing in [&[0][..], &[199], &[40, 80, 120], &[40, 41, 42, 43]] {
             let error = from_table(&table(missing), &Mapping::default()).unwrap_err().to_string();
             assert!(error.contains(&format!("row {}, column T", missing[0] + 2)), "{missing:?}: {error}");
@@ -553,8 +561,8 @@ mod tests {
         assert!((loaded.trace.dt() - 1e-4).abs() < 1e-12);
         let theta = loaded.trace.get(Signal::Theta1).unwrap();
         assert!(theta.windows(2).all(|w| w[1] - w[0] == 50.0), "{theta:?}");
-        let said = loaded.warnings.join("\n");
-        assert!(said.contains("time starts anew 1 times (a counter of 16 bits)"), "{said}");
-        assert!(said.contains("theta1 starts anew 3 times (a counter of 12 bits)"), "{said}");
+        let text = loaded.warnings.join("\n");
+        assert!(text.contains("time starts anew 1 times (a counter of 16 bits)"), "{text}");
+        assert!(text.contains("theta1 starts anew 3 times (a counter of 12 bits)"), "{text}");
     }
 }

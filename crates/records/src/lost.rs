@@ -13,8 +13,9 @@ use rayon::prelude::*;
 
 use crate::autoregressive::expected;
 
-/// Intervals from a lost sample to a second one, none where it is alone, and neighbours on each side of them, pass by pass: a lost sample
-/// hides another near it until it is bridged, and two that hide each other are found together.
+/// The passes of the search, each with the number of intervals from a lost sample to a second one (0 for a single sample) and the number
+/// of neighbours on each side. A lost sample distorts the cubic at another one near it: the second is found once the first is replaced,
+/// or both in a pass for two.
 const PASSES: [(usize, usize); 8] = [(0, MANY), (0, MANY), (0, 3), (0, 3), (1, MANY), (1, 3), (2, MANY), (3, MANY)];
 /// Neighbours on each side for a slow motion.
 const MANY: usize = 6;
@@ -158,8 +159,8 @@ fn lost(y: &[f64], noise: f64, pass: (usize, usize)) -> Vec<Lost> {
             let agree = c.residual <= AGREE * median.max(noise);
             off > FAR * c.residual.max(median).max(noise) && (clear || agree && span < 2)
         };
-        let told = block.zip(cubics).filter(is_lost);
-        told.map(|(k, c)| (k, c.expected, c.residual)).collect::<Vec<Lost>>()
+        let estimates = block.zip(cubics).filter(is_lost);
+        estimates.map(|(k, c)| (k, c.expected, c.residual)).collect::<Vec<Lost>>()
     };
     let blocks: Vec<usize> = (neighbours..end).step_by(BLOCK).collect();
     let found: Vec<Vec<Lost>> = blocks.into_par_iter().map(of_block).collect();
@@ -178,8 +179,8 @@ fn repeated(y: &[f64], noise: f64) -> Vec<(usize, f64)> {
     if repeats.len() as f64 > MOST * y.len() as f64 {
         return Vec::new();
     }
-    let told = expected(y, &repeats).into_iter();
-    told.filter(|e| (y[e.at] - e.value).abs() > FAR * e.error.max(noise)).map(|e| (e.at, e.value)).collect()
+    let estimates = expected(y, &repeats).into_iter();
+    estimates.filter(|e| (y[e.at] - e.value).abs() > FAR * e.error.max(noise)).map(|e| (e.at, e.value)).collect()
 }
 
 /// Replaces the samples that repeat the one before by their interpolated values, whatever the noise of the position is.
@@ -187,13 +188,13 @@ pub fn restore(y: &mut [f64]) {
     repeated(y, 0.0).into_iter().for_each(|(k, expected)| y[k] = expected);
 }
 
-/// Bridges the lost samples of a position whose noise has a standard deviation of `noise`, in its unit, and tells how many they were. Where
-/// they would be more than one in fifty, they are the signal and stay.
+/// Interpolates the lost samples of a position whose noise has a standard deviation of `noise`, in its unit, and returns their number. Where
+/// more than one sample in fifty seems lost, it is the signal itself, and nothing is changed.
 pub fn bridge(y: &mut [f64], noise: f64) -> usize {
     bridged(y, noise).len()
 }
 
-/// Bridges the lost samples as [`bridge`] does, and gives them as they were found, one twice where two passes bridged it.
+/// The same; returns the indices of the samples in the order of the passes, some more than once.
 fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
     let mut all = Vec::new();
     for (k, expected) in repeated(y, noise) {
@@ -216,7 +217,7 @@ fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
         for (k, expected, residual) in found {
             all.push(k);
             all.extend((span > 0).then_some(k + span));
-            // The nearest neighbours tell a fast motion best, where they are sound.
+            // For a fast motion the nearest neighbours give the best value, where none of them is lost.
             let [nearer] = nearest.at::<1>(y, k);
             let expected = if nearer.residual < residual { nearer.expected } else { expected };
             (y[k], y[k + span]) = (expected[0], expected[1]);
@@ -225,15 +226,16 @@ fn bridged(y: &mut [f64], noise: f64) -> Vec<usize> {
     all
 }
 
-/// Steps of the encoder from which a position goes on after a sample that was held: where it repeats because it is slow, it goes on by one.
-const GOES_ON: f64 = 1.5;
+/// Change of the position after a sample that was held, in steps of the encoder, from which on the axis was moving: a slow position, which
+/// repeats as well, changes by one step.
+const MOVING: f64 = 1.5;
 
-/// The samples among those that [`bridge`] bridges that repeat the one before, in order: the log held them while the axis went on.
+/// Indices of those samples that [`bridge`] replaces that repeat the one before, in order: the log held them while the axis moved.
 #[must_use]
 pub fn held(y: &[f64], noise: f64) -> Vec<usize> {
     // Most records have none: nothing is fitted there.
     let step = (1..y.len()).filter(|k| !repeats(y, *k)).map(|k| (y[k] - y[k - 1]).abs()).fold(f64::INFINITY, f64::min);
-    if !(1..y.len().saturating_sub(1)).any(|k| repeats(y, k) && (y[k + 1] - y[k]).abs() >= GOES_ON * step) {
+    if !(1..y.len().saturating_sub(1)).any(|k| repeats(y, k) && (y[k + 1] - y[k]).abs() >= MOVING * step) {
         return Vec::new();
     }
     let mut held = bridged(&mut y.to_vec(), noise);

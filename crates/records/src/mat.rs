@@ -158,7 +158,15 @@ pub(super) fn table(vectors: Vec<Vector>, file: &str) -> Result<Table, TraceErro
             v.values
         })
         .collect();
-    Ok(Table { file: file.to_owned(), headers, columns, faults, lines: Vec::new(), mended: Vec::new(), cut: None })
+    Ok(Table {
+        file: file.to_owned(),
+        headers,
+        columns,
+        faults,
+        lines: Vec::new(),
+        bridge_warnings: Vec::new(),
+        cut: None,
+    })
 }
 
 struct Reader {
@@ -168,7 +176,7 @@ struct Reader {
     elements: usize,
 }
 
-/// One element: its type, its data, and what stands behind it.
+/// One element: its type, its data, and the bytes after it.
 struct Element<'a> {
     kind: u32,
     data: &'a [u8],

@@ -1,23 +1,27 @@
-//! Cells without a number: few that stand alone are bridged by straight lines, in a whole table and in a stream by the same rule.
+//! Cells without a number: where they are few and isolated they are interpolated linearly, in a table and in a stream by the same rule.
 
 use super::error::TraceError;
 use super::table::{Fault, line_of};
 
-/// Share of a column's cells that may be missing for them to be bridged.
+/// Largest share of a column's cells that may be missing for them to be interpolated.
 const MISSING: f64 = 0.01;
-/// Most cells in a row that are bridged.
+/// Most consecutive cells that are interpolated.
 const IN_A_ROW: usize = 3;
 
-/// The cells of a column that are missing, counted as they come.
+/// The missing cells of one column, counted block by block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Missing {
+    /// Cells so far.
     rows: usize,
+    /// Missing ones among them.
     count: usize,
+    /// Missing ones at the end of the last block.
     run: usize,
+    /// Most consecutive missing ones.
     longest: usize,
-    /// Whether the first cell is one of them: nothing is before it to draw a line from.
+    /// Whether the first cell is missing: it has no neighbour before it to interpolate from.
     leads: bool,
-    /// The first of them.
+    /// The first missing cell.
     first: Option<Fault>,
 }
 
@@ -38,17 +42,16 @@ impl Missing {
         self.rows += values.len();
     }
 
-    /// The fault that no line is drawn across, whatever follows: a cell that is something else than missing, the first cell, too many in
-    /// a row.
+    /// The first fault, where the column is refused whatever follows: a cell holds another text than one for a missing value, the first
+    /// cell is missing, or more than [`IN_A_ROW`] consecutive ones are.
     pub fn beyond(&self) -> Option<&Fault> {
         self.first.as_ref().filter(|f| !f.missing() || self.leads || self.longest > IN_A_ROW)
     }
 
-    /// Of a column that is at its end: the fault for which it is not bridged, or what is said of it where it is; nothing where no cell
-    /// is missing.
+    /// At the end of the column: the warning that cells were interpolated; `None` where none is missing.
     ///
     /// # Errors
-    /// The first cell without a number of a column that is not bridged.
+    /// The first cell without a number, where the column has too many of them or ends in one.
     pub fn ended(&self, file: &str, column: &str) -> Result<Option<String>, Fault> {
         let Some(fault) = &self.first else { return Ok(None) };
         if self.beyond().is_some() || self.run > 0 || self.count as f64 > MISSING * self.rows as f64 {
@@ -61,7 +64,7 @@ impl Missing {
     }
 }
 
-/// Straight lines across the cells that are no numbers, between those that are.
+/// Interpolates linearly between the finite values, over those that are not finite.
 pub(super) fn bridge(values: &mut [f64]) {
     let mut last = 0;
     for k in 1..values.len() {
@@ -76,8 +79,8 @@ pub(super) fn bridge(values: &mut [f64]) {
     }
 }
 
-/// Rows of a stream, whose columns come piece by piece: a piece that ends in a missing cell waits, from the last row that is whole on,
-/// for the one that follows.
+/// Interpolates the missing cells of a stream. Where a column ends in a missing cell, the rows from the last complete one on are held
+/// back until the next rows are there.
 pub(super) struct Bridges {
     columns: Vec<Missing>,
     waiting: Option<Piece>,
@@ -101,12 +104,12 @@ impl Piece {
 }
 
 impl Bridges {
-    /// For so many columns.
+    /// For a stream of this many columns.
     pub fn new(columns: usize) -> Self {
         Self { columns: vec![Missing::default(); columns], waiting: None }
     }
 
-    /// Takes the next rows, in each column of which the first cell that is no number is told; gives those that can be passed on.
+    /// Takes the next rows, with the first cell of each column that is no number; gives the rows that are complete.
     ///
     /// # Errors
     /// The column, and its cell that is not bridged.
@@ -131,7 +134,7 @@ impl Bridges {
         let count = rows.columns.first().map_or(0, Vec::len);
         let mut keep = count;
         if self.columns.iter().any(|c| c.run > 0) {
-            // What waits begins with a row that has all its cells, as the first row of all has.
+            // The rows held back begin with a complete one, as the first row of the file is.
             let whole = |row: &usize| rows.columns.iter().all(|c| c[*row].is_finite());
             keep = (0..count).rev().find(whole).unwrap_or(0);
             let line = |row: usize| (row, rows.line(row));
@@ -145,17 +148,17 @@ impl Bridges {
         Ok((keep > 0).then_some(rows))
     }
 
-    /// After the last rows: what is said of the columns that were bridged, `name(column)` each.
+    /// After the last rows: a warning for each column with interpolated cells; `name(k)` is the name of column `k`.
     ///
     /// # Errors
     /// When a column has more missing cells than are bridged, or ends in one.
     pub fn ended(self, file: &str, name: impl Fn(usize) -> String) -> Result<Vec<String>, TraceError> {
-        let mut words = Vec::new();
+        let mut warnings = Vec::new();
         for (k, missing) in self.columns.iter().enumerate() {
             let name = name(k);
-            let word = missing.ended(file, &name).map_err(|fault| fault.named(file, &name))?;
-            words.extend(word.filter(|w| !words.contains(w)));
+            let warning = missing.ended(file, &name).map_err(|fault| fault.named(file, &name))?;
+            warnings.extend(warning.filter(|w| !warnings.contains(w)));
         }
-        Ok(words)
+        Ok(warnings)
     }
 }

@@ -1,4 +1,4 @@
-//! What stands in the place of the module `hdf5` in a build without that feature: it says how to get it.
+//! Replaces the module `hdf5` in a build without that feature: the error says how to get it.
 
 use super::error::TraceError;
 use super::table::Table;

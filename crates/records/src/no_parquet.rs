@@ -1,4 +1,4 @@
-//! What stands in the place of the module `parquet` in a build without that feature: every call says how to get it.
+//! Replaces the module `parquet` in a build without that feature: the errors say how to get it.
 
 use std::convert::Infallible;
 use std::fs::File;

@@ -48,12 +48,12 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         columns: Vec::new(),
         faults: Vec::new(),
         lines: Vec::new(),
-        mended: Vec::new(),
+        bridge_warnings: Vec::new(),
         cut: None,
     };
     for name in names.iter().filter(|n| n.ends_with(".npy")) {
         let mut array = Vec::new();
-        // The size that the archive claims may be a lie: no more is read.
+        // No more is read than the size that the archive declares, which may be wrong.
         let entry = archive.by_name(name).map_err(damaged)?;
         entry.take(UNFOLDED).read_to_end(&mut array).map_err(|e| wrong(format!("{name}: damaged ({e})")))?;
         add(&mut table, name.trim_end_matches(".npy"), &array).map_err(|what| wrong(format!("{name}: {what}")))?;
@@ -61,7 +61,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     if table.headers.is_empty() {
         return Err(wrong("no array of it has one or two dimensions of numbers".to_owned()));
     }
-    // Arrays of another length than the longest are columns that say so when used.
+    // Arrays shorter than the longest become columns that are an error when used.
     let rows = table.columns.iter().map(Vec::len).max().unwrap_or(0);
     for k in 0..table.columns.len() {
         let found = table.columns[k].len();

@@ -202,7 +202,7 @@ pub(super) fn read(open: File, file: &str) -> Result<Table, TraceError> {
         columns,
         faults,
         lines: Vec::new(),
-        mended: Vec::new(),
+        bridge_warnings: Vec::new(),
         cut: None,
     })
 }
@@ -266,7 +266,7 @@ fn numbers<T: DataType>(
             values.push(value.map_or(f64::NAN, &mut number));
         }
     }
-    // A number without bound is worse than none: it is no missing value.
+    // An infinite number is reported before a missing one.
     let of = |bad: fn(&f64) -> bool| values.iter().position(bad).map(|row| (row, values[row].to_string()));
     let fault = of(|v| v.is_infinite()).or(null).or_else(|| of(|v| v.is_nan()));
     Ok(Batch { values, fault })

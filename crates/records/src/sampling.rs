@@ -1,4 +1,4 @@
-//! Is a record uniformly sampled, and on which grid.
+//! Whether a record is uniformly sampled, and on which grid.
 //!
 //! The grid is the line `start + k*dt` through the first and the last time stamp. Time stamps off the line by no more
 //! than the file's own rounding are uniform; by up to [`Sampling::RESAMPLED`] of an interval they are resampled; a step
@@ -11,11 +11,11 @@ pub struct Grid {
     pub start: f64,
     /// Interval, s.
     pub dt: f64,
-    /// How the time stamps lie to it.
+    /// Distance of the time stamps from it.
     pub sampling: Sampling,
 }
 
-/// How a record's time stamps lie to its grid.
+/// Distance of a record's time stamps from its grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sampling {
     /// Uniform up to rounding.
@@ -143,9 +143,9 @@ impl Decimals {
     }
 }
 
-/// Values at the `samples` times of a grid that the stamps lie anyhow to. A smooth signal by the cubic through the four
-/// samples around each time (Lagrange); a held one keeps the value of the last stamp, or where an interval of the grid is
-/// wider than those of the stamps its mean over it, so that the impulse of a torque stays.
+/// Values at the `samples` times of a grid, from `values` at the stamps `time` (s), which may be anywhere. A smooth signal is interpolated
+/// by the cubic through the four samples around each time (Lagrange). A `held` one keeps the value of the last stamp; where the interval
+/// of the grid is wider than those of the stamps, it is its mean over the interval, so that the impulse of a torque is kept.
 #[must_use]
 pub fn resample_far(time: &[f64], values: &[f64], grid: &Grid, samples: usize, held: bool) -> Vec<f64> {
     let n = time.len();

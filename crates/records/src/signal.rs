@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-pub use crate::axis::Motion;
+pub use crate::axis::AxisKind;
 
-/// A physical quantity, as far as a trace needs to tell one unit from another.
+/// A physical quantity, by which the units of a trace are checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// s
@@ -81,7 +81,7 @@ impl Signal {
         Self::Command,
     ];
 
-    /// Whether the signal is of the drive's loop: it says nothing of the axis itself, and a trace may lack it.
+    /// Whether the signal belongs to the drive's control loop, not to the axis: a trace may be without it.
     #[must_use]
     pub const fn is_of_the_loop(self) -> bool {
         matches!(self, Self::Reference | Self::Command)
@@ -118,22 +118,22 @@ impl Signal {
 
     /// What the signal measures.
     #[must_use]
-    pub const fn quantity(self, motion: Motion) -> Quantity {
+    pub const fn quantity(self, motion: AxisKind) -> Quantity {
         match (self, motion) {
-            (Self::T | Self::Command, Motion::Rotary) => Quantity::Torque,
-            (Self::T | Self::Command, Motion::Linear) => Quantity::Force,
-            (Self::Theta1 | Self::Theta2 | Self::Reference, Motion::Rotary) => Quantity::Angle,
-            (Self::Theta1 | Self::Theta2 | Self::Reference, Motion::Linear) | (Self::X2, _) => Quantity::Length,
-            (Self::Omega1 | Self::Omega2, Motion::Rotary) => Quantity::AngularVelocity,
-            (Self::Omega1 | Self::Omega2, Motion::Linear) => Quantity::Velocity,
-            (Self::Alpha1 | Self::Alpha2, Motion::Rotary) => Quantity::AngularAcceleration,
-            (Self::Alpha1 | Self::Alpha2, Motion::Linear) => Quantity::Acceleration,
+            (Self::T | Self::Command, AxisKind::Rotary) => Quantity::Torque,
+            (Self::T | Self::Command, AxisKind::Linear) => Quantity::Force,
+            (Self::Theta1 | Self::Theta2 | Self::Reference, AxisKind::Rotary) => Quantity::Angle,
+            (Self::Theta1 | Self::Theta2 | Self::Reference, AxisKind::Linear) | (Self::X2, _) => Quantity::Length,
+            (Self::Omega1 | Self::Omega2, AxisKind::Rotary) => Quantity::AngularVelocity,
+            (Self::Omega1 | Self::Omega2, AxisKind::Linear) => Quantity::Velocity,
+            (Self::Alpha1 | Self::Alpha2, AxisKind::Rotary) => Quantity::AngularAcceleration,
+            (Self::Alpha1 | Self::Alpha2, AxisKind::Linear) => Quantity::Acceleration,
         }
     }
 
     /// The SI unit of the signal.
     #[must_use]
-    pub const fn unit(self, motion: Motion) -> &'static str {
+    pub const fn unit(self, motion: AxisKind) -> &'static str {
         self.quantity(motion).unit()
     }
 }

@@ -1,7 +1,7 @@
 //! Traces larger than memory: the rows of a CSV or Parquet file, some thousand at a time, as often as they are asked for.
 //!
-//! What a whole table is checked and mended for ([`super::load()`]) is checked here in one pass when the trace is opened and mended again as
-//! it is read; what needs all of a record at once, resampling, is refused with the way out.
+//! The checks of [`super::load()`] are made in one pass when the trace is opened, its corrections each time the trace is read. Resampling
+//! needs the whole record at once: it is refused, and the error says what to do instead.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -19,9 +19,9 @@ use super::sampling::{Decimals, Sampling};
 use super::table::{Fault, Kind, Table};
 use super::{Quantity, Signal, Trace, csv, parquet};
 
-/// Bytes of a CSV file that are read at a time: whatever the file, no more than this, and the numbers in it, is in memory.
+/// Bytes of a CSV file that are read at a time: this bounds the memory in use, whatever the size of the file.
 const BLOCK: usize = 8 << 20;
-/// Steps of time whose median is the usual one.
+/// Number of steps between time stamps whose median is taken for the usual one.
 const STEPS: usize = 1 << 14;
 
 /// A file whose rows are read piece by piece.
@@ -32,10 +32,14 @@ struct Rows {
     head: Table,
 }
 
-/// What takes rows, and of each column the first cell that is no number.
+/// Callback that takes rows, and the first cell of each column that is no number.
 type Take<'a> = dyn FnMut(Piece, &[Option<Fault>]) -> Result<(), TraceError> + 'a;
 
 impl Rows {
+    /// Opens a file and reads its header.
+    ///
+    /// # Errors
+    /// When it cannot be read, has no header, or is of a form that cannot be read row by row.
     fn open(path: &Path) -> Result<Self, TraceError> {
         let file = path.display().to_string();
         let (kind, mut open) = Kind::open(path)?;
@@ -66,12 +70,15 @@ impl Rows {
         Ok(Self {
             path: path.to_owned(),
             kind,
-            head: Table { file, headers, columns, faults, lines: Vec::new(), mended: Vec::new(), cut: None },
+            head: Table { file, headers, columns, faults, lines: Vec::new(), bridge_warnings: Vec::new(), cut: None },
         })
     }
 
-    /// Reads these columns from the first row to the last, with straight lines across cells that are missing; gives what is to be said of
-    /// the file.
+    /// Passes the columns of the indices `wanted` to `take`, from the first row to the last, with missing cells interpolated. Gives the
+    /// warnings.
+    ///
+    /// # Errors
+    /// When the file cannot be read or a missing cell is not interpolated; the error of `take`.
     fn each(
         &self,
         wanted: &[usize],
@@ -84,9 +91,9 @@ impl Rows {
             let passed = bridges.take(piece, faults).map_err(|(k, fault)| fault.named(file, &name(k)))?;
             passed.map_or(Ok(()), |piece| take(&piece))
         };
-        let mut said = Vec::new();
+        let mut notes = Vec::new();
         match self.kind {
-            Kind::Csv => said.extend(self.each_block(wanted, &mut bridged)?),
+            Kind::Csv => notes.extend(self.each_block(wanted, &mut bridged)?),
             _ => {
                 let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
                 let source = parquet::Source::open(File::open(&self.path).map_err(failed)?, file)?;
@@ -95,10 +102,14 @@ impl Rows {
                 })?;
             }
         }
-        said.extend(bridges.ended(file, name)?);
-        Ok(said)
+        notes.extend(bridges.ended(file, name)?);
+        Ok(notes)
     }
 
+    /// The same for a CSV file, [`BLOCK`] bytes at a time, without interpolation. Gives the warning of a last row that is cut off.
+    ///
+    /// # Errors
+    /// When the file cannot be read, a line is longer than a block, or a row has another number of fields; the error of `take`.
     fn each_block(&self, wanted: &[usize], take: &mut Take<'_>) -> Result<Option<String>, TraceError> {
         let failed = |reason| TraceError::Read { path: self.path.clone(), reason };
         let name = &self.head.file;
@@ -133,8 +144,8 @@ impl Rows {
             let mut all: Vec<Option<Vec<f64>>> = rows.columns.into_iter().map(Some).collect();
             for (k, &column) in wanted.iter().enumerate() {
                 // The same column may serve two signals.
-                let twin = wanted[..k].iter().position(|c| *c == column);
-                let values = twin.map_or_else(|| all[column].take(), |at: usize| columns.get(at).cloned());
+                let earlier = wanted[..k].iter().position(|c| *c == column);
+                let values = earlier.map_or_else(|| all[column].take(), |at: usize| columns.get(at).cloned());
                 columns.push(values.unwrap_or_default());
             }
             if count > 0 {
@@ -145,13 +156,13 @@ impl Rows {
             line += rows.passed;
             bytes.drain(..end);
             if ended {
-                return Ok(cut.map(|text| csv::cut::word(name, line, &text)));
+                return Ok(cut.map(|text| csv::cut::cut_warning(name, line, &text)));
             }
         }
     }
 }
 
-/// Which column is a signal, and how it is brought to SI.
+/// Where a signal is in the file: `scale*column + offset` is its value in SI units.
 #[derive(Debug, Clone, Copy)]
 struct Source {
     column: usize,
@@ -169,7 +180,7 @@ pub struct Stream {
     /// Largest distance of a time stamp from the grid, s.
     tolerance: f64,
     length: usize,
-    /// Each a sentence that says what to do.
+    /// Warnings for the user: each is a sentence that says what to do.
     pub warnings: Vec<String>,
     /// As in [`super::Loaded`].
     pub drive: Option<String>,
@@ -202,16 +213,16 @@ impl Stream {
             }
         };
         let mut clock = Clock::new(rows.head.file.clone());
-        // All that will be used is read, so that what has to be said of it is said before the work.
+        // Every column in use is read once here, so that its warnings are given before the work.
         let columns: Vec<usize> = time.iter().chain(signals.iter().map(|(_, s)| s)).map(|s| s.column).collect();
-        let said = rows.each(&columns, &mut |piece| match time {
+        let notes = rows.each(&columns, &mut |piece| match time {
             Some(t) => clock.take(&scaled(&piece.columns[0], t.scale, t.offset), piece),
             None => {
                 clock.count += piece.columns[0].len();
                 Ok(())
             }
         })?;
-        warnings.extend(said);
+        warnings.extend(notes);
         clock.finish()?;
         if clock.count < SHORTEST {
             return Err(TraceError::TooShort { file: rows.head.file, found: clock.count, needed: SHORTEST });
@@ -288,10 +299,10 @@ impl Stream {
         }
     }
 
-    /// The record from its first sample to its last: `take(index of the first sample, samples)`.
+    /// Passes the record to `take(first, samples)` piece by piece, in SI units; `first` is the index of the piece's first sample.
     ///
     /// # Errors
-    /// [`TraceError`], naming file, row and column; what `take` gives.
+    /// [`TraceError`], naming file, row and column; the error of `take`.
     pub fn each(&self, mut take: impl FnMut(usize, Trace) -> Result<(), TraceError>) -> Result<(), TraceError> {
         let columns: Vec<usize> =
             self.time.iter().chain(self.signals.iter().map(|(_, s)| s)).map(|s| s.column).collect();
@@ -327,15 +338,16 @@ impl Stream {
     }
 }
 
-/// What one pass over the time stamps finds.
+/// What one pass over the time stamps finds, s.
 struct Clock {
     file: String,
     count: usize,
     first: f64,
     last: f64,
     decimals: Decimals,
-    /// The first steps and the lines behind them, until there are enough of them.
+    /// The first steps, each with the line of its second stamp, until there are [`STEPS`] of them.
     early: Vec<(f64, usize)>,
+    /// The median of those.
     usual: Option<f64>,
 }
 
@@ -344,6 +356,10 @@ impl Clock {
         Self { file, count: 0, first: 0.0, last: 0.0, decimals: Decimals::default(), early: Vec::new(), usual: None }
     }
 
+    /// Takes the stamps of a piece, s, one a row.
+    ///
+    /// # Errors
+    /// When they do not increase, or leave a gap.
     fn take(&mut self, stamps: &[f64], piece: &Piece) -> Result<(), TraceError> {
         for (k, &stamp) in stamps.iter().enumerate() {
             self.decimals.take(stamp);
@@ -380,7 +396,10 @@ impl Clock {
         Err(TraceError::Gap { file: self.file.clone(), line, gap, missing, dt })
     }
 
-    /// The usual step, and the early ones judged by it.
+    /// Sets the usual step to the median of the early ones, and checks these for gaps.
+    ///
+    /// # Errors
+    /// [`TraceError::Gap`].
     fn finish(&mut self) -> Result<(), TraceError> {
         if self.usual.is_some() || self.early.is_empty() {
             return Ok(());
@@ -500,8 +519,8 @@ mod tests {
             "column theta1 has no",
             "is cut off",
         ] {
-            for said in [&whole.warnings, &stream.warnings] {
-                assert_eq!(said.iter().filter(|w| w.contains(expected)).count(), 1, "{expected}: {said:?}");
+            for notes in [&whole.warnings, &stream.warnings] {
+                assert_eq!(notes.iter().filter(|w| w.contains(expected)).count(), 1, "{expected}: {notes:?}");
             }
         }
         let mut seen = 0;

@@ -1,4 +1,4 @@
-//! A file of named numeric columns, whatever its form: told by its first bytes and not by its name.
+//! A file of named numeric columns. Its form is found by its first bytes, not by its name.
 
 use std::fs::File;
 use std::io::Read;
@@ -38,7 +38,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Tells from a file's first 128 bytes (fewer for a shorter one).
+    /// The form of a file by its first 128 bytes (fewer of a shorter one).
     ///
     /// # Errors
     /// When the file is of a form that is not read.
@@ -86,7 +86,7 @@ impl Kind {
         Ok(Self::Csv)
     }
 
-    /// Opens a file and tells what it is.
+    /// Opens a file and finds its form.
     ///
     /// # Errors
     /// When the file cannot be read, or is of a form that is not read.
@@ -126,7 +126,7 @@ impl Fault {
         NO_VALUE.contains(&self.text.trim_matches('"').trim().to_lowercase().as_str())
     }
 
-    /// Takes the place of a column's first fault: where there is none, and of a missing value where this is none.
+    /// Becomes the first fault of a column where there is none yet, or only a missing value while this is another text.
     pub fn into_first(self, first: &mut Option<Self>) {
         if first.as_ref().is_none_or(|f| f.missing() && !self.missing()) {
             *first = Some(self);
@@ -150,14 +150,14 @@ pub struct Table {
     pub(super) faults: Vec<Option<Fault>>,
     /// (row, line) where the line of a row is not one more than that of the row before.
     pub(super) lines: Vec<(usize, usize)>,
-    /// Of columns whose missing values were bridged: the column, and what is to be said of it.
-    pub(super) mended: Vec<(usize, String)>,
-    /// What is to be said of a last row that was left out.
+    /// For each column with interpolated cells: its index, and the warning.
+    pub(super) bridge_warnings: Vec<(usize, String)>,
+    /// Warning of a last row that was left out.
     pub(super) cut: Option<String>,
 }
 
 impl Table {
-    /// Bridges cells without a number by straight lines where they are few and stand alone; of such a column it is said when it is used.
+    /// Interpolates cells without a number where they are few and isolated; the warning is given when the column is used.
     fn bridged(mut self) -> Self {
         let rows = self.rows();
         for index in 0..self.columns.len() {
@@ -166,21 +166,21 @@ impl Table {
             }
             let mut missing = Missing::default();
             missing.take(&self.columns[index], self.faults[index].as_ref());
-            if let Ok(Some(word)) = missing.ended(&self.file, &self.headers[index].name) {
+            if let Ok(Some(warning)) = missing.ended(&self.file, &self.headers[index].name) {
                 missing::bridge(&mut self.columns[index]);
                 self.faults[index] = None;
-                self.mended.push((index, word));
+                self.bridge_warnings.push((index, warning));
             }
         }
         self
     }
 
-    /// What was made of a column that had cells without a number.
-    pub(super) fn mended(&self, index: usize) -> Option<&str> {
-        self.mended.iter().find(|(k, _)| *k == index).map(|(_, word)| word.as_str())
+    /// Warning of a column with interpolated cells.
+    pub(super) fn bridge_warning(&self, index: usize) -> Option<&str> {
+        self.bridge_warnings.iter().find(|(k, _)| *k == index).map(|(_, warning)| warning.as_str())
     }
 
-    /// The finite values of a column, for a look at it.
+    /// The finite values of a column, in its own unit.
     pub(super) fn finite(&self, index: usize) -> Vec<f64> {
         self.columns[index].iter().copied().filter(|v| v.is_finite()).collect()
     }
@@ -312,7 +312,7 @@ pub(super) fn line_of(lines: &[(usize, usize)], row: usize) -> usize {
     after.checked_sub(1).map_or(row + 1, |i| lines[i].1 + row - lines[i].0)
 }
 
-/// Words for a count of an encoder or converter, which is in no unit: its scale is the user's to say.
+/// Names for the counts of an encoder or converter, which have no unit: the user gives their scale.
 const COUNTS: [&str; 12] =
     ["count", "counts", "cts", "cnt", "inc", "incr", "increments", "pulse", "pulses", "ticks", "lsb", "raw"];
 

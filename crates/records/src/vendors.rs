@@ -9,14 +9,14 @@
 //! `%DIMENSION=`, `%COUNT=` and `%CYCLETIME=` (microseconds); behind `%[DATA]` stand rows of time and values, each closed by a
 //! semicolon. Source: the public MATLAB reader `read_tncscope_file`. No export of a control was at hand for either.
 
-use super::csv::cut::{told, word};
+use super::csv::cut::{cut_warning, excerpt};
 use super::error::TraceError;
 use super::forms::Filled;
 use super::table::{Table, header};
 use super::units::Unit;
 use crate::xml::{Document, Element};
 
-/// Whether XML is what the text begins as.
+/// Whether the text begins as XML does.
 pub(super) fn is_xml(text: &[u8]) -> bool {
     let first = text.trim_ascii_start();
     first.starts_with(b"<?xml") || first.starts_with(b"<trace")
@@ -44,7 +44,7 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     let document = Document::parse(bytes).or_else(|e| {
         closed(bytes)
             .and_then(|closed| {
-                cut = closed.begun.map(|(line, text)| word(file, line, &text));
+                cut = closed.begun.map(|(line, text)| cut_warning(file, line, &text));
                 Document::parse(&closed.whole).ok()
             })
             .ok_or_else(|| {
@@ -66,7 +66,7 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         let Some(id) = signal.get("id") else { continue };
         let key = signal.get("key").unwrap_or(id);
         let name = signal.get("name").filter(|n| !n.trim().is_empty()).unwrap_or(key);
-        // Two signals of one name are told apart by their ids.
+        // Two signals of one name are distinguished by their ids.
         let taken = signals.iter().any(|(_, other)| header(other).name == header(name).name);
         let name = if taken { format!("{name} ({id})") } else { name.to_owned() };
         signals.push((id, named(&name, signal.get("unitsType").unwrap_or_default())));
@@ -97,14 +97,14 @@ pub(super) fn sinumerik(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
     Ok(Table { cut, ..filled.table(file, 1) })
 }
 
-/// A trace of Sinumerik that was closed behind its last whole sample.
+/// A trace of Sinumerik that was cut off, closed after its last complete sample.
 struct Closed {
     whole: Vec<u8>,
-    /// Line and text of the sample that was begun behind that.
+    /// Line and text of the incomplete sample after it.
     begun: Option<(usize, String)>,
 }
 
-/// Closes a trace of Sinumerik that ends in the middle; None where it has no whole sample.
+/// Closes a trace of Sinumerik that is cut off; None where it has no complete sample.
 fn closed(bytes: &[u8]) -> Option<Closed> {
     let end = memchr::memmem::rfind(bytes, b"/>")? + 2;
     let begun = bytes[end..].trim_ascii();
@@ -118,7 +118,7 @@ fn closed(bytes: &[u8]) -> Option<Closed> {
     let line = 1 + memchr::memchr_iter(b'\n', &bytes[..bytes.trim_ascii_end().len()]).count();
     // The end of an element is no sample.
     let sample = !begun.is_empty() && !begun.starts_with(b"</");
-    Some(Closed { whole, begun: sample.then(|| (line, told(begun))) })
+    Some(Closed { whole, begun: sample.then(|| (line, excerpt(begun))) })
 }
 
 /// A file of TNCscope.
@@ -174,7 +174,7 @@ pub(super) fn tncscope(bytes: &[u8], file: &str) -> Result<Table, TraceError> {
         let cells = |row: &str| row.matches(';').count();
         // Each row is closed by a semicolon.
         if before.ends_with(';') && cells(last) < cells(before) {
-            cut = Some(word(file, at, &told(last.as_bytes())));
+            cut = Some(cut_warning(file, at, &excerpt(last.as_bytes())));
             rows.pop();
         }
     }

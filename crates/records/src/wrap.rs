@@ -2,7 +2,7 @@
 
 use super::error::TraceError;
 use super::load::{Column, scale};
-use super::signal::{Motion, Quantity, Signal};
+use super::signal::{AxisKind, Quantity, Signal};
 use super::table::Table;
 
 /// Bits of the counters of positions that are known: converters of resolvers have 10, encoders up to 31.
@@ -10,8 +10,9 @@ const BITS: std::ops::RangeInclusive<u32> = 10..=32;
 /// Of other columns: words of a bus.
 const WORDS: [u32; 2] = [16, 32];
 
-/// Counters of limited width go on where they start anew; says so. A counter is one whose whole numbers stay within its width,
-/// from zero on or about zero, and jump by nearly that; an angle within one turn jumps by nearly that.
+/// Unwraps the values of a counter of limited width, in place, and gives the warning; `None` where the column is no counter. A counter
+/// holds whole numbers within its range, from zero on or about zero, and jumps by nearly that range; an angle within one turn jumps by
+/// nearly one turn.
 ///
 /// # Errors
 /// As [`scale`].
@@ -20,7 +21,7 @@ pub(super) fn unwrap(
     table: &Table,
     column: &Column,
     signal: Signal,
-    motion: Motion,
+    motion: AxisKind,
 ) -> Result<Option<String>, TraceError> {
     let (_, factor) = scale(table, column, signal.name(), signal.quantity(motion))?;
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
@@ -44,7 +45,7 @@ pub(super) fn unwrap(
     }
     for (width, name) in widths {
         let jumps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|d| d.abs() > 0.5 * width).collect();
-        // What wraps stays within its width, reaches both ends of it, and leaps nearly all of it at once.
+        // A counter that overflows stays within its range, is near both ends of it, and jumps by nearly all of it.
         let wraps = high - low <= 1.001 * width
             && high - low > 0.8 * width
             && !jumps.is_empty()

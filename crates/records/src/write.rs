@@ -1,4 +1,4 @@
-//! Trace files out: written beside the target and renamed, so that no half file is left behind.
+//! Writes files: under a temporary name next to the target, then renamed, so that no incomplete file is left.
 
 use std::collections::HashSet;
 use std::io::Write;
@@ -8,14 +8,14 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use sha2::{Digest, Sha256};
 
 use super::error::TraceError;
-use super::signal::Motion;
+use super::signal::AxisKind;
 use super::{Signal, Trace};
 
 /// Writes a trace with units in the header, numbers with all their digits.
 ///
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
-pub fn write_csv(path: &Path, trace: &Trace, motion: Motion) -> Result<(), TraceError> {
+pub fn write_csv(path: &Path, trace: &Trace, motion: AxisKind) -> Result<(), TraceError> {
     let time: Vec<f64> = (0..trace.len()).map(|k| trace.time(k)).collect();
     let mut columns: Vec<(String, &[f64])> = vec![("time [s]".to_owned(), &time)];
     for signal in Signal::ALL {
@@ -32,7 +32,7 @@ pub fn write_csv(path: &Path, trace: &Trace, motion: Motion) -> Result<(), Trace
 /// # Errors
 /// [`TraceError::Write`] when the folder or the file cannot be written.
 pub fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), TraceError> {
-    // A number without bound is no result: a reader would refuse the file, a spreadsheet would not say why.
+    // An infinite number is no result: a reader would refuse the file, a spreadsheet would not show why.
     for (name, values) in columns {
         if let Some(row) = values.iter().position(|v| !v.is_finite()) {
             return Err(TraceError::NotFinite {
@@ -82,8 +82,8 @@ pub fn append_number(text: &mut String, value: f64) {
     debug_assert!(written.is_ok(), "writing to a string");
 }
 
-/// Writes a whole file at once: beside the target first, then renamed. A file that stands under the final name is complete,
-/// or as it was before, whenever the process ends; what an ended process left beside it is taken away by the next one.
+/// Writes a whole file at once: under a temporary name next to the target, then renamed. The file of the final name is complete, or as it
+/// was before, whenever the process ends; temporary files of processes that ended are removed by the next one.
 ///
 /// `-` is standard output. A device or a pipe is written through; a symbolic link is followed; a file that is there keeps its
 /// mode.
@@ -179,26 +179,26 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
-/// Why a folder takes no file, without the name that the file would have had on its way: the user gave another.
+/// Why no file can be made in a folder, without the temporary name, which the user did not give.
 fn refused(folder: &Path, error: &std::io::Error) -> std::io::Error {
     let there = folder.display();
-    let words = match std::fs::metadata(folder) {
+    let reason = match std::fs::metadata(folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => format!("the folder {there} does not exist"),
         Ok(found) if !found.is_dir() => format!("{there} is no folder"),
         _ => error.get_ref().and_then(std::error::Error::source).map_or_else(|| error.to_string(), ToString::to_string),
     };
-    std::io::Error::new(error.kind(), words)
+    std::io::Error::new(error.kind(), reason)
 }
 
-/// What begins the name of a file on its way.
+/// How the names of temporary files begin.
 const PREFIX: &str = ".eixo-";
-/// A file left beside its target for so long belongs to nobody, whichever machine it came from, s.
+/// Age from which a temporary file belongs to no process, whatever machine made it, s.
 const ABANDONED: u64 = 24 * 3600;
 
-/// Files on their way: an interrupt takes them away before the process ends.
+/// Temporary files of this process: an interrupt removes them before the process ends.
 static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// A file on its way.
+/// A temporary file.
 struct Pending {
     file: tempfile::NamedTempFile,
 }
@@ -221,7 +221,7 @@ impl Pending {
         Ok(Self { file })
     }
 
-    /// Takes the file away again.
+    /// Removes the file.
     fn forget(self) {
         let temporary = self.file.path().to_owned();
         let mut all = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
@@ -240,7 +240,7 @@ impl Pending {
     }
 }
 
-/// Once a process: Ctrl-C and a request to end take the files on their way along. Once a folder: what ended processes left.
+/// Once a process: sets Ctrl-C and SIGTERM to remove the temporary files. Once a folder: removes those of processes that ended.
 fn prepare(folder: &Path) {
     static SEEN: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
     let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -261,7 +261,7 @@ fn prepare(folder: &Path) {
     }
 }
 
-/// Takes away what ended processes left in a folder. A process that runs, here or on another machine that shares the folder,
+/// Removes the temporary files of processes that ended. A process that runs, here or on another machine that shares the folder,
 /// keeps its own.
 fn sweep(folder: &Path) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
@@ -312,7 +312,7 @@ mod tests {
             .with(Signal::T, values.clone())
             .and_then(|t| t.with(Signal::Theta2, values))
             .unwrap();
-        write_csv(&path, &trace, Motion::Rotary).unwrap();
+        write_csv(&path, &trace, AxisKind::Rotary).unwrap();
         assert_eq!(load(&path, &Mapping::default()).unwrap().trace, trace);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -404,12 +404,12 @@ mod tests {
         let path = folder.path().join("no/such/folder/trace.csv");
         let error = write_columns(&path, &[("a", &[1.0])]).unwrap_err().to_string();
         let parent = path.parent().unwrap().display();
-        let said = format!(
+        let expected = format!(
             "{}: cannot write: the folder {parent} does not exist. Create the folder, or choose a folder that exists",
             path.display()
         );
-        assert_eq!(error, said);
-        assert_eq!(writable(&path).unwrap_err().to_string(), said);
+        assert_eq!(error, expected);
+        assert_eq!(writable(&path).unwrap_err().to_string(), expected);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         std::fs::write(folder.path().join("log.csv"), "x").unwrap();
         let below = write_text(&folder.path().join("log.csv/trace.csv"), b"x").unwrap_err().to_string();

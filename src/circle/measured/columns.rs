@@ -83,7 +83,7 @@ fn tokens(name: &str) -> Vec<String> {
 }
 
 /// The direction that a word names: true for clockwise.
-pub(super) fn way(word: &str) -> Option<bool> {
+pub(super) fn sense(word: &str) -> Option<bool> {
     match word.to_lowercase().as_str() {
         "cw" | "clockwise" | "g2" | "g02" => Some(true),
         "ccw" | "acw" | "anticlockwise" | "counterclockwise" | "g3" | "g03" => Some(false),
@@ -92,10 +92,10 @@ pub(super) fn way(word: &str) -> Option<bool> {
 }
 
 /// The direction that a text names, true for clockwise: `Run 1 CCW`, `counter-clockwise`.
-pub(super) fn way_of(text: &str) -> Option<bool> {
+pub(super) fn sense_of(text: &str) -> Option<bool> {
     let tokens = tokens(text);
     let counter = tokens.windows(2).any(|w| matches!(w[0].as_str(), "counter" | "anti") && w[1] == "clockwise");
-    if counter { Some(false) } else { tokens.iter().find_map(|w| way(w)) }
+    if counter { Some(false) } else { tokens.iter().find_map(|w| sense(w)) }
 }
 
 /// Units of ballbar software in addition to those of a trace.
@@ -141,7 +141,7 @@ fn role(name: &str, unit: Option<Quantity>) -> Option<Role> {
     if has(&["time", "t", "zeit"]) || unit == Some(Quantity::Time) {
         return Some(Role::Time);
     }
-    (way_of(name).is_some() && length).then_some(Role::Deviation)
+    (sense_of(name).is_some() && length).then_some(Role::Deviation)
 }
 
 /// What each column of a table may be, and its unit where that is known.
@@ -267,7 +267,7 @@ pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, Me
     }
     let mut all = Vec::new();
     // Two columns that name unlike directions are two turns; of others the first is meant, a deviation before a radius.
-    let turned: Vec<usize> = lengths.iter().copied().filter(|c| way_of(&table.headers[*c].name).is_some()).collect();
+    let turned: Vec<usize> = lengths.iter().copied().filter(|c| sense_of(&table.headers[*c].name).is_some()).collect();
     let chosen = if turned.len() >= 2 {
         turned
     } else {
@@ -297,7 +297,7 @@ pub(super) fn pick(table: &Table, radius: Option<f64>) -> Result<Vec<Picked>, Me
             points,
             direction: direction.clone(),
             signed,
-            clockwise: way_of(&table.headers[c].name),
+            clockwise: sense_of(&table.headers[c].name),
             notes: notes.clone(),
         });
     }

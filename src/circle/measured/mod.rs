@@ -105,9 +105,9 @@ pub fn read(files: &[PathBuf], given: &Given) -> Result<Measured, MeasuredError>
         }
     }
     if files.len() == 2 && chosen.len() == 1 {
-        let way = if chosen[0].clockwise { "clockwise" } else { "counter-clockwise" };
+        let direction = if chosen[0].clockwise { "clockwise" } else { "counter-clockwise" };
         return Err(MeasuredError::Mismatch(format!(
-            "{} and {}: both turn {way}, as far as their columns, header lines, names and the order of their points tell; say it \
+            "{} and {}: both turn {direction}, as far as their columns, header lines, names and the order of their points tell; say it \
              with --directions ccw,cw, one for each of the {before} turns",
             files[0].display(),
             files[1].display()
@@ -177,8 +177,8 @@ impl Run {
     fn feed(&self, radius: f64) -> Option<f64> {
         let Points::Cartesian { x, y, time: Some(time) } = &self.points else { return None };
         let (first, last) = (time.first()?, time.last()?);
-        let way = radius * span(&angles(x, y));
-        let feed = way / (last - first);
+        let path = radius * span(&angles(x, y));
+        let feed = path / (last - first);
         (feed.is_finite() && feed > 0.0).then_some(feed)
     }
 }
@@ -277,9 +277,9 @@ fn split(table: &Table, declared: &Declared, file: &str, given: &Given) -> Resul
             if covered > TAU + 0.02 {
                 // The middle turn: the ends are the ways in and out.
                 let spare = 0.5 * (covered - TAU);
-                let way = |k: usize| (own[k] - own[0]).abs();
-                let first = (0..own.len()).find(|k| way(*k) >= spare).unwrap_or(0);
-                let last = (0..own.len()).rfind(|k| way(*k) <= spare + TAU).unwrap_or(own.len() - 1).max(first);
+                let travel = |k: usize| (own[k] - own[0]).abs();
+                let first = (0..own.len()).find(|k| travel(*k) >= spare).unwrap_or(0);
+                let last = (0..own.len()).rfind(|k| travel(*k) <= spare + TAU).unwrap_or(own.len() - 1).max(first);
                 points = points.part(first, last + 1);
                 notes.push(format!("{:.0} degrees were measured; the middle turn is used.", covered.to_degrees()));
             }

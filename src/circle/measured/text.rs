@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::columns::{unit, way, way_of};
+use super::columns::{sense, sense_of, unit};
 use crate::trace::Quantity;
 
 /// What header lines declare.
@@ -31,7 +31,7 @@ impl Declared {
 /// What a file's name declares.
 pub(super) fn of_name(file: &Path) -> Declared {
     let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    Declared { clockwise: way_of(&stem), ..Declared::default() }
+    Declared { clockwise: sense_of(&stem), ..Declared::default() }
 }
 
 /// A text as columns, and what its header declares.
@@ -97,7 +97,7 @@ fn is_data(line: &str) -> bool {
     let numbers = |fields: Vec<&str>| {
         let filled: Vec<&str> = fields.into_iter().map(str::trim).filter(|f| !f.is_empty()).collect();
         let count = filled.iter().filter(|f| number(f).is_some()).count();
-        count >= 2 && filled.iter().all(|f| number(f).is_some() || way(f.trim_matches('"')).is_some())
+        count >= 2 && filled.iter().all(|f| number(f).is_some() || sense(f.trim_matches('"')).is_some())
     };
     numbers(line.split([';', '\t']).collect())
         || numbers(line.split([',', ';', '\t']).collect())
@@ -111,13 +111,13 @@ fn by_spaces(line: &str) -> Option<Vec<String>> {
     }
     let fields: Vec<&str> = line.split_whitespace().collect();
     let count = fields.iter().filter(|f| number(f).is_some()).count();
-    let all = fields.iter().all(|f| number(f).is_some() || way(f).is_some());
+    let all = fields.iter().all(|f| number(f).is_some() || sense(f).is_some());
     (count >= 2 && all).then(|| fields.iter().map(|f| sign(f)).collect())
 }
 
 /// A word of direction as a sign.
 fn sign(field: &str) -> String {
-    match way(field.trim().trim_matches('"')) {
+    match sense(field.trim().trim_matches('"')) {
         Some(true) => "-1".to_owned(),
         Some(false) => "1".to_owned(),
         None => field.to_owned(),
@@ -181,7 +181,7 @@ fn header(lines: &[&str]) -> Declared {
             declared.feed = quantity(Quantity::Velocity, 1e-3 / 60.0);
         }
         if declared.clockwise.is_none() && (lower.contains("dir") || lower.contains("run") || lower.contains("sense")) {
-            declared.clockwise = way_of(line);
+            declared.clockwise = sense_of(line);
         }
     }
     declared

@@ -18,7 +18,7 @@ struct Machine {
     /// Heights at +X, +Y, -X, -Y.
     spikes: [f64; 4],
     /// Lean of Y towards X, rad: squareness is its negative.
-    lean: f64,
+    squareness: f64,
     /// X longer, Y shorter by this share.
     scale: f64,
     /// X late, s.
@@ -52,7 +52,7 @@ impl Machine {
                 let (size, pitch, phase) = self.cyclic[i];
                 if pitch > 0.0 { size * (TAU * along[i] / pitch + phase).sin() } else { 0.0 }
             };
-            let x = x0 * (1.0 + self.scale) + self.lean * y0 + ripple(0) - 0.5 * vx * self.backlash[0]
+            let x = x0 * (1.0 + self.scale) + self.squareness * y0 + ripple(0) - 0.5 * vx * self.backlash[0]
                 + 0.5 * vy * self.lateral[1]
                 + self.bow[1] * (y0 / R).powi(2);
             let y = y0 * (1.0 - self.scale) + ripple(1) - 0.5 * vy * self.backlash[1]
@@ -69,8 +69,8 @@ impl Machine {
             if k.is_multiple_of(23) {
                 jerk = if a.sin().abs() < 0.5 { self.jerks * normal() } else { 0.0 };
             }
-            let shake = self.vibration.0 * (TAU * self.vibration.1 * t).sin();
-            let out = spike + shake + jerk * a.cos().abs() + self.noise * normal();
+            let vibration = self.vibration.0 * (TAU * self.vibration.1 * t).sin();
+            let out = spike + vibration + jerk * a.cos().abs() + self.noise * normal();
             (x + self.centre.0 + out * a.cos(), y + self.centre.1 + out * a.sin())
         };
         let (x, y) = (0..points).map(place).unzip();
@@ -100,7 +100,7 @@ fn near(found: f64, true_one: f64, within: f64, what: &str) {
 const ALL: Machine = Machine {
     backlash: [6e-6, 3e-6],
     spikes: [8e-6, 5e-6, 6e-6, 4e-6],
-    lean: 30e-6,
+    squareness: 30e-6,
     scale: 20e-6,
     late: 0.4e-3,
     cyclic: [(1.5e-6, 0.010, 0.3), (0.8e-6, 0.005, 1.0)],
@@ -160,7 +160,7 @@ fn the_standard_errors_cover_what_is_off() {
 fn one_deviation_alone_takes_the_whole_circularity_and_the_others_are_nothing() {
     let single: [(Machine, Kind); 7] = [
         (Machine { backlash: [6e-6, 0.0], ..Machine::default() }, Kind::Backlash(Axis::X)),
-        (Machine { lean: 40e-6, ..Machine::default() }, Kind::Squareness),
+        (Machine { squareness: 40e-6, ..Machine::default() }, Kind::Squareness),
         (Machine { scale: 25e-6, ..Machine::default() }, Kind::Scaling),
         (Machine { late: 1e-3, ..Machine::default() }, Kind::Servo),
         (Machine { lateral: [0.0, 5e-6], ..Machine::default() }, Kind::Lateral(Axis::Y)),
@@ -197,15 +197,19 @@ fn vibration_has_its_frequency_and_jerks_their_axis() {
     let a = Machine { jerks: 2e-6, noise: 0.2e-6, ..Machine::default() }.analysis();
     let (x, y) = (size(&a, Kind::StickSlip(Axis::X)), size(&a, Kind::StickSlip(Axis::Y)));
     assert!(x > 1.0 && y == 0.0, "{x} {y}");
-    let calm = Machine { noise: 0.5e-6, ..Machine::default() }.analysis();
-    assert_eq!(size(&calm, Kind::StickSlip(Axis::X)), 0.0);
-    assert!(calm.effects.iter().all(|e| !matches!(e.kind, Kind::Vibration | Kind::Cyclic(_))), "{:?}", calm.effects);
-    near(1e6 * calm.left, 0.5, 0.05, "noise");
+    let without_stick_slip = Machine { noise: 0.5e-6, ..Machine::default() }.analysis();
+    assert_eq!(size(&without_stick_slip, Kind::StickSlip(Axis::X)), 0.0);
+    assert!(
+        without_stick_slip.effects.iter().all(|e| !matches!(e.kind, Kind::Vibration | Kind::Cyclic(_))),
+        "{:?}",
+        without_stick_slip.effects
+    );
+    near(1e6 * without_stick_slip.left, 0.5, 0.05, "noise");
 }
 
 #[test]
 fn one_direction_leaves_the_diagonal_ellipse_open() {
-    let machine = Machine { lean: 30e-6, backlash: [4e-6, 0.0], noise: 0.1e-6, ..Machine::default() };
+    let machine = Machine { squareness: 30e-6, backlash: [4e-6, 0.0], noise: 0.1e-6, ..Machine::default() };
     let (turns, _) = turns(&[(false, machine.path(false, 3600, 1))], R).expect("a circle");
     let a = analyse(&turns, R, None).expect("an analysis");
     near(size(&a, Kind::Diagonal), 1.5, 0.05, "diagonal");

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::columns::Made;
 use crate::trace::guess::{Guess, Role};
-use crate::trace::{COUNTS, Motion, Quantity, Signal, Table};
+use crate::trace::{AxisKind, COUNTS, Quantity, Signal, Table};
 
 /// Number with four digits, as a person would write it into the file.
 fn four(value: f64) -> String {
@@ -35,7 +35,7 @@ pub(super) fn write(made: &Made, table: &Table, read: &Read, file: &str) -> Stri
     let folder = Path::new(file).parent().and_then(Path::file_name).map(|s| plain(&s.to_string_lossy()));
     // A log that is called by its date is one of a machine that its folder is called by.
     let name = if stem.chars().any(char::is_alphabetic) { stem } else { folder.unwrap_or(stem) };
-    let linear = made.motion == Motion::Linear;
+    let linear = made.motion == AxisKind::Linear;
     let [inertia, damping, stiffness, torque] =
         if linear { ["kg", "N.s/m", "N/m", "N"] } else { ["kg.m2", "N.m.s/rad", "N.m/rad", "N.m"] };
     // A current without its torque constant, or a number of the drive, has units of its own.

@@ -5,12 +5,12 @@ use anyhow::Context;
 use super::args::Args;
 use super::asker::Asker;
 use crate::trace::guess::{Guess, Role, SURE, guess};
-use crate::trace::{Motion, Quantity, Signal, Table, Unit, nearest};
+use crate::trace::{AxisKind, Quantity, Signal, Table, Unit, nearest};
 
 /// What was made of a log.
 pub(super) struct Made {
     pub guesses: Vec<Guess>,
-    pub motion: Motion,
+    pub motion: AxisKind,
     pub dt: Option<f64>,
     /// From the drive's unit to the torque.
     pub torque_scale: f64,
@@ -84,9 +84,9 @@ pub(super) fn make(table: &Table, args: &Args, asker: &mut Asker) -> anyhow::Res
     let length = quantity(Signal::Theta1) == Some(Quantity::Length)
         || (!has(Signal::Theta1) && quantity(Signal::Theta2) == Some(Quantity::Length))
         || quantity(Signal::T) == Some(Quantity::Force);
-    let motion = if length { Motion::Linear } else { Motion::Rotary };
+    let motion = if length { AxisKind::Linear } else { AxisKind::Rotary };
     // The position of a table in metres, where the motor's is in radians, is x2.
-    if motion == Motion::Rotary {
+    if motion == AxisKind::Rotary {
         for g in &mut guesses {
             if g.role == Role::Signal(Signal::Theta2) && g.unit.is_some_and(|u| u.quantity == Quantity::Length) {
                 g.role = Role::Signal(Signal::X2);

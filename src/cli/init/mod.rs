@@ -77,10 +77,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let mut blocks = vec![Block::Table(chosen(&made, &table)), Block::Summary(verdict(&examination))];
     if let (Some(dt), None) = (made.dt, args.dt) {
-        let word = format!(
+        let warning = format!(
             "No column is a time: {dt} s from row to row is assumed. All that is read from the log depends on it; give it with --dt."
         );
-        blocks.push(Block::Warning(word));
+        blocks.push(Block::Warning(warning));
     }
     blocks.extend(loaded.warnings.iter().cloned().map(Block::Warning));
     blocks.extend(findings(&examination).into_iter().filter(|b| !matches!(b, Block::Table(_))));

@@ -7,7 +7,7 @@ use super::sentences;
 use crate::diagnose::{Diagnosis, LoopErrors, Verdict};
 use crate::report::chart::{Axis, Chart, Colour, Dash, Series};
 use crate::report::{Block, Cell, Figure, Table};
-use crate::trace::{Motion, Signal};
+use crate::trace::{AxisKind, Signal};
 
 /// Hypotheses in the table.
 const MOST: usize = 6;
@@ -36,7 +36,7 @@ pub(super) fn short(d: &Diagnosis) -> Vec<Block> {
 }
 
 /// The same with the commands over time, and every hypothesis.
-pub(super) fn blocks(d: &Diagnosis, motion: Motion) -> Vec<Block> {
+pub(super) fn blocks(d: &Diagnosis, motion: AxisKind) -> Vec<Block> {
     let mut blocks = short(d);
     let Some(l) = &d.closed_loop else { return blocks };
     let unit = Signal::Command.unit(motion);

@@ -16,7 +16,7 @@ use super::format::{self, Medium};
 use super::{Block, Figure, Report, Section, chain};
 use crate::diagnose::{Diagnosis, Overlay, Site, Verdict};
 use crate::effects::Place;
-use crate::trace::Motion;
+use crate::trace::AxisKind;
 pub use controlled::errors as errors_in_the_loop;
 use naming::improved;
 pub use sentences::warnings;
@@ -32,7 +32,7 @@ pub struct Findings<'a> {
     /// What was diagnosed: file, samples, rate.
     pub trace: &'a str,
     /// Rotary or linear.
-    pub motion: Motion,
+    pub motion: AxisKind,
     /// What is to be known of the record: from its reading, its examination and its noise.
     pub warnings: &'a [String],
 }

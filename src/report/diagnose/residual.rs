@@ -9,13 +9,13 @@ use crate::diagnose::{ClosureOf, Location, Overlay, Site, TORQUE, Where};
 use crate::effects::Place;
 use crate::report::chart::{Axis, Chart, Colour, Dash, Mark, Range, Series, When};
 use crate::report::{Block, Cell, Figure, Table};
-use crate::trace::{Motion, Signal};
+use crate::trace::{AxisKind, Signal};
 
 /// Most plots of a residual against a state.
 const CURVES: usize = 4;
 
 /// A held-out signal, the models' runs over it, and what they leave.
-pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: Motion) -> Vec<Block> {
+pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: AxisKind) -> Vec<Block> {
     let unit = Signal::from_name(o.channel).map_or("", |s| s.unit(motion));
     let time: Arc<[f64]> = o.time.as_slice().into();
     let chart =
@@ -74,7 +74,7 @@ pub(super) fn overlay(o: &Overlay, of: ClosureOf, after_name: &str, motion: Moti
 }
 
 /// Pictures of where the gap shows.
-pub(super) fn blocks(w: &Where, motion: Motion) -> Vec<Block> {
+pub(super) fn blocks(w: &Where, motion: AxisKind) -> Vec<Block> {
     let located = &w.shown;
     let has = |side: Side| located.by_frequency.iter().any(|p| p.residual == side);
     let name = if w.site == Some(Site::At(Place::Table)) && has(Side::Table) { Side::Table } else { Side::Motor };
@@ -130,7 +130,7 @@ fn over_frequency(parts: &[FrequencyPart], name: Side, unit: &str) -> Option<Fig
     Some(Figure::new(chart, ""))
 }
 
-fn against_state(c: &StateCurve, unit: &str, motion: Motion) -> Figure {
+fn against_state(c: &StateCurve, unit: &str, motion: AxisKind) -> Figure {
     let (against, rotary) = naming::variable(c.against);
     let against_unit = motion.unit(rotary);
     let bins = if matches!(c.against, StateVariable::Turn1 | StateVariable::Turn2) {

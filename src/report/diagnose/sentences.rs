@@ -10,7 +10,7 @@ use crate::diagnose::{
 use crate::effects::{Contrast, Effect};
 use crate::examine::NOMINAL_OFF;
 use crate::report::format::{self, Medium};
-use crate::trace::Motion;
+use crate::trace::AxisKind;
 
 /// The verdict in a sentence.
 pub fn sentence(d: &Diagnosis) -> String {
@@ -158,7 +158,7 @@ pub fn alike(c: &Confusable) -> String {
 }
 
 /// What the user should know of the data, of a motion that is known.
-pub fn warnings(d: &Diagnosis, motion: Option<Motion>) -> Vec<String> {
+pub fn warnings(d: &Diagnosis, motion: Option<AxisKind>) -> Vec<String> {
     let unit = motion.map_or_else(String::new, |m| format!(" {}", m.unit("rad")));
     let rounding = d.rounding.iter().map(|r| {
         let channels = r.channels.join(" and ");
@@ -188,7 +188,7 @@ fn run_off(d: &Diagnosis) -> Option<String> {
 }
 
 /// Where the gap shows, of a motion that is known.
-pub fn gap_shows(l: &Location, motion: Option<Motion>) -> String {
+pub fn gap_shows(l: &Location, motion: Option<AxisKind>) -> String {
     let unit = motion.map_or_else(String::new, |m| format!(" {}", m.unit("N.m")));
     format!(
         "With its parameters fitted alone, the model lacks {}{unit} rms in torque, {}.",
@@ -240,7 +240,7 @@ fn significant(v: f64) -> String {
 pub const REMAINS: f64 = 1.5;
 
 /// What no cause explains, in a sentence; none where it is little.
-pub fn remainder(d: &Diagnosis, motion: Motion) -> Option<String> {
+pub fn remainder(d: &Diagnosis, motion: AxisKind) -> Option<String> {
     let r = Some(&d.remainder).filter(|r| r.noise_multiple > REMAINS)?;
     let opening = if d.causes.is_empty() { "No cause explains" } else { "Beside that no cause explains" };
     Some(format!(

@@ -1,6 +1,6 @@
 //! The colour of an encoder's noise: white, or growing as one over the frequency below a corner (flicker noise).
 //!
-//! Told where the motion is not: from Nyquist's frequency down as far as the spectrum is that of such a noise, `1 + corner/f`. A motion
+//! Estimated outside the band of the motion: from Nyquist's frequency down as far as the spectrum is that of such a noise, `1 + corner/f`. A motion
 //! rises far more steeply from where it begins. What holds there is taken to hold in the motion's own band.
 
 use rustfft::{FftPlanner, num_complex::Complex};
@@ -12,10 +12,10 @@ const SEGMENTS: usize = 8;
 const HIGHEST: f64 = 0.48;
 /// Fewest lines of a half octave.
 const LINES: usize = 3;
-/// Half octaves over which a spectrum must be a noise's for its colour to be told.
+/// Least number of half octaves with the spectrum of a noise for its colour to be estimated.
 const LEAST: usize = 6;
-/// Half octaves next to the motion that may have some of it: without them the noise must be of that colour, too.
-const BESIDE: usize = 2;
+/// Half octaves next to the motion's band, into which it may extend: the noise must be coloured without them, too.
+const NEXT_TO_MOTION: usize = 2;
 /// Squared error a half octave up to which a spectrum is a noise's.
 const AGREES: f64 = 2.5;
 /// Gain in half the squared error from which a colour is one: in a band far below it is several times the noise. At 3 a white noise had a
@@ -26,7 +26,7 @@ const ERROR: f64 = 0.02;
 /// Standard deviation of the logarithm of a median of periodograms, times the root of their number: Laplace's, of an exponential.
 const OF_MEDIAN: f64 = 1.44;
 
-/// A level of the spectrum over a half octave: frequency in cycles a sample, the logarithm of its power and that's standard error.
+/// A level of the spectrum over a half octave: frequency in cycles a sample, the logarithm of the power, and its standard error.
 #[derive(Debug, Clone, Copy)]
 struct Level {
     frequency: f64,
@@ -42,7 +42,7 @@ pub fn corner(position: &[f64]) -> Option<f64> {
     if noise < LEAST || !agrees(noise) {
         return None;
     }
-    let [all, clear] = [noise, noise - BESIDE].map(|n| fitted(&levels[..n]));
+    let [all, clear] = [noise, noise - NEXT_TO_MOTION].map(|n| fitted(&levels[..n]));
     let (all, clear) = (all?, clear?);
     let corner = all.corner.min(clear.corner);
     (corner > 0.0 && clear.white - clear.squares > 2.0 * GAINED).then_some(corner)
@@ -56,7 +56,7 @@ fn levels(position: &[f64]) -> Vec<Level> {
     if n < segment + 2 {
         return Vec::new();
     }
-    // Of second differences: a motion is larger by so much that no window would hold it where it is.
+    // Of second differences: else the motion, which is far larger, would leak through any window.
     let series: Vec<f64> = position.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect();
     let window: Vec<f64> = (0..segment)
         .map(|k| {
@@ -77,7 +77,7 @@ fn levels(position: &[f64]) -> Vec<Level> {
             z[..=segment / 2].iter().map(Complex::norm_sqr).collect()
         })
         .collect();
-    // A median: a blow or a spike spoils its segment alone.
+    // A median: an impact or a spike affects its own segment alone.
     let power = |m: usize| -> f64 {
         let mut of_line: Vec<f64> = periodograms.iter().map(|p| p[m]).collect();
         let middle = of_line.len() / 2;
@@ -158,8 +158,8 @@ mod tests {
     #[test]
     fn the_corner_of_a_flicker_noise_under_a_motion_is_told_to_a_factor() {
         for (corner_of, seed) in [(0.1, 1), (0.3, 2), (1.0, 3)] {
-            let told = corner(&with_motion(coloured(8192, corner_of, seed))).expect("it is coloured");
-            assert!((told / corner_of).ln().abs() < 0.7, "{corner_of} {told}");
+            let estimate = corner(&with_motion(coloured(8192, corner_of, seed))).expect("it is coloured");
+            assert!((estimate / corner_of).ln().abs() < 0.7, "{corner_of} {estimate}");
         }
     }
 
@@ -169,11 +169,11 @@ mod tests {
             assert!(corner(&with_motion(noise(8192, seed))).is_none_or(|c| c < 0.02), "{seed}");
         }
         // A random walk of the acceleration: steep up to Nyquist's frequency.
-        let mut walk = noise(8192, 9);
+        let mut random_walk = noise(8192, 9);
         (0..3).for_each(|_| {
-            (1..8192).for_each(|k| walk[k] += walk[k - 1]);
+            (1..8192).for_each(|k| random_walk[k] += random_walk[k - 1]);
         });
-        assert_eq!(corner(&walk), None);
+        assert_eq!(corner(&random_walk), None);
         assert_eq!(corner(&noise(100, 1)), None);
         assert_eq!(corner(&vec![0.0; 4096]), None);
     }

@@ -1,21 +1,21 @@
-//! Noise that grows with the speed: samples taken early or late by a time that no stamp tells.
+//! Noise that grows with the speed: samples taken early or late by a time that no stamp shows.
 //!
 //! A position read `e` too late is off by `e*omega`, so the variance of a channel's noise is `s0^2 + st^2*omega^2`: where the axis stands
-//! it is the encoder's alone. Both are told by how the differences that are free of the motion vary with the speed from stretch to
-//! stretch, each stretch by the logarithm of its power, so that a blow or a jump of friction spoils its own alone.
+//! it is the encoder's alone. Both are estimated from how the differences that are free of the motion vary with the speed from stretch to
+//! stretch, each stretch by the logarithm of its power, so that an impact or a jump of friction affects its own stretch alone.
 
 /// Samples in a stretch: short beside a move, with some ten degrees of freedom in its differences.
 const STRETCH: usize = 32;
-/// Variances of the growth over that at rest that are looked at: powers of this, a step about as large as what a record of some
-/// stretches tells.
+/// The growths that are tried, as variances over that at rest, are powers of this: a step of about the accuracy that a record of some
+/// stretches gives.
 const STEP: f64 = 1.4;
 const POWERS: std::ops::RangeInclusive<i32> = -20..=30;
-/// Logarithm of a stretch's power over the law's from which it is a blow, however much more it is.
-const BLOW: f64 = 1.0;
+/// Largest deviation of a stretch that counts, as the logarithm of its power over that of the law: an impact counts as no more.
+const OUTLIER: f64 = 1.0;
 /// Sum of the logarithms by which the stretches must lie nearer to the law than to one level, and the same for each of them. Without
 /// jitter it came to three at most over some hundred records, with jitter that matters to ten and more, a tenth for each.
-const TOLD: f64 = 5.0;
-const OF_EACH: f64 = 0.05;
+const SIGNIFICANT: f64 = 5.0;
+const SIGNIFICANT_EACH: f64 = 0.05;
 
 /// How a channel's noise grows with its speed.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +26,7 @@ pub struct Growth {
     pub mean: f64,
 }
 
-/// The growth of the noise in `differences` of some order of a position `y`, whole stretches of them; `None` where they tell of none.
+/// The growth of the noise in `differences` of some order of a position `y`, whole stretches of them; `None` where there is none.
 pub fn growth(y: &[f64], differences: &[f64]) -> Option<Growth> {
     let order = y.len().checked_sub(differences.len())?;
     let of = |chunk: &[f64]| chunk.iter().map(|v| v * v).sum::<f64>() / STRETCH as f64;
@@ -39,14 +39,14 @@ pub fn growth(y: &[f64], differences: &[f64]) -> Option<Growth> {
     }
     speeds.iter_mut().for_each(|v| *v /= mean);
     // The least sum of absolute deviations of the logarithms, the level at rest at its best: their median.
-    let apart = |by: f64| -> f64 {
+    let deviation = |by: f64| -> f64 {
         let mut over: Vec<f64> = powers.iter().zip(&speeds).map(|(p, v)| p - (1.0 + by * v).ln()).collect();
         let middle = over.len() / 2;
         let median = *over.select_nth_unstable_by(middle, f64::total_cmp).1;
-        over.iter().map(|v| (v - median).abs().min(BLOW)).sum()
+        over.iter().map(|v| (v - median).abs().min(OUTLIER)).sum()
     };
-    let (by, least) = POWERS.map(|i| STEP.powi(i)).map(|by| (by, apart(by))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (apart(0.0) - least >= TOLD.max(OF_EACH * powers.len() as f64)).then(|| Growth {
+    let (by, least) = POWERS.map(|i| STEP.powi(i)).map(|by| (by, deviation(by))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (deviation(0.0) - least >= SIGNIFICANT.max(SIGNIFICANT_EACH * powers.len() as f64)).then(|| Growth {
         factor: speeds.iter().flat_map(|v| std::iter::repeat_n(1.0 + by * v, STRETCH)).collect(),
         mean: 1.0 + by,
     })
@@ -77,12 +77,12 @@ mod tests {
         // The rms speed is 0.01/sqrt(2) a sample, so that a jitter of 0.05 makes 3.5e-4.
         for noise in [1e-5, 1e-4, 3e-4] {
             let (y, d) = position(noise, 0.05);
-            let told = growth(&y, &d).expect("a jitter");
+            let estimate = growth(&y, &d).expect("a jitter");
             let by = (0.05 * 0.01 / noise).powi(2) / 2.0;
             assert!(
-                ((told.mean - 1.0) / by).ln().abs() < 1.6 || by > 100.0 && told.mean > 100.0,
+                ((estimate.mean - 1.0) / by).ln().abs() < 1.6 || by > 100.0 && estimate.mean > 100.0,
                 "{noise}: {} {by}",
-                told.mean
+                estimate.mean
             );
         }
     }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn blows_are_no_jitter() {
+    fn impacts_are_no_jitter() {
         let (y, mut d) = position(1e-4, 0.0);
         for k in (100..8000).step_by(400) {
             d[k] += 0.1;

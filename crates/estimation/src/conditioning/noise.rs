@@ -3,8 +3,8 @@
 //! The `n`-th difference of a smooth signal vanishes while that of white noise keeps the variance
 //! `C(2n, n)*sigma^2`; so `sigma` is the level at which the scaled differences of rising order settle (difference
 //! table of Hamming, Numerical Methods for Scientists and Engineers, 1973, ch. 10; More & Wild, Estimating computational
-//! noise, SIAM J. Sci. Comput. 33, 2011). Levels are medians over blocks: a jump of friction or contact spoils its block
-//! alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
+//! noise, SIAM J. Sci. Comput. 33, 2011). Levels are medians over blocks: a jump of friction or contact affects its own
+//! block alone. Where the excitation repeats, the difference of two periods is free of the repeated motion from the
 //! start, and serves as one more candidate. What stays of the signal can only raise a level.
 //!
 //! Assumed: the noise is white at the sampling rate, or grows below a corner ([`super::colour`]). Where the levels never settle, the
@@ -34,12 +34,12 @@ const SEEN: f64 = 2.58;
 pub enum NoiseMethod {
     /// Not measured.
     Absent,
-    /// Differences of the channel settled at this order.
+    /// Differences of the channel converged at this order.
     Differences {
         /// The order.
         order: usize,
     },
-    /// Differences of period less period settled at this order.
+    /// Differences between periods converged at this order.
     Periods {
         /// The order.
         order: usize,
@@ -119,7 +119,7 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
         [Some(a), _, Some(b), _],
         [NoiseMethod::Differences { order: m }, _, NoiseMethod::Differences { order: n }, _],
     ) = (channels, estimate.method)
-        && let Some((common, own)) = together(a, b, m.max(n))
+        && let Some((common, own)) = common_variance(a, b, m.max(n))
     {
         estimate.common = common;
         (estimate.std[0], estimate.std[2]) = ((common + own[0]).sqrt(), (common + own[1]).sqrt());
@@ -129,28 +129,28 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
 
 /// The variance that the noises of two positions have in common, by their differences of an order, and that of each alone: of samples
 /// taken late both show the same, and the twist none of it.
-fn together(a: &[f64], b: &[f64], order: usize) -> Option<(f64, [f64; 2])> {
+fn common_variance(a: &[f64], b: &[f64], order: usize) -> Option<(f64, [f64; 2])> {
     let power = |d: &[f64]| block_median(d, order) / binomial(2 * order);
     let [first, second] = [at_rest(a, a, order)?, at_rest(b, b, order)?];
     let rest = [power(&first.0), power(&second.0)];
     let twist: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-    let apart = power(&differences(&twist, order));
+    let twist_power = power(&differences(&twist, order));
     let all = (rest[0] * first.1 * rest[1] * second.1).sqrt();
-    let common = all - 0.5 * apart;
-    (common > 0.0).then(|| (common, rest.map(|r| apart * r / (rest[0] + rest[1]).max(f64::MIN_POSITIVE))))
+    let common = all - 0.5 * twist_power;
+    (common > 0.0).then(|| (common, rest.map(|r| twist_power * r / (rest[0] + rest[1]).max(f64::MIN_POSITIVE))))
 }
 
 /// The level at which differences settle, of the channel or of its periods, whichever is lower.
 fn level_of(y: &[f64], period: Option<usize>) -> (f64, NoiseMethod) {
-    let plain = settled(y).map(|(level, order)| (with_speed(y, y, order).unwrap_or(level), order));
+    let plain = converged_level(y).map(|(level, order)| (with_speed(y, y, order).unwrap_or(level), order));
     let periodic = period.filter(|p| y.len() >= p + 2 * BLOCK).map(|p| {
         let difference: Vec<f64> = (p..y.len()).map(|k| (y[k] - y[k - p]) / 2.0_f64.sqrt()).collect();
-        settled(&difference)
+        converged_level(&difference)
             .map(|(level, order)| (with_speed(&difference, &y[..y.len() - p], order).unwrap_or(level), order))
     });
     let unsettled = |level: f64| {
-        let told = floor(y).filter(|told| *told < level);
-        told.map_or((level, NoiseMethod::Unsettled), |told| (told, NoiseMethod::Spectrum))
+        let found = floor(y).filter(|found| *found < level);
+        found.map_or((level, NoiseMethod::Unsettled), |found| (found, NoiseMethod::Spectrum))
     };
     match (plain, periodic) {
         (Ok((a, order)), Some(Ok((b, lower)))) if b * AGREE < a || (b < a * AGREE && lower < order) => {
@@ -201,7 +201,7 @@ fn differ(d: &mut Vec<f64>) {
 }
 
 /// The level at which three orders in a row agree, and the lowest of them; else the lowest level.
-fn settled(y: &[f64]) -> Result<(f64, usize), f64> {
+fn converged_level(y: &[f64]) -> Result<(f64, usize), f64> {
     let levels = levels(y);
     for n in LOWEST..levels.len().saturating_sub(1) {
         let (low, high) = levels[n - 1..=n + 1].iter().fold((f64::MAX, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
@@ -423,14 +423,14 @@ mod tests {
         };
         let [a, b] = [read(own[0], 22), read(own[1], 23)];
         let estimate = estimate_noise(&white(8192, 1.0, 24), &[Some(&a), None, Some(&b), None], None);
-        let together = m.windows(2).map(|w| (jitter * (w[1] - w[0])).powi(2)).sum::<f64>() / 8191.0;
+        let common_variance = m.windows(2).map(|w| (jitter * (w[1] - w[0])).powi(2)).sum::<f64>() / 8191.0;
         for (c, own) in [(0, own[0]), (2, own[1])] {
-            let all = (together + own * own).sqrt();
+            let all = (common_variance + own * own).sqrt();
             assert!((estimate.std[c] / all - 1.0).abs() < 0.1, "{estimate:?} {all}");
         }
-        assert!((estimate.common / together - 1.0).abs() < 0.2, "{estimate:?} {together}");
-        let told = estimate.jitter.expect("it rules the noise");
-        assert!((told / jitter - 1.0).abs() < 0.1, "{told}");
+        assert!((estimate.common / common_variance - 1.0).abs() < 0.2, "{estimate:?} {common_variance}");
+        let found = estimate.jitter.expect("it rules the noise");
+        assert!((found / jitter - 1.0).abs() < 0.1, "{found}");
     }
 
     #[test]
@@ -457,16 +457,16 @@ mod tests {
     }
 
     #[test]
-    fn a_lattice_is_found_with_its_step_and_a_finer_one_than_the_noise_is_not_named() {
+    fn a_quantised_channel_is_found_with_its_step_and_a_finer_step_than_the_noise_is_not_named() {
         let step = TAU / 2500.0;
-        let lattice = |std: f64| -> Vec<f64> {
+        let quantised = |std: f64| -> Vec<f64> {
             motion(4096, 4096).iter().zip(white(4096, std, 12)).map(|(m, e)| ((m + e) / step).round() * step).collect()
         };
-        let coarse = estimate_noise(&white(4096, 1.0, 13), &[Some(&lattice(1e-5)), None, None, None], None);
+        let coarse = estimate_noise(&white(4096, 1.0, 13), &[Some(&quantised(1e-5)), None, None, None], None);
         let found = coarse.quantum[0].expect("the lattice is coarse");
         assert!((found / step - 1.0).abs() < 1e-9, "{found} {step}");
         assert!(coarse.std[0] >= 0.999 * step / 12.0_f64.sqrt(), "{coarse:?}");
-        let fine = estimate_noise(&white(4096, 1.0, 13), &[Some(&lattice(10.0 * step)), None, None, None], None);
+        let fine = estimate_noise(&white(4096, 1.0, 13), &[Some(&quantised(10.0 * step)), None, None, None], None);
         assert_eq!(fine.quantum[0], None);
         assert!((fine.std[0] / (10.0 * step) - 1.0).abs() < 0.08, "{fine:?}");
     }

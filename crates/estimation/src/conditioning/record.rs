@@ -23,11 +23,12 @@ pub struct Record {
     pub hold: Hold,
     /// Torque on the motor (or its command), N.m; one value a sample.
     pub torque: Vec<f64>,
-    /// Where it is known more often than the motion: at this many even instants a sample, the first of them the sample's own.
+    /// The torque where it is known more often than the motion: how many times a sample, at even steps from the sample's own time on, and
+    /// its values at those times, N.m.
     pub between: Option<(usize, Vec<f64>)>,
     /// `[theta1, omega1, theta2, omega2]`, rad and rad/s, as long as the torque; what was not measured is `None`.
     pub channels: [Option<Vec<f64>>; 4],
-    /// Standard deviation of the noise of each channel, in its unit; means nothing where the channel is `None`.
+    /// Standard deviation of the noise of each channel, in its unit; without meaning where the channel is `None`.
     pub noise: [f64; 4],
     /// Frequency below which the noise of theta1 and of theta2 grows as 1/f, Hz; zero where it is white.
     pub corner: [f64; 2],
@@ -35,7 +36,7 @@ pub struct Record {
     pub common_noise: f64,
     /// Time at either end within which a filter began, s.
     pub settling: f64,
-    /// Stretches that tell nothing (the drive is off, the axis stands): they are followed, and not weighed.
+    /// Samples without information (the drive is off, the axis stands): they are simulated, with zero weight.
     pub idle: Vec<std::ops::Range<usize>>,
 }
 

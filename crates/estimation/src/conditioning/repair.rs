@@ -70,9 +70,9 @@ mod tests {
         (y[3101], y[3103]) = (y[3100], y[3102]);
         y[3304] = y[3303];
         y[3307] = y[3306];
-        let (mended, count) = bridged(&spoilt);
+        let (repaired, count) = bridged(&spoilt);
         assert_eq!(count, 12);
-        let (a, b) = (mended.channels[0].as_ref().expect("there"), sound.channels[0].as_ref().expect("there"));
+        let (a, b) = (repaired.channels[0].as_ref().expect("there"), sound.channels[0].as_ref().expect("there"));
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 5.0 * NOISE));
     }
 
@@ -84,18 +84,18 @@ mod tests {
         let mut spoilt = sound.clone();
         let y = spoilt.channels[0].as_mut().expect("a position");
         y[2001] = y[2000];
-        let (mended, count) = bridged(&spoilt);
+        let (repaired, count) = bridged(&spoilt);
         assert_eq!(count, 1);
         let at = |r: &Record| r.channels[0].as_ref().expect("there")[2001];
-        assert!((at(&mended) - at(&sound)).abs() < 0.02 * (at(&spoilt) - at(&sound)).abs());
+        assert!((at(&repaired) - at(&sound)).abs() < 0.02 * (at(&spoilt) - at(&sound)).abs());
     }
 
     #[test]
     fn a_blow_is_no_spike() {
         // A speed that turns round within a sample, as at an end stop.
         for kink in [2e-4, 2e-3, 2e-2] {
-            let blow = record(&|k| kink * (k as f64 - 1777.3).abs());
-            assert_eq!(bridged(&blow).1, 0, "{kink}");
+            let impact = record(&|k| kink * (k as f64 - 1777.3).abs());
+            assert_eq!(bridged(&impact).1, 0, "{kink}");
         }
     }
 

@@ -3,7 +3,7 @@
 use super::conclusion::Decision;
 use super::diagnosis::Diagnosis;
 use super::overlay::Overlay;
-use crate::axis::Motion;
+use crate::axis::AxisKind;
 use crate::conditioning::{NoiseEstimate, Record};
 use crate::effects::Effect;
 use crate::hypothesis::model::Model;
@@ -18,7 +18,7 @@ pub struct Case<'a> {
     /// The nominal model.
     pub nominal: Model,
     /// What its numbers are units of.
-    pub motion: Motion,
+    pub motion: AxisKind,
     /// Record that the fits see.
     pub train: &'a Record,
     /// What is known of its noise.

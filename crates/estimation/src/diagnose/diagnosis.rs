@@ -4,7 +4,7 @@ use super::closed_loop::ClosedLoop;
 use super::conclusion::Confusable;
 use super::location::{Appearance, Location};
 use super::verdict::Verdict;
-use crate::axis::{Motion, Structure};
+use crate::axis::{AxisKind, Structure};
 use crate::effects::{Effect, Place};
 use crate::hypothesis::{BaseParameter, Hypothesis};
 
@@ -126,7 +126,7 @@ pub struct Cause {
 impl Cause {
     /// The one cause of a gap, told by one parameter with its standard error.
     #[must_use]
-    pub fn alone(effect: Effect, parameter: usize, value: f64, std: f64, motion: Motion) -> Self {
+    pub fn alone(effect: Effect, parameter: usize, value: f64, std: f64, motion: AxisKind) -> Self {
         let info = effect.info();
         let unit = info.parameters[parameter].unit_on(motion);
         let estimate = Estimate { value, std: Some(std).filter(|s| s.is_finite()), unit };

@@ -12,7 +12,7 @@ use super::prepared::Prepared;
 use super::procedure::TOLD;
 use super::residual::remains;
 use super::verdict::Verdict;
-use crate::axis::{Motion, Structure};
+use crate::axis::{AxisKind, Structure};
 use crate::conditioning::{CHANNELS, Record};
 use crate::effects::Effect;
 use crate::hypothesis::fit::Fit;
@@ -78,7 +78,7 @@ pub fn build(
     }
 }
 
-fn causes(decision: &Decision, motion: Motion) -> Vec<Cause> {
+fn causes(decision: &Decision, motion: AxisKind) -> Vec<Cause> {
     let fit = &decision.chosen;
     let mut causes: Vec<Cause> = fit
         .terms

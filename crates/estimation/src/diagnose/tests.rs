@@ -5,7 +5,7 @@ use super::diagnose;
 use super::diagnosis::{ClosureOf, Site};
 use super::prepared::prepared;
 use super::verdict::Verdict;
-use crate::axis::{Axis, Hold, Motion, Parameters, Scheme, Structure};
+use crate::axis::{Axis, AxisKind, Hold, Parameters, Scheme, Structure};
 use crate::conditioning::{Record, estimate_noise};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use crate::hypothesis::band::Reach;
@@ -81,7 +81,7 @@ fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> O
     let case = Case {
         machine: "axis".to_owned(),
         nominal: Model::new(nominal, structure, Settings::default()),
-        motion: Motion::Rotary,
+        motion: AxisKind::Rotary,
         train: record,
         noise: &noise,
         holdout: None,
@@ -353,14 +353,15 @@ fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free
     let case = Case {
         machine: "axis".to_owned(),
         nominal,
-        motion: Motion::Rotary,
+        motion: AxisKind::Rotary,
         train: &record,
         noise: &estimate_noise(&record.torque, &[0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref()), None),
         holdout: None,
         suspects: EFFECTS.to_vec(),
     };
     let (searched, _) = prepared(&record, &nominal, Reach::Shown);
-    let suspects = EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, Motion::Rotary)).collect();
+    let suspects =
+        EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
     let mut search = searched.search(&case, suspects, &|_| ());
     let fit = search.alone_beside_the_data_sheet().expect("causes");
     assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);

@@ -230,7 +230,7 @@ fn jumps(input: &Input<'_>, channel: Channel<'_>, findings: &mut Vec<Finding>) -
             spikes.push(k + 1..k + 2);
         }
     }
-    let unit = super::Motion::unit(input.motion, "rad");
+    let unit = super::AxisKind::unit(input.motion, "rad");
     if !spikes.is_empty() {
         findings.push(
             Finding::new(

@@ -41,7 +41,7 @@ use rayon::prelude::*;
 
 pub use finding::{Finding, Severity};
 
-use crate::axis::{Motion, Parameters, Structure};
+use crate::axis::{AxisKind, Parameters, Structure};
 use crate::trace::{Machine, Signal, Trace, bridge};
 
 /// Times that the inertia that moves may be off its nominal value, either way: beyond it the record is of another axis, unit or sign.
@@ -78,7 +78,7 @@ pub struct Input<'a> {
     /// The nominal model, where one is known: units are checked against it.
     pub nominal: Option<Nominal>,
     /// Rotary or linear, for the units in the sentences.
-    pub motion: Motion,
+    pub motion: AxisKind,
 }
 
 /// A channel of the record.
@@ -197,8 +197,8 @@ const MAX_FORCE: f64 = 1e10;
 
 /// Torques and speeds that no machine has: the column is in another unit, or counts.
 fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
-    let linear = input.motion == Motion::Linear;
-    let unit = |rotary| Motion::unit(input.motion, rotary);
+    let linear = input.motion == AxisKind::Linear;
+    let unit = |rotary| AxisKind::unit(input.motion, rotary);
     let say = |signal: &'static str, seen: String, remedy: &str| {
         Finding::new(
             "magnitude",

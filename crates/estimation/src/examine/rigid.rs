@@ -22,7 +22,7 @@ use super::pairs::factor;
 use super::robust::quantile;
 use super::smoothing::{SHORTEST, smoothed, widths};
 use super::spectra::Spectra;
-use super::{Input, Motion, NOMINAL_OFF, Nominal, Structure};
+use super::{AxisKind, Input, NOMINAL_OFF, Nominal, Structure};
 use crate::identify::lsq::triangularise;
 
 /// Share of the antiresonance (table against a locked motor) up to which the axis moves as one body: the table moves there 4/3 times as far
@@ -163,7 +163,7 @@ fn time_domain_fit(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -
     let quiet = 0.02 * fast;
     let middle = x[x.len() / 2];
     let size = x.iter().fold(0.0_f64, |m, v| m.max((v - middle).abs()));
-    let hinge = input.motion == Motion::Rotary && size > HINGE && size < TURNS;
+    let hinge = input.motion == AxisKind::Rotary && size > HINGE && size < TURNS;
     let columns = if hinge { 7 } else { 5 };
     let stride = (q.len() / SAMPLES).max(1);
     let rows: Vec<usize> = (1..q.len() - 1).step_by(stride).collect();
@@ -211,7 +211,7 @@ fn sign_finding(turned: f64, own: f64) -> Finding {
 /// The finding on an inertia `mass`, kg.m2 (kg), that is `ratio` times the nominal one: a wrong unit if the ratio is near a unit's factor or,
 /// where `sure`, beyond the error of any nominal value; else a warning.
 pub(super) fn inertia_finding(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -> Finding {
-    let unit = Motion::unit(input.motion, "kg.m2");
+    let unit = AxisKind::unit(input.motion, "kg.m2");
     let seen = format!("The inertia that moves is {mass:.4e} {unit}, {} times the nominal one", told(ratio));
     let words = factor(ratio);
     let of_a_nominal = !sure || (1.0 / MAX_NOMINAL_ERROR..MAX_NOMINAL_ERROR).contains(&ratio);

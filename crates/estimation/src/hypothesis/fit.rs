@@ -9,7 +9,7 @@ use rustfft::FftPlanner;
 use super::Hypothesis;
 use super::descent::{Along, Descent, differ};
 use super::discrepancy::Discrepancy;
-use super::likelihood::{Band, C, Motion, TorqueResidual};
+use super::likelihood::{Band, C, MotionSpectra, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scales::Scales;
 use super::tracking::{Bandwidth, Resolution, Torques, Tracked, parts, track, track_with_perturbations};
@@ -104,7 +104,7 @@ pub struct Problem<'a> {
     pub peak: f64,
     pub scales: Option<Scales>,
     /// Spectra of the measured motion; `None` where it is not measured whole.
-    motion: Option<Arc<Motion>>,
+    motion: Option<Arc<MotionSpectra>>,
     resolution: Resolution,
     /// Whether the axis' own parameters stay at what a model begins with.
     holds_parameters: bool,

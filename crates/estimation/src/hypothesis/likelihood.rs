@@ -105,7 +105,7 @@ pub struct TorqueResidual {
 }
 
 /// Spectra of the motion as measured: accelerations, twist and its rate.
-pub struct Motion {
+pub struct MotionSpectra {
     acceleration: [Vec<C>; 2],
     twist: Vec<C>,
     rate: Vec<C>,
@@ -341,7 +341,7 @@ impl Band {
     }
 
     /// Spectra of the measured motion, which the torque of a base parameter follows; `None` where a position is missing.
-    pub fn motion(&self, record: &Record) -> Option<Motion> {
+    pub fn motion(&self, record: &Record) -> Option<MotionSpectra> {
         let side = |i: usize| record.channels[2 * i].as_deref();
         let sides = match self.sight {
             Sight::Both => [side(0)?, side(1)?],
@@ -355,7 +355,7 @@ impl Band {
             Sight::Motor | Sight::Table => return None,
         };
         let twist: Vec<f64> = sides[0].iter().zip(sides[1]).map(|(a, b)| a - b).collect();
-        Some(Motion {
+        Some(MotionSpectra {
             acceleration: sides.map(|y| self.acceleration(y)),
             rate: self.spectrum(|k| (twist[k + 1] - twist[k - 1]) / (2.0 * self.dt)),
             twist: self.spectrum(|k| twist[k]),
@@ -363,7 +363,7 @@ impl Band {
     }
 
     /// What a step of a base parameter adds to the rows, along the motion as measured: the linear axis' own torque.
-    pub fn base_column(&self, p: BaseParameter, motion: &Motion, slope: f64) -> [Vec<C>; 2] {
+    pub fn base_column(&self, p: BaseParameter, motion: &MotionSpectra, slope: f64) -> [Vec<C>; 2] {
         let by = slope / (self.n as f64).sqrt();
         let of = |series: &[C], by: f64| -> Vec<C> { series.iter().map(|s| *s * by).collect() };
         let none = || vec![C::default(); self.omega.len()];

@@ -1,4 +1,4 @@
-//! What a method's estimates are worth: a simulation against the record, and the torque that they make of the motion.
+//! Assesses a method's estimates: a simulation compared with the record, and the torque computed from the measured motion.
 
 use super::methods::Run;
 use super::output_error::{Free, OutputError};
@@ -8,7 +8,7 @@ use super::run::{Method, NOISE_FREE, torque_unit};
 use super::statistics::{spectrum, whiteness};
 use crate::axis::{Parameters, Scheme, Structure};
 use crate::numerics::level::{deviation, rms};
-use crate::trace::{Motion, Signal};
+use crate::trace::{AxisKind, Signal};
 
 /// Least samples of a record of which a part is held out.
 const LEAST_PARTED: usize = 192;
@@ -29,7 +29,7 @@ impl Run<'_> {
         }
     }
 
-    /// Fit, whiteness and excitation estimate of a method's parameters, but for refused ones.
+    /// Adds fit, whiteness and excitation estimate to a result, unless its estimates were refused.
     pub fn assess(&self, result: &mut MethodResult, scheme: Scheme) {
         let found = self.estimates.iter().find(|(name, _)| *name == result.method && result.failure.is_none());
         let Some((_, estimated)) = found else { return };
@@ -71,7 +71,7 @@ impl Run<'_> {
         }
         let model = OutputError::of(&rest, rho, structure, effects).ok()?;
         let residuals = model.residuals(&model.fit(&p, scheme, Free { parameters: false, ..free }));
-        // Against the whole record's size: a part in which one output hardly moves says nothing of the fit.
+        // Relative to the output over the whole record: in a part where it hardly moves, its own size means nothing.
         let fits = self.outputs.outputs().zip(residuals).map(|((_, measured), (_, r))| {
             let size = deviation(measured);
             if rms(&r) <= NOISE_FREE * size { 100.0 } else { 100.0 * (1.0 - rms(&r) / size) }
@@ -121,7 +121,7 @@ impl Run<'_> {
         let time = |k: usize| if of_samples { self.joined.time(k) } else { self.record.time(k) };
         let error: Vec<f64> = estimate.iter().zip(&truth).map(|(a, b)| a - b).collect();
         let unit = torque_unit(self.machine.signals.motion);
-        // A spectrum across a gap would be one of the gap.
+        // A spectrum over a gap would show the gap.
         let longest = if of_samples { self.joined.longest() } else { self.record.longest_rows() };
         ExcitationEstimate {
             formulation,
@@ -139,7 +139,7 @@ pub(super) fn output_fit(
     measured: &[f64],
     residual: &[f64],
     time: impl Fn(usize) -> f64,
-    motion: Motion,
+    motion: AxisKind,
 ) -> OutputFit {
     let size = deviation(measured);
     let error = rms(residual);

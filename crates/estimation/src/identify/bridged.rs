@@ -13,7 +13,7 @@ const BLOCK: usize = 16;
 /// Interpolates the lost samples of every position of a record, each piece by itself. Gives a warning for each position that has any.
 pub(super) fn lost(joined: &mut Joined) -> Vec<String> {
     let positions = [Signal::Theta1, Signal::Theta2, Signal::X2];
-    let told = positions.into_iter().filter_map(|signal| {
+    let warnings = positions.into_iter().filter_map(|signal| {
         let count = joined.repair(signal, |y| bridge(y, noise(y)));
         let samples = if count == 1 { "sample" } else { "samples" };
         (count > 0).then(|| {
@@ -24,7 +24,7 @@ pub(super) fn lost(joined: &mut Joined) -> Vec<String> {
             )
         })
     });
-    told.collect()
+    warnings.collect()
 }
 
 /// Standard deviation of a position's noise, or of its resolution where that is coarser.
@@ -79,11 +79,11 @@ mod tests {
         spoilt.set(Signal::Theta1, y).unwrap();
         let pieces = [spoilt.slice(0..1500), spoilt.slice(1500..4096)];
         let mut joined = Joined::of(&pieces).unwrap();
-        let words = lost(&mut joined);
-        assert!(words.len() == 1 && words[0].starts_with("4 samples of theta1"), "{words:?}");
-        let (mended, truth) = (joined.samples().get(Signal::Theta1).unwrap(), sound.get(Signal::Theta1).unwrap());
+        let warnings = lost(&mut joined);
+        assert!(warnings.len() == 1 && warnings[0].starts_with("4 samples of theta1"), "{warnings:?}");
+        let (repaired, truth) = (joined.samples().get(Signal::Theta1).unwrap(), sound.get(Signal::Theta1).unwrap());
         for k in 0..4096 {
-            let off = (mended[k] - truth[k]).abs();
+            let off = (repaired[k] - truth[k]).abs();
             assert!(if held.contains(&k) { off < 6.0 * NOISE } else { off == 0.0 }, "{k}: {off:e}");
         }
     }

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 use super::long_run::Scores;
 use super::lsq::triangularise;
 use super::parameters::{Estimated, Rows};
-use super::record::Record;
+use super::record::RegressionRecord;
 use super::recursive::Els;
 use super::regression::{
     Recorder, RegressionError, Scales, Variance, long_enough, motor_row, rows, table_row, variance,
@@ -30,7 +30,11 @@ const ROUNDS: usize = 50;
 ///
 /// # Errors
 /// As [`super::regression::recursive`].
-pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
+pub fn extended_recursive(
+    record: &RegressionRecord,
+    lambda: f64,
+    p0: f64,
+) -> Result<(Estimated, History), RegressionError> {
     let scales = Scales::new(record)?;
     let n = record.rows();
     // The past residuals are brought to the size of the other regressors by the level of the plain residuals.
@@ -89,7 +93,7 @@ pub fn extended_recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Esti
 /// since the past residuals move with the estimates (L. Ljung, System Identification, 2nd ed., 10.3 and 9.4; pseudolinear
 /// regression as an instrumental variable of its own gradient). None where the noise model is at the edge of stability.
 fn pseudolinear(
-    record: &Record,
+    record: &RegressionRecord,
     (motor, cm): (&SVector<f64, 3>, &[f64]),
     (table, ct): (&SVector<f64, 2>, &[f64]),
     lambda: f64,
@@ -133,8 +137,8 @@ fn pseudolinear(
     if lambda >= 1.0 {
         // A recursion whose first steps still have weight need not end where the sum of its scores is zero: the remaining distance is an
         // error, too.
-        let way = inverse * SVector::<f64, ALL>::from(scores.total::<ALL>());
-        covariance += way * way.transpose();
+        let remaining = inverse * SVector::<f64, ALL>::from(scores.total::<ALL>());
+        covariance += remaining * remaining.transpose();
     }
     let kept = [0, 1, 2, MOTOR_ELS, MOTOR_ELS + 1];
     let five = SMatrix::<f64, 5, 5>::from_fn(|i, j| covariance[(kept[i], kept[j])]);
@@ -171,11 +175,11 @@ impl<const P: usize> Filter<P> {
 }
 
 /// Extended least squares in batches: LS, its residuals, LS with the past residuals as regressors, repeated until the
-/// estimates rest.
+/// estimates converge.
 ///
 /// # Errors
 /// When the record is too short, does not excite a direction, or the rounds do not converge.
-pub fn extended_batch(record: &Record) -> Result<Estimated, RegressionError> {
+pub fn extended_batch(record: &RegressionRecord) -> Result<Estimated, RegressionError> {
     let n = long_enough(record.rows(), MOTOR_ELS)?;
     let plain = rows(record)?;
     let motor_of = |k: usize| {

@@ -66,7 +66,7 @@ pub struct Fit {
     pub iterations: usize,
 }
 
-/// Column of a reading and whether the output drifts freely.
+/// The column of a reading that a signal is measured by.
 const fn column(signal: Signal) -> Option<usize> {
     match signal {
         Signal::Theta1 => Some(0),
@@ -152,7 +152,7 @@ pub fn measure(trace: &Trace, period: usize) -> Option<Measured> {
 /// not linear and most of the noise is gone from it.
 ///
 /// # Errors
-/// None in fact: the signals have one length.
+/// Never, as all signals have one length.
 pub fn average(trace: &Trace, measured: &Measured) -> Result<Trace, TraceError> {
     let n = measured.period;
     let mut out = Trace::new(trace.start, trace.dt, trace.hold);
@@ -319,8 +319,8 @@ impl Measured {
         let (_, g, _) = self.outputs.iter().find(|(s, _, _)| *s == Signal::Theta1)?;
         let flat: Vec<f64> = g.iter().zip(&frequency).map(|(g, f)| g.norm() * (TAU * f).powi(2)).collect();
         let peak = interior(&flat, |a, b| a > b)?;
-        let dip = interior(&flat[..peak], |a, b| a < b)?;
-        let (anti, resonance) = (TAU * frequency[dip], TAU * frequency[peak]);
+        let antiresonance = interior(&flat[..peak], |a, b| a < b)?;
+        let (anti, resonance) = (TAU * frequency[antiresonance], TAU * frequency[peak]);
         // Far above the resonance the motor moves alone: |theta1|*w^2 = 1/I1. The total inertia follows from the ratio
         // (resonance/antiresonance)^2 = 1 + I2/I1.
         let high = flat.iter().skip(peak + (flat.len() - peak) / 2).copied().collect::<Vec<_>>();

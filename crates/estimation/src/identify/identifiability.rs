@@ -1,4 +1,4 @@
-//! Whether a record identifies the axis: what must hold before it is said.
+//! Whether a record identifies the axis, by these conditions.
 //!
 //! The parameters are those of an axis that can exist; each is known within 30 % at two standard errors, or what it stands
 //! for is known to be of no account; a simulation with them follows the record; and one that never saw the last third of
@@ -19,7 +19,7 @@ pub(super) const SMALL_TORQUE: f64 = 0.05;
 /// A simulation that follows an output worse than this, per cent, does not follow it.
 pub const LEAST_FIT: f64 = 50.0;
 
-/// What the record earned.
+/// Whether a record identifies the axis, and why not.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Identifiability {
     /// Whether the record identifies the axis.
@@ -34,7 +34,7 @@ pub struct Identifiability {
     pub held_out_percent: Option<f64>,
 }
 
-/// What is known beside the method's own result.
+/// What is known in addition to the method's own result.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Evidence {
     /// Fit on the held-out part, per cent.
@@ -70,7 +70,7 @@ impl Identifiability {
         Self { identified: true, ..Self::default() }
     }
 
-    /// Judges the method to trust, `best` of the methods.
+    /// Assesses the recommended method, `best`, among all `methods`.
     pub(super) fn of(methods: &[MethodResult], best: Option<&MethodResult>, evidence: Evidence) -> Self {
         let mut doubts = Vec::new();
         let Some(best) = best.filter(|m| m.failure.is_none() && !m.parameters.is_empty()) else {
@@ -86,7 +86,7 @@ impl Identifiability {
             return Self { doubts: vec![doubt.to_owned()], advice: advice.to_owned(), ..Self::default() };
         };
         let zeta = best.modal.iter().find(|e| e.name == "zeta");
-        // A damping below zero that is not small is none of an axis.
+        // No axis has a damping clearly below zero.
         let grows = zeta.is_some_and(|z| z.value < -SMALL_DAMPING);
         let zeta = zeta.and_then(|e| e.std);
         let account = |e: &Estimate| -> bool {
@@ -116,7 +116,7 @@ impl Identifiability {
              no inertia and no stiffness."
                 .clone_into(&mut advice);
         }
-        // The simulation that follows the record best is one that no sample shows: another that follows it too is not more than that.
+        // The fit of output error has a natural frequency beyond half the sampling rate: then a worse fit is no evidence of another.
         let converged = |m: &MethodResult| m.termination.is_some_and(Termination::is_converged);
         if methods.iter().any(|m| m.method == Method::Oe.name() && converged(m) && is_unseen(m)) {
             doubts.push(BEYOND[0].to_owned());

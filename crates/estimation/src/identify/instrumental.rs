@@ -14,7 +14,7 @@ use nalgebra::{Matrix4, Vector4};
 use super::long_run::Scores;
 use super::output_error::{Free, OutputError};
 use super::parameters::{Estimated, wider};
-use super::record::{Record, Row};
+use super::record::{RegressionRecord, Row};
 use super::regression::RegressionError;
 use crate::axis::{Parameters, Scheme};
 
@@ -34,7 +34,7 @@ fn table(r: &Row) -> Vector4<f64> {
 /// # Errors
 /// When the record is too short, the rounds do not converge, or leave physical values.
 pub fn instrumental(
-    record: &Record,
+    record: &RegressionRecord,
     outputs: &OutputError,
     start: &Parameters,
 ) -> Result<(Estimated, usize), RegressionError> {
@@ -51,7 +51,7 @@ pub fn instrumental(
         let column = |f: fn(&crate::effects::Reading<f64>) -> f64| readings.iter().map(f).collect::<Vec<f64>>();
         let (theta1, omega1) = (column(|r| r.theta1), column(|r| r.omega1));
         let (theta2, omega2) = (column(|r| r.theta2), column(|r| r.omega2));
-        let clean = Record {
+        let clean = RegressionRecord {
             torque: record.torque,
             theta1: &theta1,
             theta2: theta2.as_slice().into(),

@@ -11,7 +11,7 @@
 
 use super::joined::Joined;
 use crate::axis::Structure;
-use crate::effects::{Base, EFFECTS, Effect, Law, Moment, Motion, Place, WithLaw};
+use crate::effects::{Base, EFFECTS, Effect, Kinematics, Law, Moment, Place, WithLaw};
 use crate::trace::{Machine, Signal, TraceError};
 
 /// Samples to either side over which a speed that is not measured is a difference of the angle.
@@ -92,7 +92,7 @@ impl Known {
                     },
                     |w| w[k],
                 );
-                let motion = Motion { x: theta[k], v };
+                let motion = Kinematics { x: theta[k], v };
                 let slides = if v == 0.0 { 0.0 } else { v.signum() };
                 let time = joined.time(k);
                 let moment = Moment { start: motion, end: motion, time, h: 0.0, contact: 0, slides, load: 0.0 };
@@ -109,7 +109,7 @@ impl Known {
     }
 }
 
-/// The torque of a law along a motion, against it.
+/// The torque of a law along a measured motion, which it resists.
 struct Along<'a> {
     p: &'a [f64],
     base: &'a Base<f64>,
@@ -167,11 +167,11 @@ mod tests {
             let value = found.methods[0].parameters.iter().find(|e| e.name == "I").map(|e| e.value);
             (value, found.warnings.join(" "))
         };
-        let (known, words) = inertia(&machine);
+        let (known, warnings) = inertia(&machine);
         assert!((known.unwrap() / 0.02 - 1.0).abs() < 0.01, "{known:?}");
-        assert!(words.contains("gravity") && words.contains("taken off"), "{words}");
-        let (unknown, words) = inertia(&Machine { effects: Settings::default(), ..machine });
+        assert!(warnings.contains("gravity") && warnings.contains("taken off"), "{warnings}");
+        let (unknown, warnings) = inertia(&Machine { effects: Settings::default(), ..machine });
         assert!(unknown.is_none_or(|i| (i / 0.02 - 1.0).abs() > 0.2), "{unknown:?}");
-        assert!(words.is_empty(), "{words}");
+        assert!(warnings.is_empty(), "{warnings}");
     }
 }

@@ -52,13 +52,6 @@ impl Normal {
         }
     }
 
-    /// Adds another part of the same problem.
-    pub fn merge(&mut self, other: &Self) {
-        self.cost += other.cost;
-        self.gradient += &other.gradient;
-        self.curvature += &other.curvature;
-    }
-
     fn is_finite(&self) -> bool {
         self.cost.is_finite()
             && self.gradient.iter().all(|v| v.is_finite())
@@ -167,16 +160,10 @@ pub struct Report {
 
 impl Report {
     /// Covariance of the parameters, n x n, for residuals of unit variance: `inv(J'J)`, zero for parameters that the
-    /// data do not determine at all (their column is named by [`Report::undetermined`]).
+    /// data do not determine at all.
     #[must_use]
     pub fn covariance(&self) -> DMatrix<f64> {
         covariance(&self.normal.curvature).0
-    }
-
-    /// Indices of the parameters that weigh in directions the data do not determine.
-    #[must_use]
-    pub fn undetermined(&self) -> Vec<usize> {
-        covariance(&self.normal.curvature).1
     }
 }
 
@@ -231,7 +218,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
     let mut scale: DVector<f64> = DVector::zeros(n);
     let (mut damping, mut growth) = (options.damping, 2.0);
     let mut iterations = 0;
-    let mut calm = 0;
+    let mut small_steps = 0;
     let termination = loop {
         for i in 0..n {
             scale[i] = scale[i].max(normal.curvature[(i, i)]);
@@ -259,7 +246,7 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
         // Inner loop: raise the damping until a step lowers the cost.
         let outcome = loop {
             if damping > 1e20 {
-                break Err(if calm > 0 || cosine < 1e-6 { Termination::Cost } else { Termination::NoProgress });
+                break Err(if small_steps > 0 || cosine < 1e-6 { Termination::Cost } else { Termination::NoProgress });
             }
             let Some(step) = step(&normal, &scale, &free, damping) else {
                 damping *= growth;
@@ -311,8 +298,8 @@ pub fn minimise<P: Problem + ?Sized>(problem: &P, start: &DVector<f64>, options:
                 }
                 // A step that is short because of the damping has a small predicted reduction anywhere.
                 let small = reduction.max(predicted) <= options.cost * before && damping <= HELD_SHORT;
-                calm = if small { calm + 1 } else { 0 };
-                if calm >= 2 {
+                small_steps = if small { small_steps + 1 } else { 0 };
+                if small_steps >= 2 {
                     break Termination::Cost;
                 }
             }
@@ -447,7 +434,7 @@ mod tests {
         let report = minimise(&problem, &DVector::from_vec(vec![0.0, 7.0]), &Options::default());
         assert!(report.termination.is_converged());
         assert_eq!(report.parameters[1], 7.0);
-        assert_eq!(report.undetermined(), [1]);
+        assert_eq!(covariance(&report.normal.curvature).1, [1]);
         // min (x-2)^2 + (2(x-2)+0.1)^2: x - 2 = -0.2/5; variance 1/(1 + 4).
         assert!((report.parameters[0] - 1.96).abs() < 1e-9);
         assert!((report.covariance()[(0, 0)] - 0.2).abs() < 1e-12);

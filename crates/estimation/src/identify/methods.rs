@@ -1,4 +1,4 @@
-//! Each method on a record: what it starts from, what it is called, how it ended.
+//! Runs each estimator on a record: its start, the description of its equations, and how it ended.
 
 use super::extended::{NOISE_ORDER, extended_batch, extended_recursive};
 use super::frequency::Measured;
@@ -7,7 +7,7 @@ use super::joined::Joined;
 use super::output_error::{Fit, Free, OutputError};
 use super::paper;
 use super::parameters::{Estimated, wider};
-use super::record::Record;
+use super::record::RegressionRecord;
 use super::regression::{RegressionError, least_squares, recursive};
 use super::result::{History, MethodResult};
 use super::run::{Method, Request, hold_name, torque_unit};
@@ -16,29 +16,34 @@ use crate::axis::{Parameters, Scheme, Structure};
 use crate::numerics::level::rms;
 use crate::trace::Machine;
 
-/// One record with what the methods share.
+/// One record, and what the methods share.
 pub(super) struct Run<'a> {
+    /// The record, SI units.
     pub joined: &'a Joined<'a>,
     /// What simulations are compared with.
     pub compared: &'a Joined<'a>,
     pub machine: &'a Machine,
     pub request: &'a Request,
-    pub record: &'a Record<'a>,
+    pub record: &'a RegressionRecord<'a>,
+    /// The problem of output error on [`Self::compared`].
     pub outputs: &'a OutputError<'a>,
+    /// The frequency response of a periodic record.
     pub measured: Option<&'a Measured>,
+    /// The estimates so far, each with its method.
     pub estimates: Vec<(&'static str, Estimated)>,
+    /// The fit of output error, once it has run.
     pub oe: Option<Fit>,
 }
 
 type Found = (Estimated, Option<History>);
 
 impl Run<'_> {
-    /// Runs a method; the estimates so far are starts for it.
+    /// Runs a method; the estimates so far are starting points for it.
     pub fn method(&mut self, method: Method) -> MethodResult {
         let (lambda, p0) = (self.request.forgetting, self.request.p0);
         let mut result = MethodResult::empty(method.name(), method.title());
         let plain = format!("F5, {}", self.record.equations());
-        let recursive_words = format!("forgetting factor {lambda}, P(0) = {p0:e}");
+        let recursion = format!("forgetting factor {lambda}, P(0) = {p0:e}");
         let found: Result<Found, String> = match method {
             _ if self.request.paper && matches!(method, Method::Ls | Method::Rls | Method::Els | Method::ElsBatch) => {
                 result.formulation = "Euler 5x4 (paper, eq. 6)".to_owned();
@@ -53,11 +58,11 @@ impl Run<'_> {
                 least_squares(self.record).map(|e| (e, None)).map_err(|e| e.to_string())
             }
             Method::Rls => {
-                result.formulation = format!("{plain}; {recursive_words}");
+                result.formulation = format!("{plain}; {recursion}");
                 recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
             }
             Method::Els => {
-                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}; {recursive_words}");
+                result.formulation = format!("{plain}; noise model of order {NOISE_ORDER}; {recursion}");
                 extended_recursive(self.record, lambda, p0).map(|(e, h)| (e, Some(h))).map_err(|e| e.to_string())
             }
             Method::ElsBatch => {
@@ -81,18 +86,23 @@ impl Run<'_> {
         result
     }
 
+    /// Sets the estimates of a result, and keeps them as a starting point for the methods that follow.
     fn take(&mut self, result: &mut MethodResult, estimated: Estimated) {
         let reference = self.request.reference.then_some(&self.machine.parameters);
         result.assess(&estimated, reference, self.machine.signals.motion, self.joined.samples().dt);
         self.estimates.push((result.method, estimated));
     }
 
+    /// The paper's Euler regressions, on the longest piece of the record.
+    ///
+    /// # Errors
+    /// Why there is no estimate.
     fn euler(&self, method: Method) -> Result<Found, String> {
         let (lambda, p0) = (self.request.forgetting, self.request.p0);
         let longest = self.joined.longest_trace();
         let alone;
         let record = if self.joined.pieces().len() > 1 {
-            alone = Record::new(&longest, self.machine.parameters.rho).map_err(|e| e.to_string())?;
+            alone = RegressionRecord::new(&longest, self.machine.parameters.rho).map_err(|e| e.to_string())?;
             &alone
         } else {
             self.record
@@ -117,7 +127,7 @@ impl Run<'_> {
             .map(|p| Parameters { b: p.b.max(0.0), ..p })
             .collect();
         if starts.is_empty() {
-            // Nothing was asked for that could serve: least squares costs next to nothing.
+            // No method that was asked for gave a physical start: least squares is cheap.
             starts.extend(least_squares(self.record).ok().filter(Estimated::is_physical).map(|e| e.parameters(rho)));
         }
         if let Some(measured) = self.measured {
@@ -153,7 +163,7 @@ impl Run<'_> {
             .map(|s| self.outputs.fit(&start, *s, plain))
             .reduce(better)
             .ok_or("no integration scheme was asked for")?;
-        // A constant torque (amplifier offset, gravity) joins where it explains more than chance would.
+        // A constant torque (amplifier offset, gravity) is fitted as well where it explains more than chance would.
         let exact = best.sigma.iter().zip(self.outputs.outputs()).all(|(s, (_, y))| *s < 1e-9 * rms(y));
         if !exact {
             let rho = self.machine.parameters.rho;
@@ -162,7 +172,7 @@ impl Run<'_> {
                 best = with;
             }
         }
-        // Where the model leaves something out, the plain standard errors are those of a record of many more samples.
+        // Where the residual is coloured, the standard errors of white noise are too small.
         let white = || self.outputs.residuals(&best).iter().all(|(_, r)| whiteness(r).white);
         if !exact
             && !white()

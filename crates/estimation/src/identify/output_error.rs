@@ -28,44 +28,48 @@ use crate::numerics::level::rms;
 use crate::scalar::{Dual, Scalar};
 use crate::trace::{Signal, Trace, TraceError};
 
-/// Parameters and initial state: what the simulation of a piece is derived to.
+/// Number of quantities that the simulation of a piece is differentiated by: the parameters and the initial state.
 const DERIVED: usize = 8;
-/// I1, I2, B, K.
+/// Number of parameters: I1, I2, B, K.
 const PARAMETERS: usize = 4;
-/// The bias of the torque stands behind the parameters, then what each piece has of its own.
+/// Index of the torque's bias among the unknowns: after the parameters, before the unknowns of each piece.
 const BIAS: usize = PARAMETERS;
-/// Initial state and offset of theta2.
+/// Number of unknowns of each piece: its initial state and its offset of theta2.
 const OWN: usize = 5;
-/// Where the first piece's own unknowns begin.
+/// Index of the first piece's first unknown.
 const FIRST: usize = BIAS + 1;
-/// Most steps of one fit.
+/// Most Levenberg-Marquardt steps of one fit.
 const ITERATIONS: usize = 60;
-/// Rounds of weighing.
+/// Most rounds of re-weighting.
 const ROUNDS: usize = 3;
 
-/// What a simulation is compared with.
+/// The problem of output error: the torque, the measured outputs, and the weights and unknowns of the fit.
 #[derive(Debug, Clone)]
 pub struct OutputError<'a> {
+    /// N.m, one value a sample.
     torque: &'a [f64],
-    /// The measured outputs, each with its column of a reading (theta1, omega1, theta2, omega2).
+    /// The measured outputs (rad, rad/s), each with its column of a reading (theta1, omega1, theta2, omega2).
     outputs: Vec<(Signal, usize, Cow<'a, [f64]>)>,
+    /// Samples of each piece.
     pieces: Vec<Range<usize>>,
     /// Time of each piece's first sample, s.
     starts: Vec<f64>,
     options: SimulateOptions,
     effects: Settings,
     structure: Structure,
+    /// Travel of the table per angle, m/rad.
     rho: f64,
+    /// Level of each output's residual, in the output's unit: the weight is `1/sigma^2`.
     sigma: Vec<f64>,
-    /// Unit of B, so that it may be zero or change sign on the way.
+    /// B is fitted in multiples of this, N.m.s/rad, and not as a logarithm: it may be zero.
     damping_unit: f64,
-    /// One an unknown: the parameters, the bias, then state and offset of each piece.
+    /// Which unknowns are fitted: the parameters, the bias, then state and offset of each piece.
     free: Vec<bool>,
-    /// Fixed values of what is not free.
+    /// Values of the unknowns that are not fitted.
     fixed: Vec<f64>,
 }
 
-/// Which unknowns are fitted beside the initial state.
+/// Which unknowns are fitted in addition to the initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Free {
     /// I1, I2, B, K.
@@ -101,6 +105,7 @@ pub struct Fit {
     pub scheme: Scheme,
 }
 
+/// The column of a reading that a signal is measured by: theta1, omega1, theta2, omega2.
 const fn column(signal: Signal) -> Option<usize> {
     match signal {
         Signal::Theta1 => Some(0),
@@ -111,18 +116,19 @@ const fn column(signal: Signal) -> Option<usize> {
     }
 }
 
+/// The value in a column of a reading, rad or rad/s.
 fn pick<S: Scalar>(r: &Reading<S>, column: usize) -> S {
     [r.theta1, r.omega1, r.theta2, r.omega2][column]
 }
 
-/// The place of a piece's own unknown.
+/// Index of an unknown of a piece: 0 to 3 its initial state, 4 its offset.
 const fn own(piece: usize, unknown: usize) -> usize {
     FIRST + piece * OWN + unknown
 }
 
 impl<'a> OutputError<'a> {
-    /// Takes the torque and every measured angle and speed of a trace; accelerations are left out, since a position
-    /// says more. The weights begin at the measured noise.
+    /// Takes the torque and every measured angle and speed of a trace (SI units); `rho` (m/rad) turns x2 into theta2 where only x2 is
+    /// measured. Accelerations are left out: they add little to the positions. The first weights are those of the measured noise.
     ///
     /// # Errors
     /// When the torque or any output is missing.
@@ -194,12 +200,13 @@ impl<'a> OutputError<'a> {
         self.outputs.iter().map(|(s, _, v)| (*s, v.as_ref()))
     }
 
-    /// Overrides the weights with known noise levels, one an output.
-    pub fn weigh(&mut self, sigma: &[f64]) {
+    /// Overrides the weights with known noise levels, one for each output, in its unit.
+    #[cfg(test)]
+    pub(super) fn weigh(&mut self, sigma: &[f64]) {
         self.sigma = sigma.to_vec();
     }
 
-    /// Measured first sample of a piece as a starting point for its initial state.
+    /// Start for the initial state of a piece, rad and rad/s: its first measured sample.
     fn first_state(&self, piece: &Range<usize>) -> [f64; 4] {
         let mut state = [0.0; 4];
         let mut known = [false; 4];
@@ -210,7 +217,7 @@ impl<'a> OutputError<'a> {
         for (position, speed) in [(0, 1), (2, 3)] {
             let values = self.outputs.iter().find(|(_, c, _)| *c == position).map(|(_, _, v)| v);
             if let (false, Some(v)) = (known[speed], values) {
-                // Over a few samples, so that noise does not make it large.
+                // Over a few samples, to reduce the effect of the noise.
                 let span = 8.min(piece.len() - 1);
                 state[speed] = (v[piece.start + span] - v[piece.start]) / (span as f64 * self.options.dt);
             }
@@ -224,7 +231,7 @@ impl<'a> OutputError<'a> {
         state
     }
 
-    /// All unknowns at the start: the parameters, and each piece's measured first state.
+    /// All unknowns at the start: the parameters, no bias, and of each piece the measured first state and no offset.
     fn unknowns(&self, parameters: [f64; PARAMETERS]) -> Vec<f64> {
         let mut q = parameters.to_vec();
         q.push(0.0);
@@ -235,14 +242,14 @@ impl<'a> OutputError<'a> {
         q
     }
 
-    /// Says of every piece whether its offset is free.
+    /// Sets whether the offset of each piece is fitted.
     fn free_offsets(&mut self, free: bool) {
         for piece in 0..self.pieces.len() {
             self.free[own(piece, 4)] = free;
         }
     }
 
-    /// Fits from `start` under one integration scheme; weights are re-found from the residuals.
+    /// Fits from `start` under one integration scheme; the weights are found from the residuals, by repeating the fit.
     #[must_use]
     pub fn fit(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
         let mut problem = self.clone();
@@ -266,7 +273,7 @@ impl<'a> OutputError<'a> {
         let mut q = self.unknowns([log(start.i1), log(start.i2), start.b / problem.damping_unit, log(start.k)]);
         problem.fixed.clone_from(&q);
 
-        // First what enters linearly, so that the parameters do not run off to mend a wrong initial state.
+        // First the unknowns that enter linearly: else the parameters would diverge to make up for a wrong initial state.
         let linear = self.effects.active().motion_is_linear();
         if linear {
             problem.solve_state(&mut q);
@@ -309,16 +316,16 @@ impl<'a> OutputError<'a> {
     }
 
     /// Fits with the weights as given and no re-weighting: the covariance is for those weights.
-    #[must_use]
-    pub fn fit_weighted(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
+    #[cfg(test)]
+    pub(super) fn fit_weighted(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
         let mut problem = self.clone();
         problem.options.scheme = scheme;
         problem.damping_unit = if start.b > 0.0 { start.b } else { 1.0 };
         problem.free_offsets(free.offset);
         problem.free[BIAS] = free.bias;
         let mut q = self.unknowns([start.i1.ln(), start.i2.ln(), start.b / problem.damping_unit, start.k.ln()]);
-        // Speeds from positions alone are poor: the linear part first. A second start clears what damping the first
-        // has gathered in the valley that I2, B and K share.
+        // First the unknowns that enter linearly, as initial speeds from positions alone are inaccurate. The second run begins with the
+        // small damping of Levenberg-Marquardt again, which the first raises in the narrow valley along I2, B and K.
         problem.solve_state(&mut q);
         let first = problem.run(&q, ITERATIONS);
         let mut q = first.0;
@@ -327,16 +334,19 @@ impl<'a> OutputError<'a> {
         problem.finish(&report.0, &report.1, 1.0, scheme)
     }
 
+    /// Degrees of freedom of the residuals, at least one.
     fn degrees(&self) -> f64 {
         let unknowns = self.free.iter().filter(|f| **f).count();
         ((self.torque.len() * self.outputs.len()) as f64 - unknowns as f64).max(1.0)
     }
 
+    /// Minimises over the free unknowns from `q`, which holds all of them: all unknowns at the minimum, and how it was reached.
     fn run(&self, q: &[f64], iterations: usize) -> (Vec<f64>, levenberg::Report) {
         let free: Vec<usize> = (0..q.len()).filter(|i| self.free[*i]).collect();
         let start = DVector::from_iterator(free.len(), free.iter().map(|i| q[*i]));
         let mut lower = vec![f64::NEG_INFINITY; free.len()];
         for (bound, i) in lower.iter_mut().zip(&free) {
+            // B is not negative.
             if *i == 2 {
                 *bound = 0.0;
             }
@@ -361,6 +371,7 @@ impl<'a> OutputError<'a> {
         all
     }
 
+    /// The parameters of the axis at unknowns `q`, SI units.
     fn axis<S: Scalar>(&self, q: &[S]) -> Parameters<S> {
         Parameters {
             i1: q[0].exp(),
@@ -371,7 +382,7 @@ impl<'a> OutputError<'a> {
         }
     }
 
-    /// The simulation of one piece: parameters and state as given.
+    /// The simulation of piece `index`: `parameters` as unknowns, `initial` in rad and rad/s, `bias` in N.m.
     fn respond<S: Scalar>(&self, index: usize, parameters: &[S], initial: [S; 4], bias: f64) -> Response<S> {
         let torque = &self.torque[self.pieces[index].clone()];
         let torque: Cow<[f64]> =
@@ -380,7 +391,7 @@ impl<'a> OutputError<'a> {
         simulate(&self.axis(parameters), self.structure, &Settings::lift(&self.effects), initial, &torque, &options)
     }
 
-    /// Measured minus simulated at unknowns `q`, one vector an output.
+    /// Measured minus simulated at unknowns `q`, one vector for each output, in its unit.
     fn differences(&self, q: &[f64]) -> Vec<Vec<f64>> {
         let mut out: Vec<Vec<f64>> = vec![Vec::with_capacity(self.torque.len()); self.outputs.len()];
         for (index, piece) in self.pieces.iter().enumerate() {
@@ -407,7 +418,7 @@ impl<'a> OutputError<'a> {
         q
     }
 
-    /// Measured minus simulated, one vector an output.
+    /// Measured minus simulated at a fit, one vector for each output, in its unit.
     #[must_use]
     pub fn residuals(&self, fit: &Fit) -> Vec<(Signal, Vec<f64>)> {
         let mut problem = self.clone();
@@ -432,10 +443,12 @@ impl<'a> OutputError<'a> {
         readings
     }
 
+    /// Level of each output's residual at unknowns `q`, in its unit.
     fn levels(&self, q: &[f64]) -> Vec<f64> {
         self.differences(q).iter().zip(&self.outputs).map(|(r, (_, _, measured))| level(rms(r), measured)).collect()
     }
 
+    /// The fit at unknowns `q`, with the covariance of its parameters in SI units.
     fn finish(&self, q: &[f64], report: &levenberg::Report, chi2: f64, scheme: Scheme) -> Fit {
         let p: Parameters = self.axis(&q[..PARAMETERS]);
         let relative = report.covariance();
@@ -465,8 +478,8 @@ impl<'a> OutputError<'a> {
         }
     }
 
-    /// Each sample's row of the Jacobian (of the simulated outputs, over their levels) and residual (over its level):
-    /// `take(sample, unknowns, derivatives, residual)`, the unknowns as numbers among the free ones.
+    /// Passes each row of the weighted problem to `take(sample, unknowns, derivatives, residual)`: the derivatives of one simulated output
+    /// by the unknowns (as indices among the free ones), and its residual, both divided by the output's level.
     fn rows(&self, q: &[f64], mut take: impl FnMut(usize, &[usize], &[f64], f64)) {
         let free: Vec<usize> = (0..q.len()).filter(|i| self.free[*i]).collect();
         let among = |unknown: usize| free.binary_search(&unknown).ok();
@@ -481,7 +494,7 @@ impl<'a> OutputError<'a> {
                 let ones = vec![1.0; piece.len()];
                 simulate(&p, self.structure, &Settings::default(), [0.0; 4], &ones, &self.options)
             });
-            // What this piece's outputs hang on: the number among the free ones, and which derivative it is.
+            // The free unknowns that this piece's outputs depend on: index among the free ones, and which derivative.
             let mut unknowns: Vec<(usize, usize)> = (0..DERIVED)
                 .filter_map(|i| Some((among(if i < PARAMETERS { i } else { own(index, i - PARAMETERS) })?, i)))
                 .collect();
@@ -509,7 +522,7 @@ impl<'a> OutputError<'a> {
     }
 }
 
-/// A level of noise kept above what rounding leaves of the signal.
+/// A noise level, at least the rounding error of the signal.
 fn level(sigma: f64, values: &[f64]) -> f64 {
     sigma.max(1e-13 * rms(values)).max(f64::MIN_POSITIVE.sqrt())
 }

@@ -13,7 +13,7 @@ use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
 use super::lsq::triangularise;
 use super::parameters::{Estimated, NAMES};
-use super::record::Record;
+use super::record::RegressionRecord;
 use super::recursive::Rls;
 use super::regression::RegressionError;
 use super::result::History;
@@ -24,7 +24,7 @@ pub const EULER_NOTE: &str = "Euler's rule is first order: on data of any better
                               several to several hundred per cent, whatever the estimator; leave --paper out for the \
                               consistent regression";
 
-/// The rule that carries the state over a sample.
+/// The integration rule over a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rule {
     /// The paper's.
@@ -34,13 +34,13 @@ pub enum Rule {
 }
 
 struct States<'a> {
-    record: &'a Record<'a>,
+    record: &'a RegressionRecord<'a>,
     omega: (&'a [f64], &'a [f64]),
     rule: Rule,
 }
 
 impl<'a> States<'a> {
-    fn new(record: &'a Record<'a>, rule: Rule) -> Result<Self, RegressionError> {
+    fn new(record: &'a RegressionRecord<'a>, rule: Rule) -> Result<Self, RegressionError> {
         let omega = record.omega.ok_or_else(|| RegressionError::Unexcited {
             side: "state",
             parameters: "any parameter".to_owned(),
@@ -107,7 +107,7 @@ impl<'a> States<'a> {
 ///
 /// # Errors
 /// Without speeds, or when a direction of the state is not excited.
-pub fn least_squares(record: &Record, rule: Rule) -> Result<Estimated, RegressionError> {
+pub fn least_squares(record: &RegressionRecord, rule: Rule) -> Result<Estimated, RegressionError> {
     let states = States::new(record, rule)?;
     Ok(states.parameters(&solve(&states)?))
 }
@@ -116,7 +116,7 @@ pub fn least_squares(record: &Record, rule: Rule) -> Result<Estimated, Regressio
 ///
 /// # Errors
 /// As [`least_squares`].
-pub fn least_squares_with_i2(record: &Record, rule: Rule, i2: f64) -> Result<Estimated, RegressionError> {
+pub fn least_squares_with_i2(record: &RegressionRecord, rule: Rule, i2: f64) -> Result<Estimated, RegressionError> {
     let states = States::new(record, rule)?;
     let (a, _) = states.matrices(&solve(&states)?);
     let k = a[(3, 0)] * i2;
@@ -148,7 +148,7 @@ fn solve(states: &States) -> Result<SMatrix<f64, 5, 4>, RegressionError> {
 ///
 /// # Errors
 /// As [`least_squares`].
-pub fn euler_least_squares(record: &Record) -> Result<Estimated, RegressionError> {
+pub fn euler_least_squares(record: &RegressionRecord) -> Result<Estimated, RegressionError> {
     least_squares(record, Rule::Euler)
 }
 
@@ -157,7 +157,7 @@ pub fn euler_least_squares(record: &Record) -> Result<Estimated, RegressionError
 /// # Errors
 /// As [`least_squares`].
 pub fn euler_recursive(
-    record: &Record,
+    record: &RegressionRecord,
     lambda: f64,
     p0: f64,
     extended: bool,
@@ -170,7 +170,7 @@ pub fn euler_recursive(
 /// # Errors
 /// As [`least_squares`].
 pub fn recursive(
-    record: &Record,
+    record: &RegressionRecord,
     rule: Rule,
     lambda: f64,
     p0: f64,

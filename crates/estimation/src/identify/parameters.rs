@@ -8,7 +8,7 @@ use super::levenberg::{self, Normal, Problem};
 use super::result::Estimate;
 use crate::axis::Parameters;
 use crate::scalar::{Dual, Scalar};
-use crate::trace::Motion;
+use crate::trace::AxisKind;
 
 /// Parameters with their covariance.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,10 +24,10 @@ pub const NAMES: [&str; 4] = ["I1", "I2", "B", "K"];
 
 /// Units of the four.
 #[must_use]
-pub const fn units(motion: Motion) -> [&'static str; 4] {
+pub const fn units(motion: AxisKind) -> [&'static str; 4] {
     match motion {
-        Motion::Rotary => ["kg.m2", "kg.m2", "N.m.s/rad", "N.m/rad"],
-        Motion::Linear => ["kg", "kg", "N.s/m", "N/m"],
+        AxisKind::Rotary => ["kg.m2", "kg.m2", "N.m.s/rad", "N.m/rad"],
+        AxisKind::Linear => ["kg", "kg", "N.s/m", "N/m"],
     }
 }
 
@@ -55,7 +55,7 @@ impl Estimated {
 
     /// The table of the four parameters.
     #[must_use]
-    pub fn estimates(&self, reference: Option<&Parameters>, motion: Motion) -> Vec<Estimate> {
+    pub fn estimates(&self, reference: Option<&Parameters>, motion: AxisKind) -> Vec<Estimate> {
         let reference = reference.map(|p| [p.i1, p.i2, p.b, p.k]);
         (0..4)
             .map(|i| {
@@ -99,7 +99,7 @@ pub struct Rows {
     pub table: SVector<f64, 2>,
     /// Their covariance.
     pub table_covariance: SMatrix<f64, 2, 2>,
-    /// Covariance of all five where the residuals may be coloured and go together; None where it is not known.
+    /// Covariance of all five that allows for coloured residuals, correlated between the rows; None where it is not known.
     pub coloured: Option<SMatrix<f64, 5, 5>>,
 }
 
@@ -163,7 +163,7 @@ struct Reconciliation<'a> {
 }
 
 impl Reconciliation<'_> {
-    /// The covariance of the five ratios carried to the four parameters (over their units): `A*five*A'` with
+    /// The covariance of the five ratios propagated to the four parameters (over their units): `A*five*A'` with
     /// `A = inv(J'J)*J'*W`, which is how the parameters move with the ratios.
     fn propagated(&self, q: &DVector<f64>, relative: &DMatrix<f64>, five: &SMatrix<f64, 5, 5>) -> Option<DMatrix<f64>> {
         let jacobian = DMatrix::from_fn(5, 4, {
@@ -248,6 +248,6 @@ mod tests {
         for i in [0, 2] {
             assert!((modal[i].std.unwrap() / modal[i].value - 0.005).abs() < 1e-12);
         }
-        assert_eq!(found.estimates(None, Motion::Rotary)[3].std, Some(0.01 * 1.76e-2));
+        assert_eq!(found.estimates(None, AxisKind::Rotary)[3].std, Some(0.01 * 1.76e-2));
     }
 }

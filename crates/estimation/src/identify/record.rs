@@ -12,12 +12,12 @@ pub(super) const DIFFERENT_ZEROS: f64 = 20.0;
 
 /// The record of a two-inertia axis.
 #[derive(Debug, Clone)]
-pub struct Record<'a> {
+pub struct RegressionRecord<'a> {
     /// Torque, N.m.
     pub torque: &'a [f64],
     /// Motor angle, rad.
     pub theta1: &'a [f64],
-    /// Table angle, rad; the encoders' zeros brought together.
+    /// Table angle, rad, without the difference of the encoders' zeros.
     pub theta2: Cow<'a, [f64]>,
     /// Speeds of motor and table, where both are measured, rad/s.
     pub omega: Option<(&'a [f64], &'a [f64])>,
@@ -27,13 +27,13 @@ pub struct Record<'a> {
     pub start: f64,
     /// What the torque does between samples.
     pub hold: Hold,
-    /// What was added to theta2 to bring the encoders' zeros together, rad: the largest of the pieces'.
+    /// What was added to theta2 for the difference of the encoders' zeros, rad: the largest of the pieces'.
     pub zero_offset: f64,
     /// The pieces, each with the time of its first sample, s; none: the record has no gaps.
     pub pieces: Cow<'a, [(Range<usize>, f64)]>,
 }
 
-impl<'a> Record<'a> {
+impl<'a> RegressionRecord<'a> {
     /// Takes the signals of a trace; `rho` (m/rad) turns x2 into theta2 where only x2 is measured.
     ///
     /// # Errors
@@ -42,10 +42,10 @@ impl<'a> Record<'a> {
         Self::in_pieces(trace, std::slice::from_ref(&(0..trace.len())), Cow::Borrowed(&[]), rho)
     }
 
-    /// Takes the signals of a record in pieces, see [`Record::new`].
+    /// Takes the signals of a record in pieces, see [`RegressionRecord::new`].
     ///
     /// # Errors
-    /// As [`Record::new`].
+    /// As [`RegressionRecord::new`].
     pub fn of(joined: &'a Joined, rho: f64) -> Result<Self, TraceError> {
         let pieces = match joined.pieces() {
             [_] => Cow::Borrowed(&[][..]),
@@ -68,7 +68,7 @@ impl<'a> Record<'a> {
             _ => Cow::Borrowed(trace.require(Signal::Theta2)?),
         };
         let n = theta1.len() as f64;
-        // A counter that was set between two pieces has another zero in each; how much the twist moves is one for all.
+        // A counter that was set between two pieces has its own zero in each; the deviation of the twist is that of all.
         let means: Vec<f64> = ranges
             .iter()
             .map(|r| {
@@ -203,7 +203,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The name of the equations that [`Record::row`] takes.
+    /// The name of the equations that [`RegressionRecord::row`] takes.
     #[must_use]
     pub const fn equations(&self) -> &'static str {
         if self.omega.is_some() {
@@ -306,7 +306,7 @@ mod tests {
         };
         let pieces = [piece(0.0, 20, 5.0), piece(100.0, 3, -700.0), piece(200.0, 30, 0.0)];
         let joined = Joined::of(&pieces).unwrap();
-        let record = Record::of(&joined, 1.0).unwrap();
+        let record = RegressionRecord::of(&joined, 1.0).unwrap();
         assert_eq!(record.rows(), 18 + 1 + 28);
         assert_eq!([0, 17, 18, 19, 46].map(|k| record.place(k)), [(0, 0), (0, 17), (1, 0), (2, 0), (2, 27)]);
         assert_eq!([0, 17, 18, 19].map(|k| record.time(k)), [1.0, 18.0, 101.0, 201.0]);
@@ -327,7 +327,7 @@ mod tests {
             .and_then(|t| t.with(Signal::Theta1, angle))
             .and_then(|t| t.with(Signal::Theta2, other))
             .unwrap();
-        let record = Record::new(&trace, 1.0).unwrap();
+        let record = RegressionRecord::new(&trace, 1.0).unwrap();
         assert!((record.zero_offset - 6.5).abs() < 1e-3);
         assert!((record.theta1[7] - record.theta2[7]).abs() < 2e-3);
     }

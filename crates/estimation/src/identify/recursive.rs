@@ -70,7 +70,7 @@ impl<const P: usize> Els<P> {
         Self { rls: Rls::new(lambda, p0), regressors, past: [0.0; P], scale }
     }
 
-    /// Begins behind a gap: the past residuals are not those before the next sample.
+    /// Clears the past residuals, at a gap of the record.
     pub fn forget_noise(&mut self) {
         self.past = [0.0; P];
     }

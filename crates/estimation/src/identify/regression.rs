@@ -1,5 +1,5 @@
-//! The regressions that need no model run, on the rows of [`Record`] in the form F5: LS and RLS, and what ELS
-//! ([`super::extended`]) has of them.
+//! The regressions that need no simulation, on the rows of [`RegressionRecord`] in the form F5: LS and RLS, and what they share with ELS
+//! ([`super::extended`]).
 //!
 //! ```text
 //! F5   a1 = -(K/I1)*twist - (B/I1)*rate + (1/I1)*torque      motor
@@ -18,14 +18,14 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 use super::long_run::{self, Scores};
 use super::lsq::{Deficient, Solution, Triangle};
 use super::parameters::{Estimated, Rows};
-use super::record::{Record, Row};
+use super::record::{RegressionRecord, Row};
 use super::recursive::Rls;
 use super::result::History;
 
 /// Points of a parameter history.
 const HISTORY: usize = 400;
 
-/// A regression that the data cannot carry.
+/// Why a regression has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegressionError {
@@ -89,7 +89,7 @@ pub(super) fn variance(solution: &Solution, left: f64) -> f64 {
 ///
 /// # Errors
 /// When the record is too short or does not excite a direction.
-pub fn least_squares(record: &Record) -> Result<Estimated, RegressionError> {
+pub fn least_squares(record: &RegressionRecord) -> Result<Estimated, RegressionError> {
     Ok(rows(record)?.reconcile())
 }
 
@@ -97,7 +97,7 @@ pub fn least_squares(record: &Record) -> Result<Estimated, RegressionError> {
 ///
 /// # Errors
 /// When the record is too short or does not excite a direction.
-pub(super) fn rows(record: &Record) -> Result<Rows, RegressionError> {
+pub(super) fn rows(record: &RegressionRecord) -> Result<Rows, RegressionError> {
     let mut squares = LeastSquares::new(record.rows());
     squares.extend(record, record.rows());
     squares.rows()
@@ -214,14 +214,14 @@ impl LeastSquares {
     }
 
     /// Takes the first `count` rows of a record, a multiple of [`super::lsq::BLOCK`] in every part but the last.
-    pub fn extend(&mut self, record: &Record, count: usize) {
+    pub fn extend(&mut self, record: &RegressionRecord, count: usize) {
         self.motor.extend(count, |k, out| out.copy_from_slice(&motor_row(&record.row(k))));
         self.table.extend(count, |k, out| out.copy_from_slice(&table_row(&record.row(k))));
         (0..count).for_each(|k| self.moments.take(&record.row(k)));
         self.count += count;
     }
 
-    /// What the standard errors are made of.
+    /// The moments of the rows, for the standard errors.
     pub const fn moments(&self) -> &Moments {
         &self.moments
     }
@@ -288,7 +288,7 @@ impl Scales {
     ///
     /// # Errors
     /// When there are too few rows, or a regressor is zero throughout.
-    pub fn new(record: &Record) -> Result<Self, RegressionError> {
+    pub fn new(record: &RegressionRecord) -> Result<Self, RegressionError> {
         let mut sums = Sums::default();
         (0..record.rows()).for_each(|k| sums.take(&record.row(k)));
         Self::of(&sums)
@@ -381,7 +381,7 @@ impl Recorder {
 ///
 /// # Errors
 /// When the record is too short or a signal is zero throughout.
-pub fn recursive(record: &Record, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
+pub fn recursive(record: &RegressionRecord, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
     let n = record.rows();
     let mut recursion = Recursion::new(Scales::new(record)?, n, lambda, p0);
     let mut moments = Moments::new(n);

@@ -7,7 +7,7 @@ use super::levenberg::Termination;
 use super::parameters::Estimated;
 use super::run::NOISE_FREE;
 use crate::axis::Parameters;
-use crate::trace::{Motion, Signal};
+use crate::trace::{AxisKind, Signal};
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "eixo.identification/1";
@@ -86,7 +86,7 @@ pub struct Estimate {
     pub unit: &'static str,
     /// The estimate.
     pub value: f64,
-    /// Standard error by the estimator's own account; None where it gives none.
+    /// Standard error as the estimator gives it; None where it gives none.
     pub std: Option<f64>,
     /// The reference, where one is given.
     pub reference: Option<f64>,
@@ -139,7 +139,7 @@ pub struct Series {
     pub y: Vec<f64>,
 }
 
-/// How the estimates of a recursive method went (the paper's Figures 6 to 9).
+/// The estimates of a recursive method over time (the paper's Figures 6 to 9).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct History {
     /// Time, s, at most some thousand points.
@@ -229,7 +229,7 @@ pub struct ResponseOf {
 }
 
 impl OutputFit {
-    /// Whether what is left is rounding, of which whiteness says nothing.
+    /// Whether the residual is rounding, whose whiteness means nothing.
     #[must_use]
     pub fn is_rounding(&self) -> bool {
         self.rms_error <= NOISE_FREE * self.rms
@@ -256,20 +256,20 @@ impl MethodResult {
         }
     }
 
-    /// Takes nothing in, and says why: numbers of no axis are not shown, nor the way to them, as they would be read.
+    /// Gives the result a reason instead of estimates and their history: values that no axis has would be misread.
     fn refuse(&mut self, why: &str) {
         self.history = None;
         self.failure = Some(why.to_owned());
     }
 
-    /// Whether a simulation with the estimates is the record to within rounding: what is left then has a shape, but no cause.
+    /// Whether a simulation with the estimates is the record to within rounding: the residual then has no cause.
     #[must_use]
     pub fn explains_exactly(&self) -> bool {
         !self.outputs.is_empty() && self.outputs.iter().all(OutputFit::is_rounding)
     }
 
-    /// Takes the estimates in, against a reference where there is one, with what is to be said of them. `dt`: sampling interval, s.
-    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: Motion, dt: f64) {
+    /// Sets the estimates, compared with a reference where there is one, and the notes on them. `dt`: sampling interval, s.
+    pub(super) fn assess(&mut self, estimated: &Estimated, reference: Option<&Parameters>, motion: AxisKind, dt: f64) {
         if !estimated.is_physical() {
             return self.refuse(
                 "the estimates are not those of an axis (an inertia or the stiffness is not positive): noise or an unmodelled \
@@ -323,7 +323,7 @@ impl Serialize for Estimate {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         /// The fields in their order.
         #[derive(Serialize)]
-        struct Told {
+        struct Serialised {
             name: &'static str,
             unit: &'static str,
             value: Option<f64>,
@@ -334,9 +334,17 @@ impl Serialize for Estimate {
         }
         let &Self { name, unit, value, std, reference, error_percent } = self;
         let determined = self.is_determined();
-        let told = |v: Option<f64>| v.filter(|_| determined);
-        Told { name, unit, value: told(Some(value)), std, reference, error_percent: told(error_percent), determined }
-            .serialize(serializer)
+        let if_determined = |v: Option<f64>| v.filter(|_| determined);
+        Serialised {
+            name,
+            unit,
+            value: if_determined(Some(value)),
+            std,
+            reference,
+            error_percent: if_determined(error_percent),
+            determined,
+        }
+        .serialize(serializer)
     }
 }
 

@@ -30,7 +30,7 @@ use super::result::{
 use super::run::{Request, summary};
 use super::statistics::spectrum;
 use crate::numerics::level::rms;
-use crate::trace::{Machine, Motion, Signal, TraceError};
+use crate::trace::{AxisKind, Machine, Signal, TraceError};
 
 /// Least samples of half a window.
 const LEAST_HALF: usize = 12;
@@ -94,27 +94,22 @@ pub enum RigidError {
     Unexcited(String),
 }
 
-/// Identifies a rigid axis from torque and angle (rad or m), sampled every `dt` s.
-///
-/// # Errors
-/// [`RigidError`].
-pub fn weak_least_squares(torque: &[f64], theta: &[f64], dt: f64, start: f64) -> Result<Rigid, RigidError> {
-    let whole = std::iter::once(0..theta.len()).collect::<Vec<_>>();
-    weak_in_pieces(&Motions { torque, theta, dt, pieces: &whole, starts: &[start] })
-}
-
 /// Torque and angle of a record in pieces.
 #[derive(Clone, Copy)]
-struct Motions<'a> {
+struct RigidRecord<'a> {
+    /// N.m (or N), one value a sample.
     torque: &'a [f64],
+    /// rad (or m), one value a sample.
     theta: &'a [f64],
+    /// Interval, s.
     dt: f64,
+    /// Samples of each piece.
     pieces: &'a [Range<usize>],
     /// Time of each piece's first sample, s.
     starts: &'a [f64],
 }
 
-impl<'a> Motions<'a> {
+impl<'a> RigidRecord<'a> {
     fn of(joined: &'a Joined) -> Result<Self, TraceError> {
         let trace = joined.samples();
         Ok(Self {
@@ -132,9 +127,12 @@ impl<'a> Motions<'a> {
     }
 }
 
-/// The same of a record in pieces: no window reaches from one into the next.
-fn weak_in_pieces(motions: &Motions) -> Result<Rigid, RigidError> {
-    let n = motions.longest();
+/// Identifies a rigid axis. No window reaches from one piece into the next.
+///
+/// # Errors
+/// When the record is too short or a direction is not excited.
+fn weak_in_pieces(record: &RigidRecord) -> Result<Rigid, RigidError> {
+    let n = record.longest();
     if 8 * LEAST_HALF + 2 > n {
         return Err(RigidError::TooShort { samples: n, window: 2 * LEAST_HALF + 1 });
     }
@@ -144,7 +142,7 @@ fn weak_in_pieces(motions: &Motions) -> Result<Rigid, RigidError> {
     let mut half = LEAST_HALF;
     let mut failure = None;
     while 8 * half + 2 <= n {
-        match in_windows(motions, half) {
+        match in_windows(record, half) {
             Ok(found) => {
                 let share = |r: &Rigid| r.std[0] / r.values[0].abs();
                 if best.as_ref().is_none_or(|b| share(&found) < share(b)) {
@@ -159,14 +157,14 @@ fn weak_in_pieces(motions: &Motions) -> Result<Rigid, RigidError> {
 }
 
 /// The regression in windows of `2*half + 1` samples.
-fn in_windows(motions: &Motions, half: usize) -> Result<Rigid, RigidError> {
-    let Motions { torque, theta, dt, .. } = *motions;
+fn in_windows(record: &RigidRecord, half: usize) -> Result<Rigid, RigidError> {
+    let RigidRecord { torque, theta, dt, .. } = *record;
     let w = Window::new(half);
     let span = 2 * half + 1;
     let total: f64 = w.psi.iter().sum();
     // Speed smoothed by the same test function, for the sign of the dry friction.
     let mut speed = vec![0.0; theta.len()];
-    for piece in motions.pieces.iter().filter(|p| p.len() >= span) {
+    for piece in record.pieces.iter().filter(|p| p.len() >= span) {
         for k in piece.clone() {
             let first = k.saturating_sub(half).clamp(piece.start, piece.end - span);
             speed[k] = -Window::apply(&w.first, &theta[first..first + span]) / (total * dt);
@@ -177,7 +175,7 @@ fn in_windows(motions: &Motions, half: usize) -> Result<Rigid, RigidError> {
     let step = (half / 2).max(1);
     let mut centres = Vec::new();
     let (mut times, mut of_piece) = (Vec::new(), Vec::new());
-    let pieces = motions.pieces.iter().zip(motions.starts).enumerate();
+    let pieces = record.pieces.iter().zip(record.starts).enumerate();
     for (number, (piece, start)) in pieces.filter(|(_, (p, _))| p.len() >= span) {
         let own = (piece.start + half..piece.end - half).step_by(step);
         times.extend(own.clone().map(|k| start + (k - piece.start) as f64 * dt));
@@ -221,7 +219,7 @@ fn longest_run(of_piece: &[usize]) -> Range<usize> {
     runs.max_by_key(ExactSizeIterator::len).unwrap_or(0..0)
 }
 
-/// Standard errors that allow for windows that overlap and residuals that last: Newey-West with a lag of eight windows
+/// Standard errors that allow for overlapping windows and autocorrelated residuals: Newey-West with a lag of eight windows
 /// (W. K. Newey, K. D. West, Econometrica 55, 1987).
 fn robust(rows: &[[f64; 5]], residual: &[f64], of_piece: &[usize], inverse: &DMatrix<f64>) -> Vector4<f64> {
     const LAGS: usize = 8;
@@ -243,23 +241,23 @@ fn robust(rows: &[[f64; 5]], residual: &[f64], of_piece: &[usize], inverse: &DMa
     Vector4::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt())
 }
 
-fn units(motion: Motion) -> [&'static str; 4] {
+fn units(motion: AxisKind) -> [&'static str; 4] {
     match motion {
-        Motion::Rotary => ["kg.m2", "N.m.s/rad", "N.m", "N.m"],
-        Motion::Linear => ["kg", "N.s/m", "N", "N"],
+        AxisKind::Rotary => ["kg.m2", "N.m.s/rad", "N.m", "N.m"],
+        AxisKind::Linear => ["kg", "N.s/m", "N", "N"],
     }
 }
 
 /// Torques at one unit of viscous friction, dry friction and load, as shares of the torque's size.
-fn shares(motions: &Motions) -> [f64; 3] {
-    let size = rms(motions.torque).max(f64::MIN_POSITIVE);
-    let span = 8.min(motions.longest().saturating_sub(1)).max(1);
-    let windows = motions.pieces.iter().flat_map(|p| motions.theta[p.clone()].windows(span + 1));
-    let speed: Vec<f64> = windows.map(|w| (w[span] - w[0]) / (span as f64 * motions.dt)).collect();
+fn shares(record: &RigidRecord) -> [f64; 3] {
+    let size = rms(record.torque).max(f64::MIN_POSITIVE);
+    let span = 8.min(record.longest().saturating_sub(1)).max(1);
+    let windows = record.pieces.iter().flat_map(|p| record.theta[p.clone()].windows(span + 1));
+    let speed: Vec<f64> = windows.map(|w| (w[span] - w[0]) / (span as f64 * record.dt)).collect();
     [rms(&speed) / size, 1.0 / size, 1.0 / size]
 }
 
-/// The estimates, where they are those of an axis. A friction that is negative within its error is none.
+/// The estimates, where an axis can have them. A friction that is negative within its error is set to zero.
 fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
     let (v, s) = (&found.values, &found.std);
     if !v.iter().chain(s.iter()).all(|v| v.is_finite()) || v[0] <= 0.0 {
@@ -284,13 +282,13 @@ fn physical(mut found: Rigid, shares: &[f64; 3]) -> Result<Rigid, String> {
     Ok(found)
 }
 
-/// How well a fit to the first two thirds makes the torque of the last third, per cent.
+/// Fit of the torque of the last third of the record with the estimates from the first two thirds, per cent.
 fn held_out(joined: &Joined) -> Option<f64> {
     let n = joined.len();
     let (first, rest) = (joined.part(0..2 * n / 3), joined.part(2 * n / 3..n));
-    let first = weak_in_pieces(&Motions::of(&first).ok()?).ok()?;
+    let first = weak_in_pieces(&RigidRecord::of(&first).ok()?).ok()?;
     // The same windows on the rest: the regression's rows there, with the first part's estimates.
-    let rest = in_windows(&Motions::of(&rest).ok()?, first.half).ok()?;
+    let rest = in_windows(&RigidRecord::of(&rest).ok()?, first.half).ok()?;
     let error: Vec<f64> =
         rest.rows.iter().map(|r| r[4] - (0..4).map(|j| r[j] * first.values[j]).sum::<f64>()).collect();
     let size = rms(&rest.fit.1);
@@ -312,7 +310,7 @@ pub(super) fn identify(
     let taken_off = known.taken_off(joined, machine)?;
     let regressed = taken_off.as_ref().unwrap_or(joined);
     let trace = joined.samples();
-    let motions = Motions::of(regressed)?;
+    let record = RigidRecord::of(regressed)?;
     let motion = machine.signals.motion;
     progress("weak-form least squares");
     let mut result = MethodResult::empty("ls", "Least squares, weak form");
@@ -320,16 +318,15 @@ pub(super) fn identify(
     let unit = Signal::T.unit(motion);
     let mut recommended = None;
     let mut evidence = Evidence::default();
-    let found = weak_in_pieces(&motions).map_err(|e| e.to_string());
-    match found.and_then(|f| physical(f, &shares(&motions))) {
+    let found = weak_in_pieces(&record).map_err(|e| e.to_string());
+    match found.and_then(|f| physical(f, &shares(&record))) {
         Ok(found) => {
             let window = (2 * found.half + 1) as f64 * trace.dt;
             result.formulation =
                 format!("{} in windows of {window:.4} s, theta1 not differentiated", result.formulation);
             let reference = request.reference.then_some(machine.parameters.i1 + machine.parameters.i2);
             let names = ["I", "viscous_motor.coefficient", "coulomb_motor.level", "load_motor.torque"];
-            evidence =
-                Evidence { held_out: held_out(regressed), shares: Some(shares(&motions)), ..Evidence::default() };
+            evidence = Evidence { held_out: held_out(regressed), shares: Some(shares(&record)), ..Evidence::default() };
             for (i, name) in names.into_iter().enumerate() {
                 let r = if i == 0 { reference } else { None };
                 result.parameters.push(Estimate::new(name, units(motion)[i], found.values[i], Some(found.std[i]), r));
@@ -382,6 +379,12 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
+    /// Of a record in one piece that starts at zero.
+    fn identified(torque: &[f64], theta: &[f64], dt: f64) -> Result<Rigid, RigidError> {
+        let pieces = std::iter::once(0..theta.len()).collect::<Vec<_>>();
+        weak_in_pieces(&RigidRecord { torque, theta, dt, pieces: &pieces, starts: &[0.0] })
+    }
+
     #[test]
     fn inertia_and_friction_of_a_rigid_axis_are_found_within_their_standard_errors() {
         // theta given in closed form, so that the torque follows from it exactly: no simulator is involved.
@@ -403,7 +406,7 @@ mod tests {
             let e: f64 = StandardNormal.sample(&mut rng);
             torque.push(i * a + d * v + f * v.signum() + l + 2.0 * e);
         }
-        let found = weak_least_squares(&torque, &theta, dt, 0.0).unwrap();
+        let found = identified(&torque, &theta, dt).unwrap();
         for (k, truth) in [i, d, f, l].into_iter().enumerate() {
             let error = (found.values[k] - truth).abs();
             assert!(error < 4.0 * found.std[k] + 1e-3 * truth.abs(), "{k}: {} +- {}", found.values[k], found.std[k]);
@@ -413,7 +416,7 @@ mod tests {
 
     #[test]
     fn an_axis_that_only_stands_is_refused_by_name() {
-        let error = weak_least_squares(&[1.0; 500], &[0.5; 500], 1e-3, 0.0).unwrap_err().to_string();
+        let error = identified(&[1.0; 500], &[0.5; 500], 1e-3).unwrap_err().to_string();
         assert!(error.contains("the inertia"), "{error}");
     }
 }

@@ -7,13 +7,13 @@ use super::joined::{Joined, noise_in_pieces};
 use super::known::Known;
 use super::methods::Run;
 use super::output_error::OutputError;
-use super::record::{Record, period};
+use super::record::{RegressionRecord, period};
 use super::result::{Identification, MethodResult, Recommendation, SCHEMA, Series, TraceSummary};
 use super::rigid;
 use super::statistics::spectrum;
 use crate::axis::{Hold, Scheme, Structure};
 use crate::numerics::level::rms;
-use crate::trace::{Machine, Motion, Signal, Trace, TraceError};
+use crate::trace::{AxisKind, Machine, Signal, Trace, TraceError};
 
 /// An estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,11 +113,11 @@ pub const fn hold_name(hold: Hold) -> &'static str {
     }
 }
 
-pub(super) fn torque_unit(motion: Motion) -> &'static str {
+pub(super) fn torque_unit(motion: AxisKind) -> &'static str {
     Signal::T.unit(motion)
 }
 
-/// The steps of a work whose number is known: each is told as "n of N".
+/// Progress over a known number of steps: each is reported as "n of N".
 pub(super) struct Steps<'a> {
     done: usize,
     all: usize,
@@ -125,7 +125,7 @@ pub(super) struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    /// `all` steps to come, told to `progress`.
+    /// Of `all` steps, reported to `progress`.
     pub(super) fn new(all: usize, progress: &'a mut dyn FnMut(&str)) -> Self {
         Self { done: 0, all, progress }
     }
@@ -176,12 +176,12 @@ pub fn identify_joined(
         }
     }
     let joined = &joined;
-    // The regressions have no term for what the axis file knows beside the parameters.
+    // The regressions have no term for the effects that the axis file gives.
     let known = Known::of(machine);
     warnings.extend(known.warnings(machine.structure));
     let taken_off = known.taken_off(joined, machine)?;
     let regressed = taken_off.as_ref().unwrap_or(joined);
-    let record = Record::of(regressed, machine.parameters.rho)?;
+    let record = RegressionRecord::of(regressed, machine.parameters.rho)?;
     if record.zero_offset != 0.0 {
         warnings.push(format!(
             "the zeros of the two encoders differ by {:.6} {}: the mean twist was taken off, and output error fits the \
@@ -212,7 +212,7 @@ pub fn identify_joined(
                 measured.as_ref().map_or(0, |m| m.periods),
                 if pieces > 1 { " of its longest piece, the other pieces have no part in it" } else { "" }
             ));
-            Record::new(average, machine.parameters.rho)?
+            RegressionRecord::new(average, machine.parameters.rho)?
         }
         _ => record,
     };
@@ -230,7 +230,7 @@ pub fn identify_joined(
                 .to_owned(),
         );
     }
-    // The derived speeds say nothing that the angles do not.
+    // The derived speeds add nothing to the angles.
     let angles = averaged.as_ref().map(|average| {
         let mut angles = average.clone();
         angles.remove(Signal::Omega1);
@@ -299,7 +299,7 @@ pub fn identify_joined(
     })
 }
 
-/// What to tell of a speed that is left out.
+/// Warning of a speed that is left out; `off` is its relative difference from the derivative of the angle.
 pub(super) fn different_speed(speed: Signal, angle: Signal, off: f64) -> String {
     format!(
         "{speed} is not the derivative of {angle} (they differ by {:.0} %): a filtered, delayed or differently scaled \
@@ -308,7 +308,7 @@ pub(super) fn different_speed(speed: Signal, angle: Signal, off: f64) -> String 
     )
 }
 
-/// How far a logged speed is from the derivative of its angle, relative root mean square: the angle's way over eight
+/// How far a logged speed is from the derivative of its angle, relative root mean square: the travel of the angle over eight
 /// samples against the integral of the speed. Zero where one of them is not logged.
 fn speed_error(joined: &Joined, angle: Signal, speed: Signal) -> f64 {
     const SPAN: usize = 8;
@@ -317,10 +317,10 @@ fn speed_error(joined: &Joined, angle: Signal, speed: Signal) -> f64 {
     let (mut difference, mut size) = (0.0, 0.0);
     for piece in joined.pieces() {
         for k in (piece.start..piece.end.saturating_sub(SPAN)).step_by(SPAN) {
-            let way = x[k + SPAN] - x[k];
+            let travel = x[k + SPAN] - x[k];
             let integral = trace.dt * (v[k..k + SPAN].iter().sum::<f64>() + 0.5 * (v[k + SPAN] - v[k]));
-            difference += (way - integral).powi(2);
-            size += way * way;
+            difference += (travel - integral).powi(2);
+            size += travel * travel;
         }
     }
     if size > 0.0 { (difference / size).sqrt() } else { 0.0 }

@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use super::identifiability::{Evidence, Identifiability};
 use super::lsq::BLOCK;
 use super::parameters::Estimated;
-use super::record::{DIFFERENT_ZEROS, Record};
+use super::record::{DIFFERENT_ZEROS, RegressionRecord};
 use super::regression::{LeastSquares, Moments, Recursion, RegressionError, Scales, Sums};
 use super::result::{History, Identification, MethodResult, Recommendation, SCHEMA, Series, Thinned, TraceSummary};
 use super::run::{DIFFERENT_SPEED, Method, Request, Steps, different_speed, hold_name};
@@ -35,11 +35,14 @@ struct Pending {
     rows: usize,
 }
 
-/// What is known of the record before it is worked on.
+/// The record, and what the first pass found.
 struct Frame<'a> {
     stream: &'a Stream,
+    /// Travel of the table per angle, m/rad.
     rho: f64,
+    /// Added to theta2, rad.
     zero_offset: f64,
+    /// Whether the rows use the logged speeds.
     speeds: bool,
 }
 
@@ -53,8 +56,12 @@ impl Frame<'_> {
         self.stream.len().saturating_sub(self.span())
     }
 
-    /// The rows from the first to the last: `take(record, rows of it, number of the first)`.
-    fn each(&self, mut take: impl FnMut(&Record, usize, usize)) -> Result<(), TraceError> {
+    /// Passes the rows to `take(record, count, first)`, from the first to the last: the first `count` rows of `record` are those from
+    /// number `first` on.
+    ///
+    /// # Errors
+    /// As [`Stream::each`].
+    fn each(&self, mut take: impl FnMut(&RegressionRecord, usize, usize)) -> Result<(), TraceError> {
         let mut pending = Pending::default();
         let total = self.rows();
         self.stream.each(|_, piece| {
@@ -81,9 +88,9 @@ impl Frame<'_> {
     }
 
     /// The pending samples as a record; its times are counted from the start of the whole one.
-    fn record<'a>(&self, pending: &'a Pending) -> Record<'a> {
+    fn record<'a>(&self, pending: &'a Pending) -> RegressionRecord<'a> {
         let frame = self.stream.frame();
-        Record {
+        RegressionRecord {
             torque: &pending.torque,
             theta1: &pending.theta1,
             theta2: Cow::Borrowed(&pending.theta2),
@@ -97,6 +104,10 @@ impl Frame<'_> {
     }
 }
 
+/// Angle of the table in a piece, rad: theta2, or x2 over `rho` (m/rad).
+///
+/// # Errors
+/// When neither is measured.
 fn table_angle(piece: &Trace, rho: f64) -> Result<Cow<'_, [f64]>, TraceError> {
     match (piece.get(Signal::Theta2), piece.get(Signal::X2)) {
         (Some(theta2), _) => Ok(Cow::Borrowed(theta2)),
@@ -105,12 +116,12 @@ fn table_angle(piece: &Trace, rho: f64) -> Result<Cow<'_, [f64]>, TraceError> {
     }
 }
 
-/// The angle's way over eight samples against the integral of the speed, as sums: see `run::speed_error`.
+/// Compares the travel of an angle over eight samples with the integral of the speed, in running sums: see `run::speed_error`.
 #[derive(Default)]
 struct SpeedError {
     angle: Vec<f64>,
     speed: Vec<f64>,
-    way: f64,
+    travel: f64,
     difference: f64,
 }
 
@@ -123,10 +134,10 @@ impl SpeedError {
         let mut k = 0;
         while k + Self::SPAN < self.angle.len() {
             let (x, v) = (&self.angle[k..], &self.speed[k..]);
-            let way = x[Self::SPAN] - x[0];
+            let travel = x[Self::SPAN] - x[0];
             let integral = dt * (v[..Self::SPAN].iter().sum::<f64>() + 0.5 * (v[Self::SPAN] - v[0]));
-            self.difference += (way - integral).powi(2);
-            self.way += way * way;
+            self.difference += (travel - integral).powi(2);
+            self.travel += travel * travel;
             k += Self::SPAN;
         }
         self.angle.drain(..k);
@@ -134,7 +145,7 @@ impl SpeedError {
     }
 
     fn relative(&self) -> f64 {
-        if self.way > 0.0 { (self.difference / self.way).sqrt() } else { 0.0 }
+        if self.travel > 0.0 { (self.difference / self.travel).sqrt() } else { 0.0 }
     }
 }
 
@@ -154,7 +165,7 @@ pub fn identify(
     let wanted = METHODS.into_iter().filter(|m| request.methods.contains(m)).collect::<Vec<_>>();
     let mut steps = Steps::new(2 + wanted.iter().filter(|m| **m != Method::Ls).count(), progress);
     steps.next("zeros and speeds");
-    let (frame, notes) = survey(stream, machine)?;
+    let (frame, notes) = first_pass(stream, machine)?;
     warnings.extend(notes);
     let n = frame.rows();
 
@@ -223,8 +234,11 @@ pub fn identify(
     })
 }
 
-/// The first pass, and what the user should know of it.
-fn survey<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<String>), TraceError> {
+/// Makes the first pass; gives its warnings, too.
+///
+/// # Errors
+/// When a signal is missing or the record cannot be read.
+fn first_pass<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<String>), TraceError> {
     let rho = machine.parameters.rho;
     let dt = stream.frame().dt;
     let (mut sum, mut squares, mut origin) = (0.0, 0.0, None);
@@ -237,7 +251,7 @@ fn survey<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, Vec<S
             let twist = a - b;
             let origin = *origin.get_or_insert(twist);
             sum += twist;
-            // About the first one, so that encoders with far zeros cancel nothing.
+            // About the first twist: no cancellation where the encoders' zeros are far apart.
             squares += (twist - origin).powi(2);
         }
         for (error, (angle, speed)) in speeds.iter_mut().zip(both) {
@@ -324,7 +338,7 @@ mod tests {
     use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
     use crate::effects::Settings;
     use crate::identify::excitation::{Kind, Multisine};
-    use crate::trace::{Mapping, Motion, load, write_csv};
+    use crate::trace::{AxisKind, Mapping, load, write_csv};
 
     /// A record of more than one piece of 8 MiB, noisy angles, encoders with zeros of their own.
     fn record(path: &std::path::Path, speeds: bool) {
@@ -354,7 +368,7 @@ mod tests {
             trace.set(Signal::Omega1, noisy(0.0, 1e-4, r.iter().map(|r| r.omega1).collect())).unwrap();
             trace.set(Signal::Omega2, noisy(0.0, 1e-4, r.iter().map(|r| r.omega2).collect())).unwrap();
         }
-        write_csv(path, &trace, Motion::Rotary).unwrap();
+        write_csv(path, &trace, AxisKind::Rotary).unwrap();
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Tables 1 to 5 of the paper, computed again beside the paper's own figures, with what agrees and what cannot.
+//! Tables 1 to 5 of the paper, computed again and compared with the paper's own figures: what agrees, and what cannot.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::excitation::{Kind, Multisine};
 use super::extended::extended_recursive;
 use super::paper::{self, Rule};
 use super::parameters::Estimated;
-use super::record::Record;
+use super::record::RegressionRecord;
 use super::regression::{RegressionError, least_squares, recursive};
 use crate::axis::{
     Hold, Parameters, PhysicalData, Scheme, SimulateOptions, Structure, dt_criterion, period_elongation, simulate,
@@ -156,9 +156,9 @@ type Column = (String, Estimated);
 
 fn columns() -> Result<Vec<Column>, TablesError> {
     let trace = experiment(LINES)?;
-    let record = Record::new(&trace, 1.0)?;
+    let record = RegressionRecord::new(&trace, 1.0)?;
     let ten = experiment(10)?;
-    let few = Record::new(&ten, 1.0)?;
+    let few = RegressionRecord::new(&ten, 1.0)?;
     Ok(vec![
         ("LS, Euler".to_owned(), paper::least_squares(&record, Rule::Euler)?),
         ("RLS, Euler".to_owned(), paper::recursive(&record, Rule::Euler, 1.0, P0, false)?.0),

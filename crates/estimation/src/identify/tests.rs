@@ -7,7 +7,7 @@ use super::excitation::{Kind, Multisine};
 use super::extended::{extended_batch, extended_recursive};
 use super::instrumental::instrumental;
 use super::output_error::{Free, OutputError};
-use super::record::Record;
+use super::record::RegressionRecord;
 use super::regression::{least_squares, recursive};
 use crate::axis::{Hold, Parameters, Scheme, SimulateOptions, Structure, simulate};
 use crate::effects::Settings;
@@ -76,7 +76,7 @@ fn the_record_of_the_tests_is_the_oracles() {
 #[test]
 fn both_rows_of_least_squares_are_numpys() {
     let trace = oracle();
-    let record = Record::new(&trace, 1.0).unwrap();
+    let record = RegressionRecord::new(&trace, 1.0).unwrap();
     let rows = super::regression::rows(&record).unwrap();
     let motor = [77.649_028_777_912_13, 2.424_557_984_792_955, 4_226.003_700_140_788];
     assert_close(rows.motor.as_slice(), &motor, 1e-8, "motor");
@@ -146,7 +146,7 @@ fn every_method_recovers_the_noise_free_parameters_of_newmark_data_under_either_
         positions.remove(Signal::Omega1);
         positions.remove(Signal::Omega2);
         for trace in [&full, &positions] {
-            let record = Record::new(trace, 1.0).unwrap();
+            let record = RegressionRecord::new(trace, 1.0).unwrap();
             let what = format!("{hold:?}, {}", record.equations());
             let outputs = OutputError::new(trace, 1.0, Structure::TwoInertia, Settings::default()).unwrap();
             let ls = least_squares(&record).unwrap();
@@ -179,7 +179,7 @@ fn under_noise_iv_and_oe_stay_within_their_standard_errors_where_ls_is_biased() 
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(40 + i as u64);
         (0..n).map(|_| -> f64 { StandardNormal.sample(&mut rng) }).map(|e| 1e-2 * sizes[i] * e).collect()
     });
-    let record = Record::new(&noisy, 1.0).unwrap();
+    let record = RegressionRecord::new(&noisy, 1.0).unwrap();
     let outputs = OutputError::new(&noisy, 1.0, Structure::TwoInertia, Settings::default()).unwrap();
     let within = |e: &super::parameters::Estimated, what: &str| {
         let std = e.covariance.unwrap().diagonal().map(f64::sqrt);
@@ -284,7 +284,7 @@ fn intervals_of_every_regression_cover_the_truth_under_coloured_noise() {
     let mut white = [0_u32; 3];
     for seed in 0..RUNS {
         let (trace, p) = disturbed(seed);
-        let record = Record::new(&trace, 1.0).unwrap();
+        let record = RegressionRecord::new(&trace, 1.0).unwrap();
         let outputs = OutputError::new(&trace, 1.0, Structure::TwoInertia, Settings::default()).unwrap();
         // The rounds of batch ELS need not converge on noise that its model cannot be.
         let found = [

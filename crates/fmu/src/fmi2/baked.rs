@@ -6,7 +6,7 @@
 
 #![allow(unsafe_code)]
 
-use crate::axis::Motion;
+use crate::axis::AxisKind;
 use crate::variables::Causality;
 use crate::variables::{COUNT, Model, Starts};
 
@@ -56,7 +56,7 @@ pub(crate) fn starts() -> Starts {
     // SAFETY: the pointer is to a static, valid and aligned. Volatile, because an export has perhaps changed the bytes
     // after the compiler saw them; every pattern of bits is a valid `u64` and `f64`.
     let block = unsafe { (&raw const BLOCK).read_volatile() };
-    let motion = if block.motion == 1 { Motion::Linear } else { Motion::Rotary };
+    let motion = if block.motion == 1 { AxisKind::Linear } else { AxisKind::Rotary };
     let model = if block.model == Model::Drive as u64 { Model::Drive } else { Model::Axis };
     Starts { model, values: block.values, motion }
 }

@@ -4,7 +4,7 @@ use std::array;
 
 use super::{COUNT, FIXED, Model, Slot, all};
 use super::{DriveSlot, NO_LIMIT};
-use crate::axis::{Motion, Parameters, Scheme, Structure};
+use crate::axis::{AxisKind, Parameters, Scheme, Structure};
 use crate::drive::Gains;
 use crate::effects::{PARAMETERS, Settings};
 use crate::scalar::Scalar;
@@ -17,7 +17,7 @@ pub struct Starts {
     /// One a variable, in the order of the model's table; what is left over is zero.
     pub values: [f64; COUNT],
     /// Units of the axis.
-    pub motion: Motion,
+    pub motion: AxisKind,
 }
 
 impl Default for Starts {
@@ -27,14 +27,14 @@ impl Default for Starts {
         for (value, variable) in values.iter_mut().zip(all()) {
             *value = variable.start.unwrap_or(0.0);
         }
-        Self { model: Model::Axis, values, motion: Motion::Rotary }
+        Self { model: Model::Axis, values, motion: AxisKind::Rotary }
     }
 }
 
 impl Starts {
     /// The start values of a machine.
     #[must_use]
-    pub fn of(parameters: &Parameters, structure: Structure, effects: &Settings, motion: Motion) -> Self {
+    pub fn of(parameters: &Parameters, structure: Structure, effects: &Settings, motion: AxisKind) -> Self {
         let mut starts = Self { motion, ..Self::default() };
         let mut put = |slot: Slot, value: f64| starts.values[slot as usize] = value;
         put(Slot::I1, parameters.i1);
@@ -49,7 +49,7 @@ impl Starts {
 
     /// The start values of a drive with a sampling interval of `dt` s, for an axis with a lead of `rho`.
     #[must_use]
-    pub fn drive(gains: &Gains, rho: f64, dt: f64, motion: Motion) -> Self {
+    pub fn drive(gains: &Gains, rho: f64, dt: f64, motion: AxisKind) -> Self {
         let mut starts = Self { model: Model::Drive, values: [0.0; COUNT], motion };
         for (slot, value) in [
             (DriveSlot::Kp, gains.kp),
@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(values.effects(), Settings::default());
         assert_eq!(values.structure(), Structure::TwoInertia);
         assert_eq!(values.scheme(), Scheme::NEWMARK);
-        let of = Starts::of(&Parameters::PAPER, Structure::TwoInertia, &Settings::default(), Motion::Rotary);
+        let of = Starts::of(&Parameters::PAPER, Structure::TwoInertia, &Settings::default(), AxisKind::Rotary);
         assert_eq!(of, Starts::default());
     }
 }

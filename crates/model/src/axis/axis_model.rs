@@ -57,7 +57,7 @@ impl<S: Scalar> Axis<S> {
         self.full.whole.step.h().re()
     }
 
-    /// The state with these angles and speeds at `time`, everything else at rest.
+    /// The state with these angles (rad) and speeds (rad/s) at `time` s, everything else at rest.
     pub fn state(&self, theta1: S, omega1: S, theta2: S, omega2: S, time: f64) -> State<S> {
         let linear = match self.full.structure {
             Structure::TwoInertia => [theta1, omega1, theta1 - theta2, omega1 - omega2],
@@ -76,7 +76,7 @@ impl<S: Scalar> Axis<S> {
         state
     }
 
-    /// The same with the effects' internal states of another state, as at the seam of two windows of one record.
+    /// The same with the effects' internal states of another state: where one window of a record continues another.
     pub fn resume(&self, [theta1, omega1, theta2, omega2]: [S; 4], internals: &Memory<S>, time: f64) -> State<S> {
         let mut state = self.state(theta1, omega1, theta2, omega2, time);
         state.memory = *internals;

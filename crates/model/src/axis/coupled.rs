@@ -1,12 +1,12 @@
 //! Effects on both inertias together with sticking friction: two equations of two unknowns.
 
 use super::axis_model::State;
-use super::mechanics::{Mechanics, Motions, motions};
+use super::mechanics::{AxisKinematics, Mechanics, motions};
 use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::{Linear, Propagator};
 use super::segment::{Segment, before};
 use super::stick::StickTorques;
-use crate::effects::{Forces, Internal, Internals, Memory, Motion, StepMotion, memory_of};
+use crate::effects::{Forces, Internal, Internals, Kinematics, Memory, StepMotion, memory_of};
 use crate::scalar::Scalar;
 
 /// The equations of the torques on both inertias, with the friction that sticks.
@@ -15,7 +15,7 @@ pub(super) struct Coupled<'a, S> {
     stick: StickTorques<S>,
     step: &'a Propagator<S>,
     from: &'a State<S>,
-    start: Motions<S>,
+    start: AxisKinematics<S>,
     tau0: [S; 2],
     tau1: [S; 2],
     /// The end without torques there.
@@ -53,7 +53,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
         self.state(force, force, memory)
     }
 
-    /// The end that the torques `led` lead to, and the torques `found` that the laws give there, N.m.
+    /// The state at the end under the torques `led`, N.m; `found` are the torques that the laws give there, N.m.
     fn state(&self, led: [S; 2], found: [S; 2], memory: Memory<S>) -> State<S> {
         let (linear, friction) = self.end(led);
         State { linear, friction, force: found, memory, ..*self.from }
@@ -106,7 +106,7 @@ impl<S: Scalar> TorqueEquations<S, 2> for Coupled<'_, S> {
         let end = motions(&self.end([torque[0] - less[0], torque[1] - less[1]]).0);
         for effect in remembering() {
             let i = effect.info().place.coordinate() as usize;
-            let moved = Motion { x: end[i].x - there[i].x, v: end[i].v - there[i].v };
+            let moved = Kinematics { x: end[i].x - there[i].x, v: end[i].v - there[i].v };
             memory_of(*effect).for_each(|i| memory[i] = internals[i].after(&moved));
         }
     }

@@ -4,11 +4,13 @@ use super::axis_model::State;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
 use super::propagator::{Compliance, Linear, Propagator};
-use crate::effects::{ActiveEffects, Base, Coordinate, Effect, Internal, Motion, Place, Settings, Slip, StepMotion};
+use crate::effects::{
+    ActiveEffects, Base, Coordinate, Effect, Internal, Kinematics, Place, Settings, Slip, StepMotion,
+};
 use crate::scalar::Scalar;
 
 /// Motion of motor, table and twist.
-pub type Motions<S> = [Motion<S>; 3];
+pub type AxisKinematics<S> = [Kinematics<S>; 3];
 
 const PLACES: [Place; 2] = [Place::Motor, Place::Table];
 
@@ -39,7 +41,7 @@ pub(super) struct Length<S> {
     pub step: Propagator<S>,
     /// Prepared for the step that nothing ends early.
     pub compliance: Option<Compliance>,
-    /// Response of the end of the step to a unit of the single law's torque there, against it.
+    /// What one N.m less of the single law's torque at the end of the step adds to the state there, rad and rad/s.
     pub response: Linear<S>,
 }
 
@@ -124,7 +126,7 @@ impl<S: Scalar> Mechanics<S> {
         if pull.re() > gap.re() { pull } else { gap }
     }
 
-    /// The side of contact that belongs to the twist: the one beyond whose end it is, if that side pushes.
+    /// Sets the side of contact by the twist: the end of the gap that the twist is beyond, if the contact pushes there.
     pub fn set_contact(&self, s: &mut State<S>) {
         if self.backlash {
             let side = s.linear[2].re().signum() as i8;
@@ -162,15 +164,15 @@ impl<S: Scalar> Length<S> {
 
 /// The motion of one coordinate.
 #[inline]
-pub(super) fn motion<S: Scalar>(l: &Linear<S>, of: Coordinate) -> Motion<S> {
+pub(super) fn motion<S: Scalar>(l: &Linear<S>, of: Coordinate) -> Kinematics<S> {
     match of {
-        Coordinate::Motor => Motion { x: l[0], v: l[1] },
-        Coordinate::Table => Motion { x: l[0] - l[2], v: l[1] - l[3] },
-        Coordinate::Twist => Motion { x: l[2], v: l[3] },
+        Coordinate::Motor => Kinematics { x: l[0], v: l[1] },
+        Coordinate::Table => Kinematics { x: l[0] - l[2], v: l[1] - l[3] },
+        Coordinate::Twist => Kinematics { x: l[2], v: l[3] },
     }
 }
 
 /// The motion of all three.
-pub(super) fn motions<S: Scalar>(l: &Linear<S>) -> Motions<S> {
+pub(super) fn motions<S: Scalar>(l: &Linear<S>) -> AxisKinematics<S> {
     [Coordinate::Motor, Coordinate::Table, Coordinate::Twist].map(|of| motion(l, of))
 }

@@ -29,9 +29,9 @@ mod stick;
 pub use along::TorqueChange;
 pub use axis_model::{Axis, State};
 pub use criterion::{dt_criterion, period_elongation};
-pub use mechanics::Motions;
+pub use mechanics::AxisKinematics;
 pub use oscillator::Scheme;
-pub use parameters::{Modal, Motion, ParameterError, Parameters, PhysicalData, Structure};
+pub use parameters::{AxisKind, Modal, ParameterError, Parameters, PhysicalData, Structure};
 pub use propagator::{Linear, Propagator};
 pub use simulate::{Hold, Response, SimulateOptions, simulate, substeps, substeps_at_speed};
 

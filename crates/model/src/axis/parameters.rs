@@ -31,7 +31,7 @@ pub enum Structure {
 
 /// Whether the axis is described in rotary units (kg.m2, rad, N.m) or by the paper's linear analogue (kg, m, N).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Motion {
+pub enum AxisKind {
     /// Inertias in kg.m2, angles in rad, torques in N.m.
     #[default]
     Rotary,
@@ -39,8 +39,8 @@ pub enum Motion {
     Linear,
 }
 
-impl Motion {
-    /// The unit that stands for one of the rotary axis: an angle becomes a length, a torque a force, an inertia a mass.
+impl AxisKind {
+    /// The unit on this kind of axis in place of one of the rotary axis: an angle becomes a length, a torque a force, an inertia a mass.
     #[must_use]
     pub fn unit(self, rotary: &'static str) -> &'static str {
         const LINEAR: [(&str, &str); 11] = [

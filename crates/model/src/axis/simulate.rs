@@ -53,7 +53,7 @@ pub struct Response<S = f64> {
     pub accelerations: Vec<[S; 2]>,
 }
 
-/// Steps per sample for the effects at hand: one for the linear axis under [`Scheme::Exact`]; with effects on the
+/// Steps per sample of `dt` s for the effects at hand: one for the linear axis under [`Scheme::Exact`]; with effects on the
 /// motion, so many that the fastest mode turns by no more than a quarter of a radian per step.
 #[must_use]
 pub fn substeps(p: &Parameters<f64>, structure: Structure, effects: &Settings<f64>, dt: f64) -> usize {
@@ -93,7 +93,7 @@ pub fn substeps_at_speed(
     ((rate * dt / 0.25).ceil() as usize).clamp(1, 16)
 }
 
-/// Simulates the axis from `initial` under `torque` (one value a sample, N.m).
+/// Simulates the axis from `initial`, `[theta1, omega1, theta2, omega2]` in rad and rad/s, under `torque` (one value a sample, N.m).
 ///
 /// The readings hold one entry per sample, the first of them the initial state.
 #[must_use]

@@ -7,7 +7,9 @@ use super::mechanics::{Mechanics, motion};
 use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::Linear;
 use super::segment::{Segment, before};
-use crate::effects::{Coordinate, Effect, Internal, Law, MEMORY_OF_ONE, Memory, Moment, Motion, WithLaw, memory_of};
+use crate::effects::{
+    Coordinate, Effect, Internal, Kinematics, Law, MEMORY_OF_ONE, Memory, Moment, WithLaw, memory_of,
+};
 use crate::scalar::Scalar;
 
 /// The state at the end of a segment.
@@ -68,8 +70,8 @@ struct SingleLaw<'a, S, L> {
     /// The end without the torque there.
     free: Linear<S>,
     /// The same along the law's coordinate, and its derivative to the torque, with the sign turned.
-    end: Motion<S>,
-    per_torque: Motion<S>,
+    end: Kinematics<S>,
+    per_torque: Kinematics<S>,
     law: PhantomData<L>,
 }
 
@@ -83,7 +85,7 @@ impl<'a, S: Scalar, L: Law> SingleLaw<'a, S, L> {
         Self { mechanics, effect, from, segment, free, end, per_torque, law: PhantomData }
     }
 
-    /// The end that the torque `led` leads to, and the torque `found` that the law gives there, N.m.
+    /// The state at the end under the torque `led`, N.m; `found` is the torque that the law gives there, N.m.
     #[inline]
     fn state(&self, led: S, found: S, memory: Memory<S>) -> State<S> {
         let linear = std::array::from_fn(|i| self.free[i] - self.segment.length.response[i] * led);
@@ -118,7 +120,7 @@ impl<S: Scalar, L: Law> TorqueEquations<S, 1> for SingleLaw<'_, S, L> {
         };
         let moment = Moment {
             start: motion(&from.linear, L::COORDINATE),
-            end: Motion { x: end.x - per.x * torque, v: end.v - per.v * torque },
+            end: Kinematics { x: end.x - per.x * torque, v: end.v - per.v * torque },
             time: segment.end,
             h: segment.length.step.h(),
             contact: from.modes.contact,
@@ -137,7 +139,7 @@ impl<S: Scalar, L: Law> TorqueEquations<S, 1> for SingleLaw<'_, S, L> {
     #[inline]
     fn remember(&self, internals: &Self::Internals, _torque: [S; 1], [less]: [S; 1], memory: &mut Memory<S>) {
         let per = &self.per_torque;
-        let moved = Motion { x: per.x * less, v: per.v * less };
+        let moved = Kinematics { x: per.x * less, v: per.v * less };
         let own = &mut memory[memory_of(self.effect)];
         for (state, internal) in own.iter_mut().zip(&internals[..L::MEMORY]) {
             *state = internal.after(&moved);

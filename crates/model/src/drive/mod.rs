@@ -10,7 +10,7 @@
 //! not grow while it would drive the limited torque further into its limit (conditional integration: Astrom and
 //! Hagglund, Advanced PID Control, 2006, section 3.5).
 
-/// What a drive is set to, in the units of an axis: rad and N.m, or m and N.
+/// Settings of a drive, in the units of an axis: rad and N.m, or m and N.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
     /// Position gain, 1/s.

@@ -9,7 +9,7 @@ impl<S: Scalar> Settings<S> {
     /// A history of the encoders in which the axis has coasted up to `motion`, sampled every `dt` seconds.
     #[must_use]
     pub fn initial_readings(&self, on: &ActiveEffects, motion: Reading<S>, dt: f64) -> SensorHistory<S> {
-        SensorHistory::settled(motion, dt, self.filter(on))
+        SensorHistory::coasting(motion, dt, self.filter(on))
     }
 
     /// Appends the motion of the next sample, as long after the last one as that after its own.

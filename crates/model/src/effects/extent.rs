@@ -1,4 +1,4 @@
-//! What a record extends over: the measure of what physics lets an effect be on it.
+//! The extent of a record: by it the physical bounds of an effect's parameters are checked.
 
 /// The extent of a record's motion and torque on the side where an effect acts, SI units.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +11,7 @@ pub struct Extent<'a> {
     pub speed: f64,
     /// Largest speed of that side, rad/s.
     pub fastest: f64,
-    /// Speed of that side below which a fifth of its way is gone, rad/s.
+    /// Speed of that side below which it covers a fifth of its path, rad/s.
     pub slow: f64,
     /// Rms twist, rad.
     pub twist: f64,
@@ -29,17 +29,17 @@ pub struct Extent<'a> {
     pub stiffness: f64,
     /// Most that friction can have taken out of the axis over the record, J: the work of the torque, and what was stored before.
     pub energy: f64,
-    /// Way of that side to and fro, rad, and its reversals.
+    /// Length of that side's path to and fro, rad, and its number of reversals.
     pub way: (f64, f64),
 }
 
-/// Share of the energy that friction may seem to have taken beyond what there was: torque and way are measured.
+/// Factor by which the energy that friction took may seem to exceed what there was: torque and path are measured.
 const MEASURED: f64 = 1.5;
 /// Least share of the record over which a coupling with play is in contact: one that never closes couples nothing.
 const CONTACT: f64 = 0.1;
 /// Least number of periods that make a frequency: a torque with fewer changes slowly, as a transient does.
 const PERIODS: f64 = 3.0;
-/// Least amplitude of a torque that repeats, over the largest torque: no drive knows its own better.
+/// Least amplitude of a periodic torque, over the largest torque: the accuracy of a drive's torque.
 const KNOWN: f64 = 1e-3;
 
 /// Share of sorted values that lie beyond two of them.
@@ -102,9 +102,9 @@ impl Extent<'_> {
         omega <= self.band && omega * self.length >= PERIODS * std::f64::consts::TAU
     }
 
-    /// Whether a period of the angle, an order in 1/rad, is there to be seen: nearly once over the travel, and in the band on a fifth of the
-    /// way. An axis that never reverses is slow as it starts and stops alone, where friction has a shape of its own: there at its rms
-    /// speed.
+    /// Whether a torque that is periodic in the angle, of an order in 1/rad, can be observed: nearly one period lies within the travel, and
+    /// its frequency is in the band over a fifth of the path. An axis that never reverses is slow only where it starts and stops, and
+    /// friction has a shape of its own there: its rms speed counts instead.
     #[must_use]
     pub fn turns(&self, order: f64) -> bool {
         let (_, reversals) = self.way;

@@ -4,15 +4,15 @@ use super::active::ActiveEffects;
 use super::info::Place;
 use super::law::slip;
 use super::settings::{Internals, MEMORY_OF_ONE, Memory, Settings, memory_of};
-use super::shapes::{Base, Coordinate, Internal, Modes, Moment, Motion, Reaction, Slip};
+use super::shapes::{Base, Coordinate, Internal, Kinematics, Modes, Moment, Reaction, Slip};
 use super::{Effect, Law, WithLaw};
 use crate::scalar::Scalar;
 
 /// Motion of both inertias at the start and at the trial end of a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepMotion<S> {
-    pub start: [Motion<S>; 3],
-    pub end: [Motion<S>; 3],
+    pub start: [Kinematics<S>; 3],
+    pub end: [Kinematics<S>; 3],
     pub time: f64,
     pub h: S,
     pub modes: Modes,
@@ -183,7 +183,7 @@ mod tests {
             let settings = shown(effect);
             for (x, v, contact) in [(0.3, 1.7, 0), (-0.2, -0.6, 1), (2.0, 0.4, -1)] {
                 let reaction = |dx: f64, dv: f64| {
-                    let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
+                    let (start, end) = (Kinematics { x: x - 2e-3, v }, Kinematics { x: x + dx, v: v + dv });
                     let moment = Moment { start, end, time: 0.7, h: 1e-3, contact, slides: 0.0, load: 0.0 };
                     settings.reaction(effect, &base, &moment, &mut [Internal::at(0.1); MEMORY])
                 };
@@ -208,7 +208,7 @@ mod tests {
             let settings = shown(effect);
             for (x, v) in [(0.3, 1.7), (-0.2, -0.6), (2.0, 0.4)] {
                 let end = |dx: f64, dv: f64| {
-                    let (start, end) = (Motion { x: x - 2e-3, v }, Motion { x: x + dx, v: v + dv });
+                    let (start, end) = (Kinematics { x: x - 2e-3, v }, Kinematics { x: x + dx, v: v + dv });
                     let moment = Moment { start, end, time: 0.7, h: 1e-3, contact: 0, slides: 0.0, load: 0.0 };
                     let mut memory = [Internal::at(0.1); MEMORY];
                     settings.reaction(effect, &base, &moment, &mut memory);

@@ -3,12 +3,12 @@
 use super::family::Family;
 use super::info::{ParameterInfo, Place, Start};
 use super::{Effect, Length};
-use crate::axis::{Motion, Structure};
+use crate::axis::{AxisKind, Structure};
 
 impl ParameterInfo {
-    /// Its unit on an axis of that motion; a phase is an angle on every one.
+    /// Its unit on that kind of axis; a phase is an angle on both.
     #[must_use]
-    pub fn unit_on(&self, motion: Motion) -> &'static str {
+    pub fn unit_on(&self, motion: AxisKind) -> &'static str {
         if matches!(self.start, Start::Phase) { self.unit } else { motion.unit(self.unit) }
     }
 }
@@ -17,9 +17,9 @@ impl Effect {
     /// Whether the effect can be identified from a record of an axis of that structure and motion: a rigid one has no coupling and no second
     /// encoder, and of two laws that differ by their side alone the motor's stands for both; a weight on a slide pulls alike everywhere.
     #[must_use]
-    pub fn may_be_named(self, structure: Structure, motion: Motion) -> bool {
+    pub fn may_be_named(self, structure: Structure, motion: AxisKind) -> bool {
         let info = self.info();
-        if !info.named || (motion == Motion::Linear && info.family == Family::Gravity) {
+        if !info.named || (motion == AxisKind::Linear && info.family == Family::Gravity) {
             return false;
         }
         if structure == Structure::TwoInertia {
@@ -33,13 +33,13 @@ impl Effect {
         }
     }
 
-    /// The effect that a common factor of every parameter of the axis comes to, and its parameter.
+    /// The effect that scales every parameter of the axis by one factor, and its parameter: a wrong torque constant.
     #[must_use]
     pub fn of_gain() -> Option<(Self, usize)> {
         super::EFFECTS.iter().find_map(|e| Some((*e, e.gain_parameter()?)))
     }
 
-    /// Radians of its torque's phase in a radian of its place, of a torque that repeats with the angle.
+    /// Order of a torque that is periodic in the angle: radians of its phase per radian at its place. `None` of any other.
     #[must_use]
     pub fn order(self, values: &[f64]) -> Option<f64> {
         match self.length()? {
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn a_phase_is_an_angle_on_a_linear_axis_too() {
         let ripple = Effect::TorqueRipple.info();
-        let units: Vec<&str> = ripple.parameters.iter().map(|p| p.unit_on(Motion::Linear)).collect();
+        let units: Vec<&str> = ripple.parameters.iter().map(|p| p.unit_on(AxisKind::Linear)).collect();
         assert_eq!(units, ["N", "1/m", "rad"]);
     }
 }

@@ -189,14 +189,14 @@ pub struct EffectInfo {
     pub parameters: &'static [ParameterInfo],
     /// Number of internal states (force effects).
     pub memory: usize,
-    /// Whether a diagnosis may name it; what another verdict covers or what is read off the log's resolution is not fitted.
+    /// Whether a diagnosis may name it. Not so: what another verdict covers, and what is known from the log's resolution.
     pub named: bool,
     /// Whether it belongs to the textbook's friction model, which the regression of a rigid axis estimates and whose combinations a
     /// diagnosis always compares.
     pub textbook: bool,
-    /// How often it is the cause before any record speaks, against another effect of the list.
+    /// Prior odds that it is the cause, relative to the other effects of the list.
     pub odds: f64,
-    /// Whether parameters are what physics lets the effect be on a record.
+    /// Whether parameters are physically possible on a record of this extent.
     pub bounds: fn(&[f64], &Extent<'_>) -> bool,
     /// Its parameters at a size that shows on the paper's axis: what every effect is tested with.
     pub example: &'static [f64],

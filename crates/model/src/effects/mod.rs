@@ -36,7 +36,7 @@ pub(crate) use settings::{Internals, MEMORY_OF_ONE};
 pub use settings::{MEMORY, Memory, PARAMETERS, Settings, memory_of};
 pub(crate) use shapes::Modes;
 pub use shapes::{
-    Base, Coordinate, DryFriction, Force, Input, Internal, Length, Level, Moment, Motion, Reaction, Sensor, Slip,
+    Base, Coordinate, DryFriction, Force, Input, Internal, Kinematics, Length, Level, Moment, Reaction, Sensor, Slip,
 };
 
 use side::{Motor, Table};
@@ -104,7 +104,7 @@ macro_rules! effects {
                 match self { $(Self::$name => when!(input, $shape, true, false),)* }
             }
 
-            /// Whether it runs along a loop: its one internal state is where it stands there, -1 to 1.
+            /// Whether it is a hysteresis loop: its one internal state is the position on the loop, -1 to 1.
             #[must_use]
             pub const fn loops(self) -> bool {
                 self.info().memory == 1

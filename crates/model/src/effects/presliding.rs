@@ -61,7 +61,7 @@ impl<I: Side> Force for Presliding<I> {
         let per_speed = m.h * 0.5 / p[1];
         let dx = per_speed * (m.start.v + m.end.v);
         let towards = if dx.re() < 0.0 { -1.0 } else { 1.0 };
-        // What the bristle lacks of sliding that way: dz/dx = 1 - sgn(dx)*z.
+        // Distance of the bristle from steady sliding in that direction: dz/dx = 1 - sgn(dx)*z.
         let lack = (S::from(1.0) - z.start * towards) * (-dx.abs()).exp();
         z.set_end(S::from(towards) - lack * towards, 0.0, lack.re() * per_speed.re());
         // The bristle's rate over the speed at the end; that may have turned since.

@@ -40,7 +40,7 @@ impl<S: Scalar> SensorHistory<S> {
     /// A history in which the axis has coasted up to `motion` at its present speed, sampled every `dt` seconds; `filter` is
     /// the encoders' time constant, s.
     #[must_use]
-    pub(super) fn settled(motion: Reading<S>, dt: f64, filter: S) -> Self {
+    pub(super) fn coasting(motion: Reading<S>, dt: f64, filter: S) -> Self {
         let mut past = [motion; LONGEST];
         for (k, slot) in past.iter_mut().enumerate() {
             let ago = filter + (LONGEST - 1 - k) as f64 * dt;
@@ -349,7 +349,7 @@ mod tests {
     fn a_cubic_motion_is_read_back_exactly_over_samples_of_many_lengths() {
         // Hermite interpolation is exact for cubics.
         let at = |t: f64| Reading { theta2: t * t * t - 2.0 * t, omega2: 3.0 * t * t - 2.0, ..Reading::default() };
-        let mut history = SensorHistory::settled(at(0.0), 0.1, 0.0);
+        let mut history = SensorHistory::coasting(at(0.0), 0.1, 0.0);
         let mut t = 0.0;
         for k in 0..30 {
             let gap = [0.1, 0.03, 0.07][k % 3];

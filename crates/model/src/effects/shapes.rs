@@ -42,7 +42,7 @@ impl Place {
 
 /// Position and velocity of the coordinate an effect sees: `theta1`, `theta2`, or the twist `theta1 - theta2`.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Motion<S> {
+pub struct Kinematics<S> {
     /// Position, rad.
     pub x: S,
     /// Velocity, rad/s.
@@ -85,9 +85,9 @@ impl Modes {
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<S> {
     /// Motion at the start, committed.
-    pub start: Motion<S>,
+    pub start: Kinematics<S>,
     /// Motion at the end, on trial.
-    pub end: Motion<S>,
+    pub end: Kinematics<S>,
     /// Time at the end, s.
     pub time: f64,
     /// Length of the step, s; zero asks for the force at the start itself.
@@ -130,26 +130,26 @@ pub struct Internal<S> {
     /// At the end, on trial.
     pub end: S,
     /// Derivative of the end to the position and to the velocity at the end of the step.
-    pub per: Motion<f64>,
+    pub per: Kinematics<f64>,
 }
 
 impl<S: Scalar> Internal<S> {
     /// A state that stays as it is.
     #[inline]
     pub fn at(start: S) -> Self {
-        Self { start, end: start, per: Motion::default() }
+        Self { start, end: start, per: Kinematics::default() }
     }
 
     /// Sets the end on trial, and its derivative to position and velocity there.
     #[inline]
     pub fn set_end(&mut self, end: S, x: f64, v: f64) {
         self.end = end;
-        self.per = Motion { x, v };
+        self.per = Kinematics { x, v };
     }
 
     /// The end on trial, corrected to first order for a move `moved` of the end of the step.
     #[inline]
-    pub(crate) fn after(&self, moved: &Motion<S>) -> S {
+    pub(crate) fn after(&self, moved: &Kinematics<S>) -> S {
         self.end + moved.x * self.per.x + moved.v * self.per.v
     }
 }

@@ -6,7 +6,7 @@ use super::info::Place;
 pub trait Side {
     /// Its place in the chain.
     const PLACE: Place;
-    /// Its place in a pair of what differs between the two, the motor's first.
+    /// Its index in a pair of values for the two sides, the motor's first.
     const INDEX: usize;
 }
 

@@ -4,10 +4,11 @@ use memchr::{memchr_iter, memrchr};
 
 use super::{Format, is_data, number, trim};
 
-/// Rows before the last that tell how numbers are written.
+/// Rows before the last by which it is found how many decimals the numbers have.
 const ROWS: usize = 16;
 
-/// How much of a body is whole rows, bytes; and the text of the last row where that is cut. `begins`: whether no row is before it.
+/// Length of the complete rows of a body, bytes, and the text of the last row where it is cut off. `begins`: whether the body holds the
+/// first row of the file.
 pub(in super::super) fn whole(body: &[u8], format: &Format, begins: bool) -> (usize, Option<String>) {
     let mut end = body.trim_ascii_end().len();
     // Some exports end in a line of their own.
@@ -23,11 +24,11 @@ pub(in super::super) fn whole(body: &[u8], format: &Format, begins: bool) -> (us
     if !is_data(line) || (begins && before.is_empty()) || !is_cut(line, end < body.len(), &before, format) {
         return (body.len(), None);
     }
-    (start, Some(told(trim(line))))
+    (start, Some(excerpt(trim(line))))
 }
 
-/// Whether the last of some rows is cut, whose words are set apart by blanks and are as many in each. `ended`: whether its line has an end.
-pub(in super::super) fn last_of_words(rows: &[&str], ended: bool) -> bool {
+/// Whether the last of some rows with fields separated by blanks is cut off. `ended`: whether its line has an end.
+pub(in super::super) fn is_last_row_cut(rows: &[&str], ended: bool) -> bool {
     let [before @ .., last] = rows else { return false };
     let joined = |row: &&str| row.split_whitespace().collect::<Vec<_>>().join(" ").into_bytes();
     let Some(columns) = before.first().map(|row| row.split_whitespace().count()) else { return false };
@@ -37,7 +38,8 @@ pub(in super::super) fn last_of_words(rows: &[&str], ended: bool) -> bool {
     is_cut(&joined(last), ended, &nearest, &format)
 }
 
-/// Whether a last row is cut, beside the rows before it: it is short or, where its line has no end, its last number breaks off.
+/// Whether a last row is cut off, compared with the rows before it (the nearest first): it has fewer fields or, where its line has no end,
+/// a last number with fewer decimals.
 fn is_cut(line: &[u8], ended: bool, before: &[&[u8]], format: &Format) -> bool {
     let fields = separators(line, format) + 1;
     if fields != format.columns {
@@ -69,13 +71,13 @@ fn separators(line: &[u8], format: &Format) -> usize {
     memchr_iter(format.separator, line).filter(|at| !quoted(*at)).count()
 }
 
-/// The text of a row that was left out, as it is told.
-pub(in super::super) fn told(row: &[u8]) -> String {
+/// Beginning of the text of a row that was left out, for the warning.
+pub(in super::super) fn excerpt(row: &[u8]) -> String {
     String::from_utf8_lossy(row).chars().take(40).collect()
 }
 
-/// What is said of a last row that was left out.
-pub(in super::super) fn word(file: &str, line: usize, text: &str) -> String {
+/// Warning of a last row that was left out; `line` counts from 1.
+pub(in super::super) fn cut_warning(file: &str, line: usize, text: &str) -> String {
     format!(
         "{file}: row {line}, the last, is cut off ({text:?}): the logger was stopped while it wrote it; it is left out"
     )

@@ -80,17 +80,17 @@ impl Head {
     }
 }
 
-/// Refuses a name that two columns have. Of a quantity that stands in several units, each in a column of its own, as in the summary of
-/// rotary and linear machines, every column keeps its unit in its name; of a signal one is meant, and which is not guessed.
+/// Refuses a name that two columns have. A quantity may be given in several units, one column for each, as in the summary of rotary and
+/// linear machines: each of these columns gets its unit into its name. Two columns with the name of a signal are always refused.
 ///
 /// # Errors
 /// [`TraceError::TwiceNamed`] when two columns have one name.
 pub(super) fn distinct(headers: &mut [Header], file: &str) -> Result<(), TraceError> {
     let signal = |name: &str| name.eq_ignore_ascii_case("time") || Signal::from_name(name).is_some();
     let several = |h: &Header| {
-        let namesakes = || headers.iter().filter(|o| o.name == h.name);
-        let alike = namesakes().filter(|o| o.unit == h.unit).count();
-        namesakes().count() > 1 && alike == 1 && namesakes().all(|o| o.unit.is_some()) && !signal(&h.name)
+        let same_name = || headers.iter().filter(|o| o.name == h.name);
+        let same_unit = same_name().filter(|o| o.unit == h.unit).count();
+        same_name().count() > 1 && same_unit == 1 && same_name().all(|o| o.unit.is_some()) && !signal(&h.name)
     };
     let several: Vec<bool> = headers.iter().map(several).collect();
     for (header, _) in headers.iter_mut().zip(several).filter(|(_, several)| *several) {

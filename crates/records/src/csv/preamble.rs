@@ -17,7 +17,7 @@ fn is_unit(field: &str) -> bool {
 /// Most lines before the data.
 const MAX_PREAMBLE: usize = 400;
 
-/// Lines above the data that are no header row alone: what the logger says of itself, a row of units, the channel heads of
+/// Lines above the data other than a single header row: metadata of the logger, a row of units, the channel heads of
 /// TwinCAT Scope (Beckhoff Information System, TE13xx, Export in csv: name and value side by side, then a column of time in
 /// milliseconds and one of values for each channel).
 pub(super) struct Preamble {
@@ -70,8 +70,8 @@ impl Preamble {
         };
         let (k, (separator, width)) = (1..found.len()).find_map(|k| {
             let one = data_at(k)?;
-            let follows = k + 1 >= found.len() || data_at(k + 1) == Some(one) || trim(found[k + 1].text) == b"EOF";
-            follows.then_some((k, one))
+            let more_data = k + 1 >= found.len() || data_at(k + 1) == Some(one) || trim(found[k + 1].text) == b"EOF";
+            more_data.then_some((k, one))
         })?;
         let fields = |k: usize| split(found[k].text, separator);
         let fits = |k: usize| {

@@ -1,4 +1,4 @@
-//! The rows of data, parsed in pieces side by side.
+//! The rows of data, parsed in parallel.
 
 use std::ops::Range;
 

@@ -7,7 +7,7 @@
 /// behind points (`01.03.2026 12:00:00,125`), the month first behind slashes (`03/01/2026 12:00:00 PM`) but where it would be beyond
 /// the twelfth. A comma may stand for the point of the seconds.
 pub(super) fn stamp(text: &[u8]) -> Option<f64> {
-    // The length alone tells nearly every other text.
+    // Nearly every other text is ruled out by its length alone.
     if !(7..=40).contains(&text.len()) || !text[0].is_ascii_digit() {
         return None;
     }

@@ -90,8 +90,8 @@ fn a_last_row_that_is_cut_is_left_out_with_a_word() {
         let table = parse(&text).unwrap_or_else(|e| panic!("{text:?}: {e}"));
         assert_eq!((table.rows(), table.cut.is_some()), (rows, line.is_some()), "{text:?}: {:?}", table.cut);
         if let Some(line) = line {
-            let said = table.cut.unwrap();
-            assert!(said.contains(&format!("a.csv: row {line}, the last, is cut off")), "{said}");
+            let warning = table.cut.unwrap();
+            assert!(warning.contains(&format!("a.csv: row {line}, the last, is cut off")), "{warning}");
         }
     }
 }

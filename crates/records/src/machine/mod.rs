@@ -33,7 +33,7 @@ use std::path::Path;
 
 use super::error::nearest;
 use super::load::{Column, Mapping};
-use super::signal::{Motion, Signal};
+use super::signal::{AxisKind, Signal};
 use crate::axis::{Hold, Parameters, PhysicalData, Structure};
 use crate::effects::{EFFECTS, Effect, Settings};
 use reader::{Reader, Section};
@@ -135,11 +135,11 @@ impl Machine {
         };
         let structure = structure(&reader, &root, &parameters)?;
         let motion = match root.table(&reader, "units")? {
-            None => Motion::Rotary,
+            None => AxisKind::Rotary,
             Some(units) => {
                 reader.only(&units, &["motion"], "[units]")?;
-                let choices = [("rotary", Motion::Rotary), ("linear", Motion::Linear)];
-                units.get("motion").map_or(Ok(Motion::Rotary), |v| reader.choice(v, "motion", &choices))?
+                let choices = [("rotary", AxisKind::Rotary), ("linear", AxisKind::Linear)];
+                units.get("motion").map_or(Ok(AxisKind::Rotary), |v| reader.choice(v, "motion", &choices))?
             }
         };
         let parameters = parameters_of(&reader, &parameters, structure)?;
@@ -268,7 +268,7 @@ fn hold(reader: &Reader, value: &reader::Value) -> Result<Hold, MachineError> {
     reader.choice(value, "hold", &[("zoh", Hold::Zoh), ("linear", Hold::Linear)])
 }
 
-fn signals(reader: &Reader, section: Option<&Section>, motion: Motion) -> Result<Mapping, MachineError> {
+fn signals(reader: &Reader, section: Option<&Section>, motion: AxisKind) -> Result<Mapping, MachineError> {
     let mut mapping = Mapping { motion, ..Mapping::default() };
     let Some(section) = section else { return Ok(mapping) };
     let mut names = vec!["time", "dt", "hold"];
@@ -373,7 +373,7 @@ mod tests {
              theta1 = {{ column = \"x\", unit = \"mm\" }}\n"
         );
         let mapping = Machine::parse(&text, "axis.toml").unwrap().signals;
-        assert_eq!((mapping.hold, mapping.motion), (Hold::Linear, Motion::Linear));
+        assert_eq!((mapping.hold, mapping.motion), (Hold::Linear, AxisKind::Linear));
         assert_eq!(mapping.time.column, "t_s");
         assert_eq!(mapping.signals[0].1.scale, 0.52);
         assert_eq!(mapping.signals[1].1.unit.as_deref(), Some("mm"));
@@ -427,7 +427,7 @@ mod tests {
         assert_eq!(machine.signals.signals[0].0, Signal::Reference);
         let text = machine.to_toml();
         assert_eq!(Machine::parse(&text, "axis.toml").unwrap_or_else(|e| panic!("{e}\n{text}")), machine, "{text}");
-        for (wrong, says) in [
+        for (wrong, expected) in [
             ("kp = 1\nkv = 1\n", "names no column of the reference"),
             ("reference = \"r\"\nkp = 1\n", "has no kv"),
             ("reference = \"r\"\nkp = 1\nkv = -1\n", "kv is -1"),
@@ -435,7 +435,7 @@ mod tests {
             ("reference = \"r\"\nkp = 1\nkv = 1\nspeed = \"fast\"\n", "\"difference\" or \"measured\""),
         ] {
             let message = error(&format!("{PARAMETERS}[controller]\n{wrong}"));
-            assert!(message.contains(says), "{message}");
+            assert!(message.contains(expected), "{message}");
         }
     }
 

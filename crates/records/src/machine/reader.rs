@@ -1,4 +1,4 @@
-//! The parts of a TOML document with the lines they stand on.
+//! The parts of a TOML document, with their lines.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -6,10 +6,10 @@ use toml::de::{DeTable, DeValue};
 use super::super::error::nearest;
 use super::MachineError;
 
-/// A value and where it stands.
+/// A value and its place in the text.
 pub type Value<'a> = Spanned<DeValue<'a>>;
 
-/// Reads values and blames lines.
+/// Reads values; its errors name file and line.
 pub struct Reader<'a> {
     text: &'a str,
     file: &'a str,

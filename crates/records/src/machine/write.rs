@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::super::signal::Motion;
+use super::super::signal::AxisKind;
 use super::Machine;
 use crate::Column;
 use crate::axis::{Hold, Structure};
@@ -43,7 +43,7 @@ impl Machine {
         for (name, value) in [("I1", p.i1), ("I2", p.i2), ("B", p.b), ("K", p.k), ("rho", p.rho)] {
             line(&format!("{name} = {value:?}"));
         }
-        if self.signals.motion == Motion::Linear {
+        if self.signals.motion == AxisKind::Linear {
             line("\n[units]\nmotion = \"linear\"");
         }
         let mapping = &self.signals;

@@ -35,7 +35,7 @@ pub(in super::super) fn tunable_effect(p: &Probe) -> Tested {
         if Some(&value) == v.start.as_ref() {
             continue;
         }
-        let _venture = super::super::host::venture();
+        let _guard = super::super::host::chosen_values();
         let early = || -> Result<_, HostError> {
             let mut instance = p.instantiate()?;
             set(&mut instance, v, &value)?;

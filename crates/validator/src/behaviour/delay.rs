@@ -15,8 +15,8 @@ pub(in super::super) fn delay(p: &Probe) -> Tested {
     }
 }
 
-/// Outputs that are those of the step before: then a course in steps of h, looked at one step later, is that in steps of
-/// h/2, looked at one of its steps later.
+/// Finds outputs that are one step late: their values in steps of h, shifted by one step, are those in steps of h/2, shifted by one of
+/// these steps.
 fn continuous(p: &Probe) -> Tested {
     let count = 10;
     let courses = two_sizes(p, count)?;
@@ -49,12 +49,12 @@ fn continuous(p: &Probe) -> Tested {
     Ok(problems)
 }
 
-/// A step after each communication step, in parts of one: hardly any event falls into it, and a sample time that is the step itself
-/// only once in as many.
+/// Length of the short step after each communication step, in communication steps: few events fall into it, and of the sample times of a
+/// clock with the period of the step one in 64.
 const SHORT: f64 = 1.0 / 64.0;
 
-/// Discrete outputs that are those of the step before, of which no course can be compared: after each step there is a short one,
-/// over which the inputs stay. What is late changes in the short ones alone.
+/// Finds discrete outputs that are one step late, which cannot be found by shifting: each step is followed by a short one, over which the
+/// inputs stay. An output that is late changes in the short steps alone.
 fn discrete(p: &Probe) -> Tested {
     /// Changes that a finding rests on.
     const FEW: usize = 2;
@@ -102,7 +102,7 @@ struct Changes {
 }
 
 impl Changes {
-    /// Whether it does so in short steps alone.
+    /// Whether it changes in short steps alone.
     fn late(&self) -> bool {
         self.whole == 0 && self.short > 0
     }

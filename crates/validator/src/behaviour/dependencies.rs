@@ -22,7 +22,7 @@ fn left_out(unknown: &Variable, known: &Variable, how: &str) -> String {
     format!("\"{}\" depends on \"{}\"{how}, which its dependencies leave out", unknown.name, known.name)
 }
 
-/// Whether a number has moved by more than an iteration leaves open.
+/// Whether a number has changed by more than the tolerance of an iterative solution.
 fn moved(from: f64, to: f64) -> bool {
     (to - from).abs() > 1e-9 * from.abs().max(to.abs()) && (to - from).abs() > 1e-300
 }

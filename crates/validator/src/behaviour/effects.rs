@@ -118,8 +118,8 @@ pub(in super::super) fn callbacks(p: &Probe) -> Tested {
     p.run(&mut instance, 0, 5)?;
     instance.terminate()?;
     let mut problems = Vec::new();
-    let rubbish = |m: &&LogMessage| m.instance.starts_with('#');
-    if instance.take_log().iter().any(|m| rubbish(&m)) {
+    let is_damaged = |m: &&LogMessage| m.instance.starts_with('#');
+    if instance.take_log().iter().any(|m| is_damaged(&m)) {
         problems.push("the FMU keeps the pointer to the instance name instead of a copy".into());
     }
     instance.free();

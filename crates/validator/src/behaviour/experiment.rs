@@ -169,7 +169,7 @@ pub(in super::super) fn parameters_initial(p: &Probe) -> Tested {
     instance.free();
     let (mut problems, mut any) = (Vec::new(), false);
     for (v, value) in &chosen {
-        let _venture = super::super::host::venture();
+        let _guard = super::super::host::chosen_values();
         let run = |early: bool| -> Result<(Value, Vec<Snapshot>), HostError> {
             let mut instance = p.instantiate()?;
             if early {

@@ -34,7 +34,7 @@ pub(in super::super) fn repeated(p: &mut Probe) -> Tested {
         if stimulus && known.tame {
             continue;
         }
-        let _venture = stimulus.then(super::super::host::venture);
+        let _guard = stimulus.then(super::super::host::chosen_values);
         p.learn(Learned { stimulus, observe_all, ..known.clone() });
         let begin = Instant::now();
         if let Ok(taken) = trial(p) {
@@ -100,7 +100,7 @@ pub(in super::super) fn sequential(p: &Probe) -> Tested {
 fn initial_kept(p: &Probe) -> Result<Option<String>, HostError> {
     /// Each takes two instances.
     const MOST: usize = 10;
-    let _venture = super::super::host::venture();
+    let _guard = super::super::host::chosen_values();
     let states = p.d.variables.iter().filter(|v| matches!(v.causality, Causality::Local | Causality::Output));
     for v in states.filter(|v| super::probe::settable(v)).take(MOST) {
         let Some(value) = super::settable_real(p, v) else { continue };

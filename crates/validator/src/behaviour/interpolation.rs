@@ -41,7 +41,7 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
         p.observe(&mut instance)
     };
     let reference = [stepped(None, None)?];
-    let (mut silent, mut answered) = (Vec::new(), false);
+    let (mut silent, mut responded) = (Vec::new(), false);
     for (order, v) in inputs.into_iter().take(10) {
         let Some((value, size)) = change(p, v, order) else { continue };
         // The input itself and direct feedthrough left out, the other variables must respond.
@@ -51,11 +51,11 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
         }
         let sloped = stepped(None, Some((v, 2.0 * size / p.step)))?;
         match p.responds(&reference, &[sloped], &[v.value_reference]) {
-            true => answered = true,
+            true => responded = true,
             false => silent.push(v.name.as_str()),
         }
     }
-    match (answered, silent.first()) {
+    match (responded, silent.first()) {
         (false, Some(name)) => Ok(vec![format!(
             "a slope of the input \"{name}\" set with fmi2SetRealInputDerivatives changes nothing, though its value does and \
              canInterpolateInputs is true"

@@ -28,7 +28,7 @@ fn grows(slow: Duration, mut cycle: impl FnMut() -> Result<(), HostError>) -> Re
     for _ in 0..cycles {
         cycle()?;
     }
-    // What grows must grow on.
+    // Every window must grow.
     let mut each = None;
     for longer in [1, if cycles == CYCLES { 3 } else { 2 }] {
         sizes.clear();

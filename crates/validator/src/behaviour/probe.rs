@@ -354,20 +354,20 @@ impl Probe {
         const OVER_A_RUN: f64 = 30.0;
         self.difference_of_runs(a, b, from)?;
         let allowed = OVER_A_RUN * self.tolerance();
-        let swing = |i: usize| {
+        let range = |i: usize| {
             let values = || a.iter().map(|s| s.reals[i]).filter(|v| v.is_finite());
             values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
         };
-        let swings: Vec<f64> = (0..self.observed[0].len()).map(swing).collect();
-        let close = |(x, y): (f64, f64), swing: f64| {
-            x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= allowed * x.abs().max(y.abs()).max(swing)
+        let ranges: Vec<f64> = (0..self.observed[0].len()).map(range).collect();
+        let close = |(x, y): (f64, f64), range: f64| {
+            x == y || x.is_nan() && y.is_nan() || (x - y).abs() <= allowed * x.abs().max(y.abs()).max(range)
         };
         let mut rounded = false;
         let mut jumps = 0;
         for (k, (x, y)) in a.iter().zip(b).enumerate() {
             let pairs = || x.reals.iter().copied().zip(y.reals.iter().copied());
             rounded |= pairs().any(|(x, y)| x != y);
-            if let Some(i) = pairs().zip(&swings).position(|(pair, swing)| !close(pair, *swing)) {
+            if let Some(i) = pairs().zip(&ranges).position(|(pair, range)| !close(pair, *range)) {
                 let (name, time) = (&self.observed[0][i].name, self.time(from + k + 1));
                 return Some(format!("\"{name}\" is {} instead of {} at t = {time}", y.reals[i], x.reals[i]));
             }

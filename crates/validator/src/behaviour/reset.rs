@@ -97,7 +97,7 @@ pub(super) fn after_reset(p: &Probe, instance: &mut Instance) -> Result<Vec<Snap
 /// An instance that has run with other parameters and start values than its own: all that can be set, else Reals alone, else
 /// those that are not zero (which often switches something off that does not go with the rest); none where the FMU takes neither.
 pub(super) fn diverted(p: &Probe) -> Result<Option<Instance>, HostError> {
-    let _venture = super::super::host::venture();
+    let _guard = super::super::host::chosen_values();
     for (zeros, others) in [(true, true), (true, false), (false, false)] {
         let mut instance = p.instantiate()?;
         if detour(p, &mut instance, zeros, others).is_ok() {

@@ -38,7 +38,7 @@ pub(in super::super) fn others(p: &Probe) -> Tested {
     if chosen.is_empty() {
         return not_applicable("there is no Integer, Boolean or String parameter");
     }
-    let venture = super::super::host::venture();
+    let chosen_values = super::super::host::chosen_values();
     let read = |some: &[(&Variable, Value)]| -> Result<Vec<Value>, HostError> {
         let mut instance = p.instantiate()?;
         for (v, value) in some {
@@ -62,7 +62,7 @@ pub(in super::super) fn others(p: &Probe) -> Tested {
     if found.is_empty() {
         return not_tested("the FMU does not initialise with other Integer, Boolean and String parameters");
     }
-    drop(venture);
+    drop(chosen_values);
     let (mut problems, mut texts) = (Vec::new(), 0);
     for ((v, value), read) in found {
         if *value != read {
@@ -124,7 +124,7 @@ pub(in super::super) fn joint(p: &Probe) -> Tested {
     }
     let references: Vec<u32> = chosen.iter().map(|(v, _)| v.value_reference).collect();
     let values: Vec<f64> = chosen.iter().map(|c| c.1).collect();
-    let _venture = super::super::host::venture();
+    let _guard = super::super::host::chosen_values();
     let read = |set_order: SetOrder| -> Result<Vec<f64>, HostError> {
         let mut instance = p.instantiate()?;
         let mut order: Vec<usize> = (0..references.len()).collect();
@@ -178,7 +178,7 @@ pub(in super::super) fn twice(p: &Probe) -> Tested {
     }
     let mut instance = p.ready()?;
     p.run(&mut instance, 0, 2)?;
-    let _venture = super::super::host::venture();
+    let _guard = super::super::host::chosen_values();
     let mut written = Vec::new();
     for (v, other) in inputs {
         let Some(Value::Real(start)) = v.start else { continue };

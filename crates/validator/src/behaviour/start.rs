@@ -88,10 +88,10 @@ pub(in super::super) fn effect(p: &Probe) -> Tested {
         }
     }
     let alike = |at: usize| {
-        let swing = range(&reference, at);
+        let spread = range(&reference, at);
         // What an FMU computes of times that are rounded otherwise.
-        let close = |(a, b): (&Vec<f64>, &Vec<f64>)| (a[at] - b[at]).abs() <= 1e-9 * swing.max(a[at].abs());
-        swing > 1e-9 * reference[0][at].abs() && others.iter().all(|rows| reference.iter().zip(rows).all(close))
+        let close = |(a, b): (&Vec<f64>, &Vec<f64>)| (a[at] - b[at]).abs() <= 1e-9 * spread.max(a[at].abs());
+        spread > 1e-9 * reference[0][at].abs() && others.iter().all(|rows| reference.iter().zip(rows).all(close))
     };
     Ok(unknowns
         .iter()

@@ -28,7 +28,7 @@ fn disturb(p: &Probe, instance: &mut Instance) {
 
 /// Whether the FMU takes such changes at all.
 fn takes_disturbance(p: &Probe) -> bool {
-    let _venture = super::super::host::venture();
+    let _guard = super::super::host::chosen_values();
     let attempt = || -> Result<(), HostError> {
         let mut instance = p.ready()?;
         p.run(&mut instance, 0, 2)?;
@@ -175,7 +175,7 @@ pub(in super::super) fn serialise(p: &Probe) -> Tested {
 /// ones: "the internal FMU state consists of the values of the continuous states, iteration variables, parameter values, ..."
 /// (section 2.1.8). Nothing where the FMU does not run so.
 fn serialise_diverted(p: &Probe) -> Result<Option<String>, HostError> {
-    let _venture = super::super::host::venture();
+    let _guard = super::super::host::chosen_values();
     let Some(mut instance) = super::reset::diverted(p)? else { return Ok(None) };
     let (n, cut) = (p.steps(), p.steps() / 2);
     instance.may_go_back = true;

@@ -87,7 +87,7 @@ type Kept<'a> = (&'a str, &'static str, f64, f64);
 fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
     let mut instance = p.instantiate()?;
     let mut written = Vec::new();
-    let venture = super::super::host::venture();
+    let chosen_values = super::super::host::chosen_values();
     for v in p.d.variables.iter().filter(|v| v.causality == Causality::Parameter) {
         if let Some(value) = settable_real(p, v)
             && instance.set_real(&[v.value_reference], &[value]).is_ok()
@@ -102,7 +102,7 @@ fn kept(p: &Probe) -> Result<Vec<Kept<'_>>, super::Stop> {
         instance.initialize(p.start, None)?;
         written.clear();
     }
-    drop(venture);
+    drop(chosen_values);
     let mut found = Vec::new();
     for (v, value) in written {
         found.push((v.name.as_str(), "parameter", value, instance.get_real(&[v.value_reference])?[0]));

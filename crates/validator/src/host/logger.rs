@@ -65,7 +65,7 @@ pub(crate) fn register(sink: &Arc<LogSink>) {
     SINKS.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::clone(sink));
 }
 
-/// Forgets a sink; messages that come later are dropped.
+/// Removes a sink from the logger; messages that come later are dropped.
 pub(crate) fn forget(sink: &Arc<LogSink>) {
     SINKS.lock().unwrap_or_else(PoisonError::into_inner).retain(|other| !Arc::ptr_eq(other, sink));
 }

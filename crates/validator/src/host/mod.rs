@@ -194,26 +194,26 @@ pub(crate) fn note(call: Call) {
     }
 }
 
-/// Notes that from now on the FMU has values that it did not choose itself, until the guard goes.
-pub(crate) fn venture() -> Venture {
-    mark_venture(1);
-    Venture
+/// Marks, until the guard is dropped, that the FMU has values that the validator chose.
+pub(crate) fn chosen_values() -> ChosenValues {
+    mark_chosen_values(1);
+    ChosenValues
 }
 
-/// See [`venture`].
-pub(crate) struct Venture;
+/// See [`chosen_values`].
+pub(crate) struct ChosenValues;
 
-impl Drop for Venture {
+impl Drop for ChosenValues {
     fn drop(&mut self) {
-        mark_venture(0);
+        mark_chosen_values(0);
     }
 }
 
-fn mark_venture(on: u32) {
+fn mark_chosen_values(on: u32) {
     let slot = CALL_SLOT.load(Ordering::Relaxed);
     if !slot.is_null() {
         // SAFETY: the slot is set once to memory that lives as long as the process.
-        unsafe { &*slot }.venture.store(on, Ordering::Relaxed);
+        unsafe { &*slot }.chosen_values.store(on, Ordering::Relaxed);
     }
 }
 

@@ -39,19 +39,19 @@ impl Given<'_> {
 }
 
 /// Reads texts while stack and heap are in use, as a host may use them between two calls: what an FMU has freed, or left on the
-/// stack, is gone then. Given back, a block may look as it did before.
+/// stack, is overwritten then. The blocks stay in use: a freed one might get its former contents.
 #[inline(never)]
 fn read_in_use(room: &mut Room, given: Given<'_>) {
-    /// Nothing that a text begins with, and an end every so often.
-    const RUBBISH: [u8; 16] = *b"\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\0";
-    let stack = std::hint::black_box([RUBBISH; 1024]);
-    let blocks: Vec<Vec<[u8; 16]>> = (1..=64).flat_map(|size| std::iter::repeat_n(vec![RUBBISH; size], 8)).collect();
+    /// A byte that no text begins with, and a terminating zero in each block.
+    const POISON: [u8; 16] = *b"\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\x15\0";
+    let stack = std::hint::black_box([POISON; 1024]);
+    let blocks: Vec<Vec<[u8; 16]>> = (1..=64).flat_map(|size| std::iter::repeat_n(vec![POISON; size], 8)).collect();
     std::hint::black_box((&stack, &blocks));
     room.read(given);
     std::hint::black_box((&stack, &blocks));
 }
 
-/// Room for texts, made before the FMU gives them: memory that is asked for behind its call may be what it has freed.
+/// Room for texts, made before the FMU gives them: memory that is allocated after its call may be what it has freed.
 ///
 /// For texts longer than the room more is asked for all the same, and a checksum taken before that shows whether they were still
 /// there afterwards.

@@ -66,7 +66,7 @@ pub(crate) struct Outcome {
     /// The FMI function called last.
     pub last: &'static str,
     /// Whether the FMU ended while it had values that the validator chose.
-    pub ventured: bool,
+    pub chosen_values: bool,
     /// Longest time that one call took, roughly.
     pub longest: Duration,
     /// What the sandbox refused first.

@@ -1,4 +1,4 @@
-//! Taking away what an FMU left in its folder, however it left it: deeper than a path is long, or closed to its owner.
+//! Removes what an FMU left in its folder, even where it is nested deeper than a path may be long, or closed to its owner.
 
 use std::fs;
 use std::io;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// How deep a folder is walked into by its path: each level is a descriptor while it is removed, and a part of a path that has
 /// an end.
 pub(super) const DEPTH: usize = 64;
-/// Rounds after which a folder is left to whoever sweeps it: each brings up what lies deeper than [`DEPTH`].
+/// Most rounds, each of which moves up what is nested deeper than [`DEPTH`]; a later run removes what is left after them.
 const ROUNDS: usize = 1 << 14;
 
 /// Removes a folder with all that is in it; symbolic links are removed, not followed. One that is not there is no error.
@@ -19,15 +19,15 @@ pub(super) fn remove(folder: &Path) -> io::Result<()> {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {}
         _ => return Ok(()),
     }
-    tame(folder)?;
+    make_removable(folder)?;
     fs::remove_dir_all(folder)
 }
 
-/// Lets a folder be removed as any other: all in it is open to its owner, and nothing lies deep.
+/// Makes a folder removable: opens all in it to its owner, and moves up what is nested deeply.
 ///
 /// # Errors
 /// The system's, where something stays as it is.
-pub(super) fn tame(folder: &Path) -> io::Result<()> {
+pub(super) fn make_removable(folder: &Path) -> io::Result<()> {
     let mut names = 0;
     for _ in 0..ROUNDS {
         if !raise(folder, &mut names)? {

@@ -263,7 +263,7 @@ mod linux {
 
     /// That an argument is the number of an older process, or of the parent: two ways. A thread of this one has a number above
     /// the process' own, but where the system has begun to count anew.
-    fn elders(argument: u8) -> Vec<Vec<(u8, Op, u64)>> {
+    fn older_processes(argument: u8) -> Vec<Vec<(u8, Op, u64)>> {
         let own = u64::from(std::process::id());
         let older = vec![(argument, Op::Ne, 0), (argument, Op::Lt, own)];
         // In a container of its own a process sees no parent.
@@ -272,7 +272,7 @@ mod linux {
     }
 
     /// Calls that change rights, look at or leave things behind in the kernel, or slow others down; libraries make them in
-    /// passing and live with a no. Which processors a younger process runs on stays open: a thread of this one is bound by the
+    /// passing and work without. Which processors a younger process runs on stays open: a thread of this one is bound by the
     /// same call, under a number that cannot be distinguished from those of others.
     fn quiet() -> seccompiler::Result<Rules> {
         let mut all = vec![
@@ -324,7 +324,7 @@ mod linux {
             libc::SYS_sched_setattr,
         ];
         for call in scheduling {
-            rules.insert(call, elders(0).iter().map(|way| when(way)).collect::<seccompiler::Result<_>>()?);
+            rules.insert(call, older_processes(0).iter().map(|way| when(way)).collect::<seccompiler::Result<_>>()?);
         }
         Ok(rules)
     }

@@ -1,4 +1,4 @@
-//! Temporary folders that do not outlive their process for long: what one that was killed left, the next one takes away.
+//! Temporary folders. Those of a process that was killed are removed by the next one.
 
 use std::io;
 use std::path::Path;
@@ -8,10 +8,10 @@ use tempfile::TempDir;
 
 /// Beginning of the name of every temporary folder; the system that the process numbers are of and the process' number follow.
 const PREFIX: &str = "eixo-fmu-";
-/// A folder this old belongs to nobody, whatever process has its number now, s.
+/// Age from which a folder belongs to no process, even where one has its number, s.
 const ABANDONED: u64 = 24 * 3600;
 
-/// Makes a temporary folder, which goes with the value. The first call takes away what killed processes left.
+/// Makes a temporary folder, which is removed with the value. The first call removes those of processes that were killed.
 ///
 /// # Errors
 /// When the system's folder for temporary files cannot be written.

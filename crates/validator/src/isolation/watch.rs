@@ -79,7 +79,7 @@ pub(super) fn run(place: &Place<'_>, job: Job) -> io::Result<Outcome> {
     streams.drain();
     // What stays is swept with the rest, later.
     for folder in &watched {
-        let _ = removal::tame(folder);
+        let _ = removal::make_removable(folder);
     }
     for folder in [workplace, private] {
         let _ = removal::remove(&folder);
@@ -100,12 +100,12 @@ fn outcome(streams: Streams, ended: Ended, longest: Duration, page: &Page, nonce
         reply = Some(left);
     }
     let (call, last) = page.call();
-    let ventured = page.venture.load(std::sync::atomic::Ordering::Relaxed) != 0;
+    let chosen_values = page.chosen_values.load(std::sync::atomic::Ordering::Relaxed) != 0;
     let refused = page.refused.load(std::sync::atomic::Ordering::Relaxed).checked_sub(1).map(wanted);
     let strength = Strength::from_number(page.strength.load(std::sync::atomic::Ordering::Relaxed));
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (stdout, stderr) = (text(&streams.printed[0].kept), text(&streams.printed[1].kept));
-    Outcome { ended, reply, call, last, ventured, longest, refused, strength, stdout, stderr }
+    Outcome { ended, reply, call, last, chosen_values, longest, refused, strength, stdout, stderr }
 }
 
 /// What a child printed: the beginning is kept, the rest read and dropped.

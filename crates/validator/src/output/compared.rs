@@ -12,7 +12,7 @@ pub fn compared(c: &Comparison) -> String {
     let share = |x: f64| format!("{:.3} %", 100.0 * x);
     let mut out = format!("{}: reference results, within {} of the range\n", c.file, share(c.tolerance));
     let width = c.variables.iter().map(|v| v.name.chars().count()).max().unwrap_or(0);
-    // A time that was added up is told without its rounding.
+    // The rounding of an accumulated time is not shown.
     let nanoseconds = |t: f64| (t * 1e9).round() / 1e9;
     for v in &c.variables {
         let verdict = if v.passes(c.tolerance) { "within" } else { "OUTSIDE" };

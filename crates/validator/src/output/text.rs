@@ -1,4 +1,4 @@
-//! For a person: grouped by severity, with the source line and the way out.
+//! For a person: grouped by severity, with the source line and what to do.
 
 use std::fmt::Write as _;
 

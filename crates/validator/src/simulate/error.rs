@@ -33,7 +33,7 @@ pub enum SimulateError {
         /// A near miss.
         near: String,
     },
-    /// A part of the inputs that is none.
+    /// A part of the inputs with too few samples, or too many.
     #[error(
         "{left:.0} samples of the input lie from {from} s to {to} s at the steps asked for; give other --from, --to or --resample"
     )]

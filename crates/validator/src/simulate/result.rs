@@ -1,7 +1,7 @@
 //! The result of a simulation: inputs and outputs over the communication points.
 
 use super::inputs;
-use crate::trace::{Hold, Motion, Signal, Trace, TraceError};
+use crate::trace::{AxisKind, Hold, Signal, Trace, TraceError};
 
 /// What was recorded: the inputs, then the outputs.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -53,9 +53,9 @@ impl SimulationResult {
 
     /// Whether the columns are those of a linear axis.
     #[must_use]
-    pub fn motion(&self) -> Motion {
+    pub fn motion(&self) -> AxisKind {
         let linear = |c: &Column| c.name == "T" && c.unit.as_deref() == Some("N");
-        if self.columns.iter().any(linear) { Motion::Linear } else { Motion::Rotary }
+        if self.columns.iter().any(linear) { AxisKind::Linear } else { AxisKind::Rotary }
     }
 
     /// Headers and values of all columns with the time, for a CSV file.

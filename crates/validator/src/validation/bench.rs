@@ -1,4 +1,4 @@
-//! Testing the behavioural rules: each in a child process, the first ones in order, the rest side by side.
+//! Tests the behavioural rules: each in a child process, the first ones in order, the rest in parallel.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -217,8 +217,8 @@ impl<'a> Bench<'a> {
             // Someone ended the process, or the FMU does so itself: run again to distinguish them.
             outcome = isolation::run(&place, job(learned))?;
         }
-        if rule.is(id::INSTANCES_REPEATED) && outcome.ventured && outcome.ended != Ended::Well {
-            // It does not bear inputs that vary; without them it can be tested all the same.
+        if rule.is(id::INSTANCES_REPEATED) && outcome.chosen_values && outcome.ended != Ended::Well {
+            // It fails with inputs that vary; with constant ones it can be tested all the same.
             let tame = Learned { tame: true, ..learned.clone() };
             outcome = isolation::run(&place, job(&tame))?;
         }
@@ -284,7 +284,7 @@ impl<'a> Bench<'a> {
             }
             Ended::Well => None,
         };
-        if let Some(message) = died.as_ref().filter(|_| outcome.ventured) {
+        if let Some(message) = died.as_ref().filter(|_| outcome.chosen_values) {
             // Nothing declares that the model allows these values.
             let why = format!("with other parameters and start values than its own, {message}");
             return (RuleStatus::NotTested(why), vec![], reply.map(|a| a.learned));
