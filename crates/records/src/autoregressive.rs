@@ -9,6 +9,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::numerics::dot;
+
 /// Order of the model.
 const ORDER: usize = 32;
 /// Samples of a segment, each with a model of its own, since the spectrum of the motion changes along a record.
@@ -257,20 +259,6 @@ fn orthogonal_triangle(y: &[f64], runs: &[Range<usize>], rounding: f64) -> Optio
     let target = triangle.column(ORDER).rows(0, ORDER).into_owned();
     let w = triangle.view((0, 0), (ORDER, ORDER)).solve_upper_triangular(&target)?;
     Some(std::iter::once(1.0).chain(w.iter().rev().map(|w| -w)).collect())
-}
-
-/// Scalar product, summed in lanes.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    let mut sums = [0.0; LANES];
-    for (a, b) in a.zip(b) {
-        for i in 0..LANES {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

@@ -25,6 +25,7 @@ mod lost;
 pub mod machine;
 mod mat;
 mod missing;
+pub mod numerics;
 mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;

@@ -8,7 +8,7 @@ use rustfft::num_complex::Complex;
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
-use super::motor_side::{coupling_explains_torque, fits_better_as_logged};
+use super::motor_side::{coupling_explains_torque, fits_better_as_logged, motor_holds_coupling};
 use super::nominal::nominal_explains_with_table;
 use super::pairs::{NEAR, factor_within};
 use super::rigid::{MotionLines, rigid_band};
@@ -148,6 +148,7 @@ pub(super) fn compare_encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], 
         && !table_tracks_motor(input)
         && !nominal_explains_with_table(input, s, lines)
         && !coupling_explains_torque(input)
+        && !motor_holds_coupling(input)
     {
         findings.push(Finding::new(
             "foreign",

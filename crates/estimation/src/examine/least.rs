@@ -1,4 +1,6 @@
-//! Least squares with coefficients within bounds.
+//! Least squares with coefficients within bounds, and their standard errors.
+
+use nalgebra::DMatrix;
 
 /// Least squares with coefficients of at least zero: see [`bounded`].
 pub(super) fn non_negative(gram: &[Vec<f64>], right: &[f64]) -> (Vec<f64>, f64) {
@@ -33,6 +35,25 @@ pub(super) fn bounded(gram: &[Vec<f64>], right: &[f64], low: &[f64], high: &[f64
     }
     let explained = (0..p).map(|i| x[i] * (2.0 * right[i] - (0..p).map(|j| gram[i][j] * x[j]).sum::<f64>())).sum();
     (x, explained)
+}
+
+/// Standard error of the sum of the coefficients `of`, where those of `free` are not at a bound and the residual has any colour:
+///
+/// ```text
+/// covariance = G^-1 * Omega * G^-1,     Omega = covariance of the scores (column times residual)
+/// ```
+///
+/// (H. White, Econometrica 48, 1980). Infinite where the columns do not determine the coefficients.
+pub(super) fn standard_error(gram: &[Vec<f64>], omega: &[Vec<f64>], free: &[usize], of: &[usize]) -> f64 {
+    // Columns of unit size, so that one bound of rank serves all.
+    let size: Vec<f64> = free.iter().map(|i| gram[*i][*i].sqrt().max(f64::MIN_POSITIVE)).collect();
+    let part =
+        |m: &[Vec<f64>]| DMatrix::from_fn(free.len(), free.len(), |i, k| m[free[i]][free[k]] / size[i] / size[k]);
+    let Some(inverse) = part(gram).cholesky().map(|c| c.inverse()) else { return f64::INFINITY };
+    let covariance = &inverse * part(omega) * &inverse;
+    let at = || (0..free.len()).filter(|i| of.contains(&free[*i]));
+    let variance: f64 = at().map(|i| at().map(|k| covariance[(i, k)] / size[i] / size[k]).sum::<f64>()).sum();
+    if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY }
 }
 
 /// A straight line through pairs, by least squares.

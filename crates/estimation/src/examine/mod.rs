@@ -29,6 +29,7 @@ mod slips;
 mod smoothing;
 mod spectra;
 mod stamps;
+mod standing;
 mod twist;
 mod usable;
 

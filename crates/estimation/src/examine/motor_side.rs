@@ -1,12 +1,19 @@
 //! The motor's equation of motion with the nominal parameters, `T = I1*a1 + B*d' + K*d`, where `d = theta1 - theta2` is the twist (rad, m):
 //! it holds whatever other torque acts on the table. Residuals are ratios of standard deviations, without unit.
 
+use super::rigid::{SAMPLES, SIGNIFICANT};
+use super::robust::quantile;
 use super::smoothing::{smoothed, widths};
-use super::{Input, Nominal, Structure};
+use super::{Input, NOMINAL_OFF, Nominal, Structure};
+use crate::identify::long_run::Scores;
+use crate::identify::lsq::triangularise;
 use crate::numerics::level::deviation;
 
 /// Residual with a column as logged, over that with the column corrected, below which the column needs no correction.
 const BETTER_FIT: f64 = 0.8;
+
+/// Share of the ninth decile of the speeds up to which friction has no sign: about zero the sign is that of the noise.
+const QUIET: f64 = 0.02;
 
 /// Residual with the coupling to the table as logged, over that without coupling, below which the column is this axis' table.
 const NEEDED_REDUCTION: f64 = 0.5;
@@ -15,6 +22,73 @@ const NEEDED_REDUCTION: f64 = 0.5;
 pub(super) fn coupling_explains_torque(input: &Input<'_>) -> bool {
     let of = |coupling: f64| motor_side_residual(input, coupling, 1.0, 1.0);
     of(1.0).zip(of(0.0)).is_some_and(|(with, without)| with < NEEDED_REDUCTION * without)
+}
+
+/// Share of the nominal coupling's torque that the motor's torque holds.
+struct CouplingShare {
+    value: f64,
+    /// Its standard error with the residual's own colour.
+    error: f64,
+    /// Standard deviation of what is left of the torque, N.m (N), over the torque's.
+    left: f64,
+}
+
+/// What a table leaves of the torque over what one at rest leaves, up to which its motion is in the motor's torque: noise of its encoder leaves
+/// a little more, another motion more by its own size.
+const AS_AT_REST: f64 = 1.05;
+
+/// Whether the motor's torque holds the torque of the nominal coupling to the table as logged, beside the friction and the load on the motor:
+///
+/// ```text
+/// T = share*(B*d' + K*d) + I1*a + c*v + F*sign(v) + b
+/// ```
+///
+/// A table that its own friction holds follows no motor, and its coupling pulls at the motor all the same, as a spring does; where it moves it
+/// leaves no more of the torque than one at rest would. Another axis' table leaves more, or the motor is not pulled at.
+pub(super) fn motor_holds_coupling(input: &Input<'_>) -> bool {
+    let Some(table) = input.theta2 else { return false };
+    let rests = vec![0.0; table.len()];
+    coupling_share(input, table).zip(coupling_share(input, &rests)).is_some_and(|(share, rests)| {
+        (NOMINAL_OFF.recip()..NOMINAL_OFF).contains(&share.value)
+            && share.value > SIGNIFICANT * share.error
+            && share.left <= AS_AT_REST * rests.left
+    })
+}
+
+/// The share for a table's angle, rad (m), with the smoothing that leaves the least of the torque.
+fn coupling_share(input: &Input<'_>, table: &[f64]) -> Option<CouplingShare> {
+    let Nominal { structure: Structure::TwoInertia, parameters: p } = input.nominal? else { return None };
+    let (t, x1, dt) = (input.torque?, input.theta1?, input.dt);
+    let by = |width: usize| {
+        let [t, x, y] = [t, x1, table].map(|v| smoothed(v, width));
+        let rate = |v: &[f64], k: usize| (v[k + 1] - v[k - 1]) / (2.0 * dt);
+        let quiet = QUIET * quantile((1..x.len() - 1).map(|k| rate(&x, k)), 0.9);
+        let stride = (t.len() / SAMPLES).max(1);
+        let samples: Vec<usize> = (1..t.len() - 1).step_by(stride).collect();
+        let row = |k: usize| {
+            let v = rate(&x, k);
+            let pull = p.b * (v - rate(&y, k)) + p.k * (x[k] - y[k]);
+            let sign = if v.abs() <= quiet { 0.0 } else { v.signum() };
+            [pull, p.i1 * (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt), v, sign, 1.0]
+        };
+        let solution = triangularise(samples.len(), 5, 1, |i, out| {
+            out[..5].copy_from_slice(&row(samples[i]));
+            out[5] = t[samples[i]];
+        })
+        .solve()
+        .ok()?;
+        let mut scores = Scores::new(samples.len(), 5);
+        for (i, k) in samples.iter().enumerate() {
+            let row = row(*k);
+            let left = t[*k] - (0..5).map(|j| solution.phi[(j, 0)] * row[j]).sum::<f64>();
+            (0..5).for_each(|j| scores.add(i, j, left * row[j]));
+        }
+        let covariance = &solution.inverse * scores.omega() * &solution.inverse;
+        let left = (solution.residual[(0, 0)] / samples.len() as f64).sqrt() / deviation(&t);
+        let share = CouplingShare { value: solution.phi[(0, 0)], error: covariance[(0, 0)].sqrt(), left };
+        left.is_finite().then_some(share)
+    };
+    widths(x1.len()).filter_map(by).min_by(|a, b| a.left.total_cmp(&b.left))
 }
 
 /// Whether the residual is smaller with torque and table angle as logged than with them times `torque` and `table` (factors, without unit).

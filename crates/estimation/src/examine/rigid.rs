@@ -16,9 +16,9 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::finding::{Finding, Severity, told};
-use super::least::bounded;
+use super::least::{bounded, standard_error};
 use super::motor_side::fits_better_as_logged;
-use super::pairs::factor;
+use super::pairs::{FACTORS, factor};
 use super::robust::quantile;
 use super::smoothing::{SHORTEST, smoothed, widths};
 use super::spectra::Spectra;
@@ -85,7 +85,8 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
     if own.min(without) <= worse * any || ratio <= 0.0 || !ratio.is_finite() {
         return None;
     }
-    Some(NominalFit::Inconsistent(inertia_finding(input, mass, ratio, true)))
+    let estimated = EstimatedInertia { value: mass, error: balance.error(), left: any };
+    inertia_finding(input, &estimated, inertia, true).map(NominalFit::Inconsistent)
 }
 
 /// The inertia, kg.m2 (kg), that explains most of the torque together with friction, a weight on a hinge and a spring; no nominal model is
@@ -100,6 +101,11 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
 /// the least of the torque's power is taken, as noise of the encoder, differentiated twice, takes from the inertia, and a width beyond the
 /// motion's band from all. None where less than three quarters are explained, or the inertia is not known to a third.
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
+    determined_in_time(input).map(|found| found.mass)
+}
+
+/// The fit that [`inertia`] is taken from.
+fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
     let mut best: Option<TimeDomainFit> = None;
     for found in at_widths(input, torque, x) {
@@ -111,7 +117,7 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
             best = Some(found);
         }
     }
-    best.map(|found| found.mass)
+    best
 }
 
 /// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is
@@ -134,7 +140,7 @@ const TURNS: f64 = 1e4;
 pub(super) const SAMPLES: usize = 20_000;
 
 /// Standard errors from which a value is surely not zero.
-const SIGNIFICANT: f64 = 3.0;
+pub(super) const SIGNIFICANT: f64 = 3.0;
 
 /// The fit in the time domain.
 struct TimeDomainFit {
@@ -208,35 +214,66 @@ fn sign_finding(turned: f64, own: f64) -> Finding {
     )
 }
 
-/// The finding on an inertia `mass`, kg.m2 (kg), that is `ratio` times the nominal one: a wrong unit if the ratio is near a unit's factor or,
-/// where `sure`, beyond the error of any nominal value; else a warning.
-pub(super) fn inertia_finding(input: &Input<'_>, mass: f64, ratio: f64, sure: bool) -> Finding {
+/// An inertia estimated from a record, and how well the record determines it.
+pub(super) struct EstimatedInertia {
+    /// The inertia that moves, kg.m2 (kg).
+    pub value: f64,
+    /// Its standard error with the residual's own colour, kg.m2 (kg).
+    pub error: f64,
+    /// Share of the torque's power that the fit leaves.
+    pub left: f64,
+}
+
+/// Standard errors about an estimate within which its true value is: 95 % of a normal distribution.
+const CONFIDENCE: f64 = 2.0;
+
+/// The finding on an inertia that is off the nominal one, kg.m2 (kg): a wrong unit if the ratio is near a unit's factor and near no other one
+/// or, where `sure`, beyond the error of any nominal value; else a warning. None where the record does not determine that it is off: its
+/// confidence interval lets the nominal value in, or a fit that leaves less of the torque has another result. Noise of the encoder,
+/// differentiated twice, takes from an inertia that is estimated without smoothing what no standard error tells.
+pub(super) fn inertia_finding(
+    input: &Input<'_>,
+    found: &EstimatedInertia,
+    nominal: f64,
+    sure: bool,
+) -> Option<Finding> {
+    let ratio = found.value / nominal;
+    let [low, high] = [-1.0, 1.0].map(|sense| (found.value + sense * CONFIDENCE * found.error) / nominal);
+    let near = 1.0 / NOMINAL_OFF..NOMINAL_OFF;
+    let is_off = low >= near.end || high <= near.start;
+    let otherwise = |fit: &TimeDomainFit| fit.left < found.left && near.contains(&(fit.mass / nominal));
+    if !is_off || determined_in_time(input).is_some_and(|fit| otherwise(&fit)) {
+        return None;
+    }
     let unit = AxisKind::unit(input.motion, "kg.m2");
-    let seen = format!("The inertia that moves is {mass:.4e} {unit}, {} times the nominal one", told(ratio));
-    let words = factor(ratio);
-    let of_a_nominal = !sure || (1.0 / MAX_NOMINAL_ERROR..MAX_NOMINAL_ERROR).contains(&ratio);
-    if words.is_none() && of_a_nominal {
-        return Finding::new(
+    let seen = format!("The inertia that moves is {:.4e} {unit}, {} times the nominal one", found.value, told(ratio));
+    // Sizes of the factors, in their logarithms, that the interval lets in; of an inertia that may be none, all.
+    let [least, most] = if ratio > 1.0 { [low, high] } else { [1.0 / high, 1.0 / low.max(0.0)] }.map(f64::ln);
+    let let_in = FACTORS.iter().filter(|(f, _)| (least..=most).contains(&f.ln())).count();
+    let words = factor(ratio).filter(|_| let_in <= 1);
+    let beyond = low >= MAX_NOMINAL_ERROR || low > 0.0 && high <= 1.0 / MAX_NOMINAL_ERROR;
+    if words.is_none() && !(sure && beyond) {
+        return Some(Finding::new(
             "inertia",
             Severity::Warn,
             "T",
             format!("{seen}."),
             "The nominal inertia, a gear ratio, the torque constant or a unit is off.",
             "Check [parameters] and the scale of T in [signals]; `eixo identify` reads the inertia from this record.",
-        );
+        ));
     }
     let like = words.map_or_else(
         || "further off than a nominal value is".to_owned(),
         |words| format!("which looks like a factor of {words}"),
     );
-    Finding::new(
+    Some(Finding::new(
         "units",
         Severity::Refuse,
         "T",
         format!("{seen}, {like}."),
         "Torque, angle or time is in another unit than the file says: every parameter is off by it.",
         "Give the unit in the header or in [signals] (unit = \"mN.m\", \"deg\", \"ms\"), or mend [parameters].",
-    )
+    ))
 }
 
 /// Frequency up to which the nominal axis moves as one rigid body, rad/s.
@@ -278,6 +315,7 @@ impl MotionLines {
 
 /// The equation above, summed over the lines of motion: columns of unit size.
 struct Balance {
+    motion: MotionLines,
     gram: Vec<Vec<f64>>,
     right: Vec<f64>,
     size: Vec<f64>,
@@ -311,7 +349,8 @@ impl Balance {
         };
         let mut columns = vec![&torque[1..n - 1], &mean, &speed, &sign, &x[1..n - 1]];
         columns.extend(table.map(|x2| &x2[1..n - 1]));
-        let MotionLines { spectra, lines } = MotionLines::new(&columns, X..columns.len(), dt, above)?;
+        let motion = MotionLines::new(&columns, X..columns.len(), dt, above)?;
+        let MotionLines { spectra, lines } = &motion;
         let total: f64 = lines.iter().map(|f| spectra.power(T, *f)).sum();
         if lines.len() < LEAST || total.is_nan() || total <= 0.0 {
             return None;
@@ -321,7 +360,28 @@ impl Balance {
         let gram = (A..=X).map(|i| (A..=X).map(|k| sum(i, k) / size[i - A] / size[k - A]).collect()).collect();
         let right = (A..=X).map(|i| sum(i, T) / size[i - A]).collect();
         let freedom = 2.0 * lines.len() as f64 * spectra.averages - 4.0;
-        Some(Self { gram, right, size, total, freedom })
+        Some(Self { gram, right, size, total, freedom, motion })
+    }
+
+    /// Standard error of the inertia that is fitted without bounds but its sign, kg.m2 (kg).
+    fn error(&self) -> f64 {
+        let any = f64::INFINITY;
+        let (x, _) = bounded(&self.gram, &self.right, &[0.0, 0.0, 0.0, -any], &[any; 4]);
+        let MotionLines { spectra, lines } = &self.motion;
+        // What is left of the torque: the column T less the columns of the equation.
+        let of: Vec<f64> = std::iter::once(1.0).chain((0..4).map(|i| -x[i] / self.size[i])).collect();
+        let mut omega = vec![vec![0.0; 4]; 4];
+        for &f in lines {
+            let left: f64 = (0..=X).map(|i| (0..=X).map(|k| of[i] * of[k] * spectra.of(i, k, f).re).sum::<f64>()).sum();
+            for (i, row) in omega.iter_mut().enumerate() {
+                for (k, o) in row.iter_mut().enumerate() {
+                    let product = spectra.of(A + i, A + k, f).re / self.size[i] / self.size[k];
+                    *o += left.max(0.0) * spectra.variance_of_sums() * product;
+                }
+            }
+        }
+        let free: Vec<usize> = (0..4).filter(|i| A + i == X || x[*i] > 0.0).collect();
+        standard_error(&self.gram, &omega, &free, &[0]) / self.size[0]
     }
 
     /// Share of the torque, times `sense`, that is left with an inertia within bounds; and that inertia.
@@ -331,5 +391,43 @@ impl Balance {
         let any = f64::INFINITY;
         let (x, explained) = bounded(&self.gram, &right, &[low, 0.0, 0.0, -any], &[high, any, any, any]);
         (1.0 - explained / self.total, x[0] / self.size[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::Parameters;
+    use crate::numerics::level::noise;
+
+    #[test]
+    fn the_standard_error_of_an_inertia_is_the_scatter_of_its_estimates_under_a_coloured_torque() {
+        let (dt, n, inertia) = (1e-3, 4096, 0.2);
+        let parts: Vec<(f64, f64)> = (1..40).map(f64::from).map(|i| (3.0 * i, 1.3 * i * i)).collect();
+        let of = |k: usize, power: i32| -> f64 {
+            parts.iter().map(|(w, p)| w.powi(power - 2) * (w * k as f64 * dt + p).sin()).sum()
+        };
+        let x: Vec<f64> = (0..n).map(|k| of(k, 0)).collect();
+        let nominal = Nominal {
+            structure: Structure::Rigid,
+            parameters: Parameters { i1: inertia, i2: 0.0, ..Parameters::PAPER },
+        };
+        let estimates: Vec<[f64; 2]> = (0..40)
+            .map(|seed| {
+                let mut e = 0.0;
+                let coloured = noise(n, seed).into_iter().map(|w| {
+                    e = 0.95 * e + w;
+                    e
+                });
+                let torque: Vec<f64> = coloured.enumerate().map(|(k, e)| -inertia * of(k, 2) + e).collect();
+                let input = Input { dt, torque: Some(&torque), theta1: Some(&x), ..Input::default() };
+                let balance = Balance::new(&input, nominal).expect("its lines show motion");
+                [balance.unexplained(1.0, [0.0, f64::INFINITY]).1, balance.error()]
+            })
+            .collect();
+        let mean = |i: usize| estimates.iter().map(|e| e[i]).sum::<f64>() / 40.0;
+        let scatter = (estimates.iter().map(|e| (e[0] - mean(0)).powi(2)).sum::<f64>() / 39.0).sqrt();
+        // The scatter of forty estimates is known to a ninth.
+        assert!((0.6..1.6).contains(&(mean(1) / scatter)), "{} against {scatter} of {}", mean(1), mean(0));
     }
 }

@@ -9,6 +9,10 @@ use crate::numerics::level::deviation;
 /// Most segments that are averaged; of a longer record they are spread evenly.
 const SEGMENTS: usize = 96;
 
+/// Variance of a sum of products of two columns over neighbouring lines, over that of as many independent lines: under a Hann window a line
+/// shares 2/3 of its amplitude with the next one and 1/6 with the one after, so 1 + 2*(4/9 + 1/36).
+const NEIGHBOURS: f64 = 35.0 / 18.0;
+
 /// Cross spectra of columns: `of(i, j, f)` is the average of `conj(X_i)*X_j` at line `f`.
 pub(super) struct Spectra {
     columns: usize,
@@ -93,6 +97,12 @@ impl Spectra {
     /// Average of `conj(X_i)*X_j` at line `f`, from 0.
     pub fn of(&self, i: usize, j: usize, f: usize) -> Complex<f64> {
         self.values[(i * self.columns + j) * self.lines + f]
+    }
+
+    /// Variance of a real cross spectrum that is summed over lines, over the sum of the products of the two columns' powers: real and
+    /// imaginary part share a product, and every average holds another one.
+    pub const fn variance_of_sums(&self) -> f64 {
+        0.5 * NEIGHBOURS / self.averages
     }
 
     /// Whether there is a column of that index.

@@ -12,6 +12,9 @@ use crate::trace::{AxisKind, Signal};
 
 /// Least samples of a record of which a part is held out.
 const LEAST_PARTED: usize = 192;
+/// Residual of one simulation over another's up to which both follow an output alike: what a model leaves out moves it by as much from one
+/// weighting of the outputs to the next.
+const ABOUT_AS_WELL: f64 = 2.0;
 
 impl Run<'_> {
     /// The integration that fits the record: as output error found it, else as asked for.
@@ -94,6 +97,19 @@ impl Run<'_> {
             .zip(&left)
             .map(|(output, (_, without))| 100.0 * (1.0 - output.rms_error / rms(without).max(f64::MIN_POSITIVE)));
         explained.reduce(f64::max)
+    }
+
+    /// Whether output error ended at a natural frequency beyond half the sampling rate, and its simulation follows every output about as well
+    /// as that with a method's parameters `p`: the record then shows neither.
+    pub fn unseen_follows(&self, p: &Parameters, scheme: Scheme) -> bool {
+        let Some(unseen) = self.oe.as_ref().filter(|fit| fit.estimated.is_unseen(self.joined.samples().dt)) else {
+            return false;
+        };
+        if p.check(Structure::TwoInertia).is_err() || p.k == 0.0 {
+            return false;
+        }
+        let shown = self.outputs.fit(p, scheme, self.free(false));
+        unseen.sigma.iter().zip(&shown.sigma).all(|(unseen, shown)| *unseen <= ABOUT_AS_WELL * shown)
     }
 
     /// The torque from the motion (Inverse Problem 2): `I1*a1 + I2*a2` with measured accelerations, else row 1 of (2)

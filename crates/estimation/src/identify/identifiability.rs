@@ -41,6 +41,8 @@ pub(super) struct Evidence {
     pub held_out: Option<f64>,
     /// Share of an output that the torque explains beyond the initial state, per cent, where that is largest.
     pub driven: Option<f64>,
+    /// Whether a simulation with a natural frequency beyond half the sampling rate follows every output about as well.
+    pub unseen_follows: bool,
     /// Share of the accelerations that the equations of motion explain, motor and table, where no simulation was compared.
     pub explained: Option<[f64; 2]>,
     /// Torques that go with viscous friction, dry friction and load at one unit of each, as shares of the torque's size.
@@ -116,9 +118,10 @@ impl Identifiability {
              no inertia and no stiffness."
                 .clone_into(&mut advice);
         }
-        // The fit of output error has a natural frequency beyond half the sampling rate: then a worse fit is no evidence of another.
-        let converged = |m: &MethodResult| m.termination.is_some_and(Termination::is_converged);
-        if methods.iter().any(|m| m.method == Method::Oe.name() && converged(m) && is_unseen(m)) {
+        // The simulation that follows the record best is one that no sample shows: another that follows it too is not more than that.
+        // One that runs away has no end: whether it was given up on the way is up to rounding.
+        let stands = |m: &MethodResult| evidence.unseen_follows || m.termination.is_some_and(Termination::is_converged);
+        if methods.iter().any(|m| m.method == Method::Oe.name() && is_unseen(m) && stands(m)) {
             doubts.push(BEYOND[0].to_owned());
             BEYOND[1].clone_into(&mut advice);
         }
@@ -160,5 +163,29 @@ impl Identifiability {
             advice,
             held_out_percent: evidence.held_out.filter(|v| v.is_finite()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_that_run_beyond_half_the_sampling_rate_and_follow_the_record_are_a_doubt_wherever_they_were_given_up()
+    {
+        let mut least_squares = MethodResult::empty("ls", "Least squares");
+        least_squares.parameters.push(Estimate::new("K", "N.m/rad", 2.0, Some(0.1), None));
+        let judged = |termination: Termination, unseen_follows: bool| {
+            let mut output_error = MethodResult::empty(Method::Oe.name(), "Output error");
+            (output_error.failure, output_error.termination) = (Some(UNSEEN.to_owned()), Some(termination));
+            let methods = [least_squares.clone(), output_error];
+            Identifiability::of(&methods, methods.first(), Evidence { unseen_follows, ..Evidence::default() })
+        };
+        for termination in [Termination::Iterations, Termination::NoProgress, Termination::Cost] {
+            let judged = judged(termination, true);
+            assert!(!judged.identified && judged.doubts == [BEYOND[0]], "{termination:?}: {judged:?}");
+        }
+        // One that was given up and follows the record less says nothing of it.
+        assert!(judged(Termination::Iterations, false).identified);
     }
 }

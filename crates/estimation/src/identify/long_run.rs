@@ -18,7 +18,7 @@ const BLOCKS: usize = 128 * MOST;
 
 /// Scores, summed over blocks of samples.
 #[derive(Debug, Clone)]
-pub(super) struct Scores {
+pub(crate) struct Scores {
     sums: Vec<f64>,
     width: usize,
     samples: usize,
@@ -26,7 +26,7 @@ pub(super) struct Scores {
 }
 
 /// Samples of a block of a record of so many.
-pub(super) fn block(samples: usize) -> usize {
+pub(crate) fn block(samples: usize) -> usize {
     samples.div_ceil(BLOCKS).max(1)
 }
 

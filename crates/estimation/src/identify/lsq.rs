@@ -11,6 +11,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::trace::numerics::dot;
+
 /// Rows of a block: with a handful of columns it stays in the first-level cache.
 pub const BLOCK: usize = 512;
 /// Smallest singular value of the unit-norm triangle, relative to the largest, that counts as rank.
@@ -101,19 +103,6 @@ fn reduce(block: &mut [f64], m: usize, width: usize) -> Vec<f64> {
         }
     }
     triangle
-}
-
-/// Inner product in eight lanes, so that it vectorises; the order of summation is fixed.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let (ac, bc) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = ac.remainder().iter().zip(bc.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in ac.zip(bc) {
-        for i in 0..8 {
-            lanes[i] += x[i] * y[i];
-        }
-    }
-    ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7])) + rest
 }
 
 impl Triangle {

@@ -11,7 +11,7 @@ pub mod instrumental;
 pub mod joined;
 mod known;
 pub mod levenberg;
-mod long_run;
+pub(crate) mod long_run;
 pub mod lsq;
 mod methods;
 pub mod output_error;

@@ -48,6 +48,12 @@ impl Estimated {
             && self.values[3] > 0.0
     }
 
+    /// Whether its natural frequency lies beyond half the sampling rate, where no sample shows it; `dt`: sampling interval, s.
+    #[must_use]
+    pub fn is_unseen(&self, dt: f64) -> bool {
+        self.parameters(1.0).modal().wn > std::f64::consts::PI / dt
+    }
+
     fn std(&self, gradient: &Vector4<f64>) -> Option<f64> {
         let variance = (gradient.transpose() * self.covariance? * gradient)[0];
         variance.is_finite().then(|| variance.max(0.0).sqrt())

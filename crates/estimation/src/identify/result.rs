@@ -276,7 +276,7 @@ impl MethodResult {
                  effect rules this regression; use OE, or diagnose the record",
             );
         }
-        if estimated.parameters(1.0).modal().wn > std::f64::consts::PI / dt {
+        if estimated.is_unseen(dt) {
             return self.refuse(UNSEEN);
         }
         self.parameters = estimated.estimates(reference, motion);

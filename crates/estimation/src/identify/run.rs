@@ -276,7 +276,9 @@ pub fn identify_joined(
     });
     let held_out = simulated.and_then(|(_, p)| run.held_out(&p, scheme));
     let driven = simulated.and_then(|(best, p)| run.driven(best, &p, scheme));
-    let identifiability = Identifiability::of(&methods, best, Evidence { held_out, driven, ..Evidence::default() });
+    let unseen_follows = simulated.is_some_and(|(_, p)| run.unseen_follows(&p, scheme));
+    let evidence = Evidence { held_out, driven, unseen_follows, ..Evidence::default() };
+    let identifiability = Identifiability::of(&methods, best, evidence);
     let frequency_response = measured.as_ref().and_then(|m| {
         let index = recommended.as_ref()?.method;
         let p = run.estimates.iter().find(|(name, _)| *name == methods[index].method)?.1.parameters(1.0);

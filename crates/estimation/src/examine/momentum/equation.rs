@@ -3,7 +3,7 @@
 use rustfft::num_complex::Complex;
 
 use super::{MAIN, SIGN, T, TABLE};
-use crate::examine::least::bounded;
+use crate::examine::least::{bounded, standard_error};
 use crate::examine::spectra::Spectra;
 
 /// The momentum equation of one record, as a least-squares problem over the lines of its spectra.
@@ -95,6 +95,30 @@ impl MomentumEquation<'_> {
             }
         }
         right_sides
+    }
+
+    /// Standard error of a solution's inertia, the sum of the coefficients `of`, kg.m2 (kg), for a motion that is delayed by `late`, s.
+    pub(super) fn error(&self, gram: &[Vec<f64>], found: &Found, of: &[usize], late: f64) -> f64 {
+        let mut omega = vec![vec![0.0; 6]; 6];
+        for &f in self.lines {
+            let turn = Complex::from_polar(1.0, -self.s.omega(f) * late);
+            let columns = self.regressors(f);
+            let product =
+                |i: usize, k: usize| columns[i].1.conj() * columns[k].1 * self.s.of(columns[i].0, columns[k].0, f);
+            // Power of what the solution leaves of the torque at the line.
+            let mut left = self.s.power(T, f);
+            for (i, x) in found.x.iter().enumerate() {
+                left -= 2.0 * x * (columns[i].1.conj() * self.s.of(columns[i].0, T, f) * turn).re;
+                left += found.x.iter().enumerate().map(|(k, y)| x * y * product(i, k).re).sum::<f64>();
+            }
+            for (i, row) in omega.iter_mut().enumerate() {
+                for (k, o) in row.iter_mut().enumerate() {
+                    *o += left.max(0.0) * self.s.variance_of_sums() * product(i, k).re;
+                }
+            }
+        }
+        let free: Vec<usize> = (0..6).filter(|i| found.x[*i] > 0.0).collect();
+        standard_error(gram, &omega, &free, of)
     }
 
     pub(super) fn solve(&self, gram: &[Vec<f64>], right: &[f64]) -> Found {

@@ -6,9 +6,9 @@ use crate::axis::Structure;
 use crate::examine::encoders::motor_side_unexplained;
 use crate::examine::finding::{Finding, Severity};
 use crate::examine::nominal::nominal_explains;
-use crate::examine::rigid::{self, SIGNIFICANTLY_WORSE, inertia_finding};
+use crate::examine::rigid::{self, EstimatedInertia, SIGNIFICANTLY_WORSE, inertia_finding};
 use crate::examine::spectra::Spectra;
-use crate::examine::{Input, NOMINAL_OFF};
+use crate::examine::{Input, NOMINAL_OFF, standing};
 
 /// Share of the torque's power that the momentum equation must explain for the torque to be of this axis.
 const MIN_EXPLAINED: f64 = 0.2;
@@ -120,6 +120,12 @@ fn fit_torque(
     let motor = || if s.has(TABLE) { 1.0 - motor_side_unexplained(s, lines, MAIN, TABLE) } else { 0.0 };
     let explained = |share: f64| share >= MIN_EXPLAINED + by_chance;
     if !explained(plus.1.max(turned_anywhere.1)) && !explained(motor()) && !rigid::explained_in_time(input) {
+        // At rest friction explains any torque, which no coefficient of a motion does.
+        let held = standing::held_share(input);
+        if held > MAJORITY {
+            findings.push(standing::finding(held));
+            return None;
+        }
         findings.push(Finding::new(
             "not_followed",
             Severity::Refuse,
@@ -178,6 +184,9 @@ fn fit_torque(
     if 1.0 - own <= SIGNIFICANTLY_WORSE * (1.0 - found.share) {
         return shown;
     }
-    findings.push(inertia_finding(input, mass, ratio, false));
+    let of: &[usize] = if collocated { &[0, 1] } else { &[0] };
+    let error = balance.error(&gram, &found, of, f64::from(late) * input.dt);
+    let estimated = EstimatedInertia { value: mass, error, left: 1.0 - found.share };
+    findings.extend(inertia_finding(input, &estimated, p.i1 + p.i2, false));
     shown
 }

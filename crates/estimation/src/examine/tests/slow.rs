@@ -1,6 +1,7 @@
 //! Slow motions, of which averaged spectra show few lines: the balance of torque in the time domain.
 
 use super::*;
+use crate::examine::rigid::{EstimatedInertia, inertia_finding};
 
 #[test]
 fn a_drive_switched_off_after_a_slow_motion_is_no_stuck_sensor_and_its_table_is_no_foreign_one() {
@@ -128,4 +129,56 @@ fn slow_moves_under_friction_tell_sign_and_unit_of_torque_and_table() {
     }
     assert_eq!(table(-1.0), ["sign"]);
     assert_eq!(table(57.3), ["units"]);
+}
+
+#[test]
+fn a_torque_below_breakaway_is_held_by_friction_and_one_that_the_table_follows_is_not() {
+    let (dt, n) = (1e-3, 4096);
+    let at = |k: usize| k as f64 * dt;
+    let torque: Vec<f64> = (0..n).map(|k| 0.01 * (at(k).rem_euclid(1.0) - 0.5).abs()).collect();
+    let mut e = noise(31, 2e-4);
+    let x1: Vec<f64> = (0..n).map(|_| e()).collect();
+    let x2: Vec<f64> = (0..n).map(|k| 0.05 * (0.9 * at(k)).cos() + e()).collect();
+    let input = Input {
+        dt,
+        torque: Some(&torque),
+        theta1: Some(&x1),
+        theta2: Some(&x2),
+        nominal: Some(NOMINAL),
+        ..Input::default()
+    };
+    assert!(standing::held_share(&input) > 0.99);
+    let found = examine(&input);
+    assert!(!found.refuses() && found.find("standing").is_some(), "{:#?}", found.findings);
+    // What moves the table turned the motor, whose encoder does not tell.
+    let follows: Vec<f64> = (0..n).map(|k| 5.0 * torque[k] + e()).collect();
+    assert!(standing::held_share(&Input { theta2: Some(&follows), ..input }) <= 0.0);
+    // A motor that moves under a torque that is not its own.
+    let moves: Vec<f64> = (0..n).map(|k| 0.1 * (7.0 * at(k)).sin() + e()).collect();
+    assert!(standing::held_share(&Input { theta1: Some(&moves), theta2: None, ..input }) < 0.2);
+}
+
+#[test]
+fn an_inertia_is_in_another_unit_only_where_its_error_lets_no_other_factor_in() {
+    let columns = slow_moves();
+    let nominal = NOMINAL.parameters.i1 + NOMINAL.parameters.i2;
+    let input = columns.motor_only();
+    let told = |ratio: f64, error: f64, left: f64, sure: bool| {
+        let found = EstimatedInertia { value: ratio * nominal, error: error * ratio * nominal, left };
+        inertia_finding(&input, &found, nominal, sure).map(|f| (f.id, f.severity))
+    };
+    let (units, inertia) = (Some(("units", Severity::Refuse)), Some(("inertia", Severity::Warn)));
+    // Nothing is left of the torque: no other fit leaves less.
+    assert_eq!(told(57.3, 0.01, 0.0, false), units);
+    assert_eq!(told(0.105, 0.05, 0.0, false), units);
+    // 7.7 to 11.3 times is 9.55 of the factors, 5.7 to 13 times is 6.28 too, 2 to 17 times the nominal value.
+    assert_eq!(told(9.5, 0.09, 0.0, false), units);
+    assert_eq!(told(9.5, 0.2, 0.0, false), inertia);
+    assert_eq!(told(9.5, 0.4, 0.0, true), None);
+    // Beyond any nominal value, whatever the factor; and none that is not told from zero.
+    assert_eq!(told(30.0, 0.2, 0.0, true), units);
+    assert_eq!(told(30.0, 0.2, 0.0, false), inertia);
+    assert_eq!(told(0.02, 0.6, 0.0, true), inertia);
+    // The smoothed motion explains most of this record's torque with the nominal inertia.
+    assert_eq!(told(0.105, 0.05, 0.5, false), None);
 }

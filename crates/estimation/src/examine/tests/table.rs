@@ -1,7 +1,7 @@
 //! The table's encoder beside the motor's: its sign, its unit, and what moves the table beside the coupling.
 
 use super::*;
-use crate::examine::motor_side::coupling_explains_torque;
+use crate::examine::motor_side::{coupling_explains_torque, motor_holds_coupling};
 
 #[test]
 fn a_table_that_counts_the_other_way_or_in_degrees_is_found_in_a_record_of_one_period_too() {
@@ -142,5 +142,34 @@ fn a_motor_feels_its_own_table_whatever_swings_that_and_no_other_axis() {
     let feels = |x: &Columns| coupling_explains_torque(&Input { nominal: Some(nominal), ..x.positions() });
     assert!(feels(&columns));
     columns.v[3] = another.iter().map(|[x, ..]| x + e()).collect();
+    assert!(!feels(&columns));
+}
+
+#[test]
+fn a_motor_under_friction_feels_a_table_at_rest_and_no_table_of_another_axis() {
+    // The motor goes to and fro slowly; friction and load are most of its torque, and the table rests until the coupling overcomes it.
+    let (p, dt, breakaway) = (Parameters::PAPER, 1e-3, 4e-3);
+    let parts: Vec<(f64, f64, f64)> = (1..6).map(f64::from).map(|i| (0.3 / i, 1.7 * i, 1.3 * i * i)).collect();
+    let of = |t: f64, n: i32| -> f64 { parts.iter().map(|(a, w, p)| a * w.powi(n) * (w * t + p).sin()).sum() };
+    let rate = |t: f64| -> f64 { parts.iter().map(|(a, w, p)| a * w * (w * t + p).cos()).sum() };
+    let mut e = noise(45, 1e-5);
+    let mut columns = Columns { dt, v: Default::default() };
+    let (mut table, mut before) = (of(0.0, 0), of(0.0, 0));
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * dt;
+        // Dragged along at the end of what its friction holds.
+        let twist = (of(t, 0) - table).clamp(-breakaway / p.k, breakaway / p.k);
+        table = of(t, 0) - twist;
+        let pull = p.k * twist + p.b * (rate(t) - (table - before) / dt);
+        before = table;
+        columns.v[0].push(-p.i1 * of(t, 2) + pull + 0.01 * rate(t).signum() + 0.002 * rate(t) + 0.003);
+        columns.v[1].push(of(t, 0) + e());
+        columns.v[3].push(table + e());
+    }
+    let feels = |x: &Columns| motor_holds_coupling(&Input { nominal: Some(NOMINAL), ..x.positions() });
+    assert!(feels(&columns));
+    columns.v[3].reverse();
+    assert!(!feels(&columns));
+    columns.v[3] = (0..8192).map(|k| 0.3 * (2.9 * f64::from(k) * dt).sin() + e()).collect();
     assert!(!feels(&columns));
 }
