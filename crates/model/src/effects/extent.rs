@@ -42,6 +42,9 @@ const PERIODS: f64 = 3.0;
 /// Least amplitude of a periodic torque, over the largest torque: the accuracy of a drive's torque.
 const KNOWN: f64 = 1e-3;
 
+/// Most samples that a drive answers late by.
+const SOME_SAMPLES: f64 = 12.0;
+
 /// Share of sorted values that lie beyond two of them.
 fn share_beyond(sorted: &[f64], lower: f64, upper: f64) -> f64 {
     let inside = sorted.partition_point(|x| *x <= upper).saturating_sub(sorted.partition_point(|x| *x < lower));
@@ -87,6 +90,13 @@ impl Extent<'_> {
     #[must_use]
     pub fn closes(&self, half_gap: f64) -> bool {
         self.twists.is_empty() || share_beyond(self.twists, -half_gap, half_gap) >= CONTACT
+    }
+
+    /// Whether a time in the drive is one of some samples: its loops run at the rate of its log or faster. A lag far beyond that is no lag but an
+    /// integrator, a delay a shift of the record.
+    #[must_use]
+    pub fn is_of_a_drive(&self, time: f64) -> bool {
+        time <= SOME_SAMPLES * self.dt
     }
 
     /// Whether a time is a twentieth of a sample and turns the phase at the band's end by a fiftieth of a radian: less of it, a fiftieth of
