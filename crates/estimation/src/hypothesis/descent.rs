@@ -283,8 +283,6 @@ impl<'a> Descent<'a> {
     pub fn standard_errors(&mut self, independent: f64) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
-        // What a value changes of the motion counts here, too.
-        self.at.changes.clear();
         let (normal, growth) = self.normal_with_growth(&x, share)?;
         let (_, errors) = normal.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
         let scatter = self.scatter(&normal, &growth);

@@ -106,6 +106,8 @@ pub struct Problem<'a> {
     /// Spectra of the measured motion; `None` where it is not measured whole.
     motion: Option<Arc<MotionSpectra>>,
     resolution: Resolution,
+    /// Whether every column is simulated.
+    exact: bool,
     /// Whether the axis' own parameters stay at what a model begins with.
     holds_parameters: bool,
     /// Steps simulated so far.
@@ -138,6 +140,7 @@ impl<'a> Problem<'a> {
             scales: None,
             motion: band.motion(record).map(Arc::new),
             resolution: Resolution::Full,
+            exact: false,
             holds_parameters: false,
             steps: Arc::default(),
         }
@@ -149,6 +152,11 @@ impl Problem<'_> {
     #[must_use]
     pub fn coarse(&self) -> Self {
         Self { resolution: Resolution::Coarse, ..self.clone() }
+    }
+
+    /// The same for fits that are made to their end.
+    fn exact(&self) -> Self {
+        Self { exact: true, ..self.clone() }
     }
 
     /// The same with the axis' own parameters held.
@@ -264,11 +272,11 @@ impl Problem<'_> {
     }
 
     /// The model with a coordinate a step further, and the effects that it is one of, where what that changes is told along the motion of
-    /// the model: on a rigid axis, and in looks, which go on from there. A fit of two inertias near the noise would not end by it: what an
-    /// effect does to the twist is as large as what is left.
+    /// the model: in looks, which only rank, and on a rigid axis on the way to a fit's end. There, and near the noise where the axis has two
+    /// inertias, what an effect does to the motion is as large as what is left.
     fn perturbed(&self, c: &Coordinate, model: &Model) -> Option<(Model, Vec<Effect>)> {
-        let is_near = self.nominal.structure == Structure::Rigid || self.resolution == Resolution::Coarse;
-        self.motion.as_ref().filter(|_| is_near && !has_mode(model))?;
+        let is_far = self.nominal.structure == Structure::Rigid || self.resolution == Resolution::Coarse;
+        self.motion.as_ref().filter(|_| is_far && !self.exact && !has_mode(model))?;
         let effects: Vec<Effect> = match c.free {
             Free::Base(p) if is_inertia(p) => Vec::new(),
             Free::Base(_) => coupling_effects(model).collect(),
@@ -359,7 +367,8 @@ impl Problem<'_> {
 
     /// Fits the hypothesis on from where a fit of it ended, to the end: as near to the model's own motion as the record allows.
     pub fn deepen(&self, fit: &Fit) -> Option<Fit> {
-        let mut descent = Descent::new(self, &fit.model, &fit.terms, fit.discrepancy)?;
+        let exact = self.exact();
+        let mut descent = Descent::new(&exact, &fit.model, &fit.terms, fit.discrepancy)?;
         descent.run(STEPS)?;
         descent.sharpen(false)?;
         Some(Fit { settled: true, ..descent.done() })
@@ -369,7 +378,8 @@ impl Problem<'_> {
     /// verdict changes by it; the parameters do by many standard errors, where an effect is bent and its torque along the measured motion
     /// leans with the noise.
     pub fn finished(&self, fit: &Fit, independent: f64) -> Option<Fit> {
-        let mut descent = Descent::resumed(self, fit);
+        let exact = self.exact();
+        let mut descent = Descent::resumed(&exact, fit);
         descent.sharpen(true)?;
         let std = descent.standard_errors(independent)?;
         Some(Fit { std, settled: fit.settled, at_bound: fit.at_bound, ..descent.done() })
