@@ -170,10 +170,15 @@ impl Problem<'_> {
         self.steps.load(Ordering::Relaxed)
     }
 
-    /// What a model lacks along the record, in time.
-    pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
+    /// Counts the steps of one run of a model.
+    fn count(&self, model: &Model) {
         let steps = self.record.len() * parts(model, self.record, self.resolution);
         self.steps.fetch_add(steps as u64, Ordering::Relaxed);
+    }
+
+    /// What a model lacks along the record, in time.
+    pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
+        self.count(model);
         track(model, self.record, bandwidth, self.resolution)
     }
 
@@ -253,7 +258,10 @@ impl Problem<'_> {
                     && (along.is_some() || coupling_effects(&at.model).next().is_none() || is_inertia(p))
                 {
                     let own = self.band.base_column(p, motion, c.slope(x));
-                    return Some(along.map_or_else(|| own.clone(), |along| sum(&own, &along)));
+                    return Some(match along {
+                        Some(along) => sum(&own, &along),
+                        None => own,
+                    });
                 }
                 if along.is_some() {
                     return along;
@@ -409,8 +417,7 @@ impl Problem<'_> {
         let perturbed: Vec<Option<(Model, Vec<Effect>)>> =
             coordinates.iter().map(|c| self.perturbed(c, model)).collect();
         let others: Vec<(Model, Vec<Effect>)> = perturbed.iter().flatten().cloned().collect();
-        let steps = self.record.len() * parts(model, self.record, self.resolution);
-        self.steps.fetch_add(steps as u64, Ordering::Relaxed);
+        self.count(model);
         let (tracked, changes) = track_with_perturbations(model, self.record, bandwidth, self.resolution, &others)?;
         let mut changes = changes.into_iter();
         let changes = perturbed.iter().map(|p| p.as_ref().and_then(|_| changes.next())).collect();

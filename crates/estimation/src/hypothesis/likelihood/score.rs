@@ -59,7 +59,7 @@ impl Band {
                 let Some(d) = self.stiffened(*parameter, model, m) else { continue };
                 let column = &mut columns[*column];
                 if both && *parameter == Free::Base(BaseParameter::I2) {
-                    // The table's discrepancy grows with its inertia (`carried`).
+                    // The table's discrepancy grows with its inertia (`Band::rescaled`).
                     let grown = slope / model.parameters.i2 * s[1];
                     column[1][m] -= y[1] * grown;
                     grows[i][m] -= 2.0 * weight * grown * c * c;
@@ -74,7 +74,7 @@ impl Band {
         grows
     }
 
-    /// What that stiffness gains with a parameter of the axis or of a third inertia; `None` where it has none of it.
+    /// What the stiffness that the equations show at a bin gains with a parameter of the axis or of a third inertia; `None` where it has none of it.
     fn stiffened(&self, parameter: Free, model: &Model, m: usize) -> Option<[[C; 2]; 2]> {
         match parameter {
             Free::Base(p) => {
