@@ -44,6 +44,8 @@ const KNOWN: f64 = 1e-3;
 
 /// Most samples that a drive answers late by.
 const SOME_SAMPLES: f64 = 12.0;
+/// Largest end of the band, in corner frequencies of the drive's lag.
+const PASSED: f64 = 5.0;
 
 /// Share of sorted values that lie beyond two of them.
 fn share_beyond(sorted: &[f64], lower: f64, upper: f64) -> f64 {
@@ -92,11 +94,17 @@ impl Extent<'_> {
         self.twists.is_empty() || share_beyond(self.twists, -half_gap, half_gap) >= CONTACT
     }
 
-    /// Whether a time in the drive is one of some samples: its loops run at the rate of its log or faster. A lag far beyond that is no lag but an
-    /// integrator, a delay a shift of the record.
+    /// Whether a delay is one of some samples: the drive's loops run at the rate of its log or faster. Far beyond that it is a shift of the record.
     #[must_use]
-    pub fn is_of_a_drive(&self, time: f64) -> bool {
-        time <= SOME_SAMPLES * self.dt
+    pub fn is_some_samples(&self, delay: f64) -> bool {
+        delay <= SOME_SAMPLES * self.dt
+    }
+
+    /// Whether a first-order lag lets a fifth of the torque pass at the band's end. One with a corner far below the band is no lag but an
+    /// integrator, which no drive is.
+    #[must_use]
+    pub fn passes_the_band(&self, lag: f64) -> bool {
+        lag * self.band <= PASSED
     }
 
     /// Whether a time is a twentieth of a sample and turns the phase at the band's end by a fiftieth of a radian: less of it, a fiftieth of

@@ -280,7 +280,7 @@ impl Input for Delay {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| x.is_of_a_drive(p[0]) && x.turns_phase(p[0]),
+        bounds: |p, x| x.is_some_samples(p[0]) && x.turns_phase(p[0]),
         example: &[2.3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
@@ -332,7 +332,7 @@ impl Input for ActuatorLag {
         textbook: false,
         // Every bus shifts a log's torque in time; few logs show a lag in addition to that.
         odds: 0.2,
-        bounds: |p, x| x.is_of_a_drive(p[0]) && x.turns_phase(p[0]),
+        bounds: |p, x| x.passes_the_band(p[0]) && x.turns_phase(p[0]),
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
