@@ -257,10 +257,12 @@ impl Search<'_> {
             }
             let enough = self.is_enough(&best);
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
+            // What is dropped again was no way on: an exchange may be.
             if !self.is_negligible(&best)
-                && let Some(next) = self.joined(&best, pool)
+                && let Some(next) = self.joined(&best, pool).map(|next| self.pruned(next, pool))
+                && !passed.contains(&next.terms)
             {
-                best = self.pruned(next, pool);
+                best = next;
                 continue;
             }
             if self.is_over_budget() {
@@ -335,7 +337,7 @@ impl Search<'_> {
             return;
         }
         let share = self.independent(std::slice::from_ref(chosen));
-        for size in 1..chosen.terms.len().max(2) {
+        for size in 1..=chosen.terms.len().max(1) {
             for fit in self.likeliest(size, share, pool) {
                 if self.problem.steps() > BUDGET_BESIDE {
                     return;
@@ -454,7 +456,7 @@ impl Search<'_> {
         let mut terms = fit.terms.clone();
         terms.remove(i);
         let bare = || {
-            let at = self.problem.along(&self.bare(fit, i), fit.bandwidth, &[])?;
+            let at = self.problem.along(&self.bare(fit, i), fit.bandwidth)?;
             Some(self.band().log_likelihood(&at.rows, at.s))
         };
         let known = pool.settled(&terms).filter(|k| bare().is_none_or(|l| k.log_likelihood >= l));

@@ -10,8 +10,9 @@ use crate::conditioning::{Record, estimate_noise};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::{Fit, Problem};
+use crate::hypothesis::likelihood::C;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::tracking::{Resolution, track, track_with_perturbations};
+use crate::hypothesis::tracking::{Resolution, track, track_step_by_step};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -125,23 +126,66 @@ fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation(
     let bandwidth = [0.2 / DT; 2];
     let simulated = |m: &Model| track(m, &record, bandwidth, Resolution::Full).expect("a run").torque;
     let own = simulated(&model);
+    let (_, trajectory) = track_step_by_step(&model, &record, bandwidth, Resolution::Full).expect("a run");
     for (effect, i) in on.iter().flat_map(|(e, values)| (0..values.len()).map(|i| (*e, i))) {
         let mut other = model;
         let value = &mut other.effects.of_mut(effect)[i];
         *value += 0.02 * value.abs().max(effect.info().parameters[i].nominal);
-        let (_, along) =
-            track_with_perturbations(&model, &record, bandwidth, Resolution::Full, &[(other, vec![effect])])
-                .expect("a run");
+        let [with, without] = [&other, &model].map(|m| trajectory.resisted(m, [effect]));
+        let along = |k: usize| with[0][k] + with[1][k] - without[0][k] - without[1][k];
         // As a hat over some samples sees both: where friction turns they differ by a sample.
         let smooth = |y: &dyn Fn(usize) -> f64| -> Vec<f64> {
             (50..record.len() - 50).step_by(10).map(|k| (k - 20..k + 20).map(y).sum::<f64>() / 40.0).collect()
         };
         let moved = simulated(&other);
-        let (a, b) = (smooth(&|k| along[0][0][k] + along[0][1][k]), smooth(&|k| moved[0][k] - own[0][k]));
+        let (a, b) = (smooth(&along), smooth(&|k| moved[0][k] - own[0][k]));
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (size, alike) =
             (product(&a, &b) / product(&b, &b), product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt());
         assert!((size - 1.0).abs() < 0.05 && alike > 0.99, "{effect:?} {i}: {size} {alike}");
+    }
+}
+
+#[test]
+fn what_another_model_lacks_along_the_motion_of_one_is_what_its_own_simulation_lacks() {
+    let effects = with(&[(Effect::CoulombMotor, 0, 3.0), (Effect::ViscousMotor, 0, 1.5)]);
+    let record = logged(effects, 1.0, 0.0, |_| 0.0, 5);
+    let bare = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &bare, Reach::Ruled);
+    let problem = Problem::of(&searched.record, &searched.band, bare, searched.peak);
+    let given = problem.given(&bare).expect("a run");
+    let along = problem.along_the_motion_of(&given);
+    // Inertia, effects, and the share of what changes, in power, that may be off.
+    type Values = &'static [(Effect, usize, f64)];
+    let others: [(f64, Values, f64); 6] = [
+        (1.0, &[], 1e-9),
+        (1.4, &[], 1e-9),
+        (1.0, &[(Effect::ActuatorLag, 0, 0.02)], 1e-4),
+        (
+            1.2,
+            &[
+                (Effect::MotorMode, 0, 0.3 * INERTIA),
+                (Effect::MotorMode, 1, 300.0 * INERTIA),
+                (Effect::MotorMode, 2, INERTIA),
+            ],
+            1e-4,
+        ),
+        // A simulation comes to rest at the reversals.
+        (0.8, &[(Effect::CoulombMotor, 0, 2.0)], 1e-2),
+        (1.1, &[(Effect::PreslidingMotor, 0, 3.0), (Effect::PreslidingMotor, 1, 0.02)], 1e-2),
+    ];
+    let power = |rows: &[Vec<C>; 2]| rows[0].iter().map(|r| r.norm_sqr()).sum::<f64>();
+    for (i, (inertia, effects, share)) in others.into_iter().enumerate() {
+        let other = Model { parameters: parameters(inertia * INERTIA), effects: with(effects), ..bare };
+        let rows = |p: &Problem<'_>| p.rows(&other, given.bandwidth, Some(given.discrepancy)).expect("a run").rows;
+        let steps = problem.steps();
+        let told = rows(&along);
+        assert_eq!(problem.steps(), steps, "nothing is simulated");
+        let own = rows(&problem);
+        let off = [0, 1].map(|e| told[e].iter().zip(&own[e]).map(|(a, b)| a - b).collect());
+        let changed = [0, 1].map(|e| own[e].iter().zip(&given.rows.rows[e]).map(|(a, b)| a - b).collect());
+        let most = share * power(&changed) + 1e-18 * power(&own);
+        assert!(power(&off) <= most, "{i}: {} of {}", power(&off), power(&changed));
     }
 }
 
@@ -243,21 +287,33 @@ fn a_coupling_that_one_encoder_hardly_shows_is_as_likely_as_it_is() {
     }
 }
 
+/// A log of a constant torque, by a load or by friction, along a way on and on, beside a torque that wanders slowly and is small beside it.
+fn onwards(effect: Effect, wander: f64) -> Record {
+    let way = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
+    // Without its start from rest, where friction holds and a load does not.
+    led(way, with(&[(effect, 0, 0.5)]), 1e-4, |t| wander * (1.3 * t).sin(), 5).part(500..6000)
+}
+
 #[test]
 fn a_friction_and_a_load_are_not_told_apart_where_the_axis_never_goes_back() {
-    let onwards = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
-    // What a constant torque leaves, slow and small beside it, a friction with a shape follows some of.
-    let wander = |t: f64| 0.05 * (1.3 * t).sin();
     for effect in [Effect::LoadMotor, Effect::CoulombMotor] {
-        let size = 0.5;
-        // Without its start from rest, where friction holds and a load does not.
-        let record = led(onwards, with(&[(effect, 0, size)]), 1e-4, wander, 5).part(500..6000);
-        let o = diagnosed(&record, INERTIA);
+        let o = diagnosed(&onwards(effect, 0.03), INERTIA);
         let families: Vec<[&str; 2]> =
             o.decision.confusable.iter().map(|c| [c.named, c.other].map(|e| e.info().family.as_str())).collect();
         assert_eq!(families, [["dry_friction", "load_torque"]], "{:?} {:?}", named(&o), told(&o));
         // Every axis has friction, few carry a weight, as the effects' own odds have it.
         assert!(o.decision.probabilities.iter().all(|p| (0.5..0.8).contains(p)), "{:?}", o.decision.probabilities);
+    }
+}
+
+#[test]
+fn what_follows_a_wandering_torque_is_no_cause() {
+    for effect in [Effect::LoadMotor, Effect::CoulombMotor] {
+        let o = diagnosed(&onwards(effect, 0.05), INERTIA);
+        let causes: Vec<Effect> = o.diagnosis.causes.iter().map(|c| c.effect).collect();
+        assert!([vec![Effect::CoulombMotor], vec![Effect::LoadMotor]].contains(&causes), "{causes:?} {:?}", told(&o));
+        let pair = |c: &super::conclusion::Confusable| [c.named, c.other] == [Effect::CoulombMotor, Effect::LoadMotor];
+        assert!(o.decision.confusable.iter().any(pair), "{:?}", told(&o));
     }
 }
 

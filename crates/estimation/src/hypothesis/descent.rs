@@ -1,10 +1,12 @@
 //! The way down from a start to the likeliest parameters of a hypothesis.
 //!
-//! Levenberg and Marquardt's method on what the model lacks, every column a simulation of its own; in turn with it the likeliest
+//! Levenberg and Marquardt's method on what the model lacks; in turn with it the likeliest
 //! discrepancy at these parameters, and the likeliest bandwidth at which the model follows the record. A discrepancy shrinks step by
 //! step, so that a fit from afar comes in along the motion as measured before the noise's own sharpness holds it in some valley. Near
 //! the noise the motion as measured has reversals and blows of the noise in it: there the model is let go along its own motion, as far
 //! as that is likelier.
+
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +15,8 @@ use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
 use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scatter;
-use super::tracking::{Bandwidth, Torques};
+use super::tracking::Bandwidth;
+use super::trajectory::Trajectory;
 use crate::axis::Structure;
 
 /// Steps tried, each shorter than the one before, until one is better.
@@ -41,8 +44,8 @@ const SHARPENING: usize = 6;
 pub struct Along {
     pub model: Model,
     pub rows: TorqueResidual,
-    /// What a step of each coordinate changes of that, N.m, where it is told along the same motion.
-    pub changes: Vec<Option<Torques>>,
+    /// The motion that it lacks that along, where columns are told along it.
+    pub trajectory: Option<Arc<Trajectory>>,
     pub s: Discrepancy,
     pub bandwidth: Bandwidth,
 }
@@ -91,7 +94,7 @@ impl<'a> Descent<'a> {
         let free = problem.free(terms);
         let coordinates: Vec<Coordinate> =
             free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
-        let at = problem.along(start, problem.bandwidth(from), &coordinates)?;
+        let at = problem.along(start, problem.bandwidth(from))?;
         Some(Self {
             problem,
             terms,
@@ -115,7 +118,7 @@ impl<'a> Descent<'a> {
             at: Along {
                 model: fit.model,
                 rows: fit.rows.clone(),
-                changes: Vec::new(),
+                trajectory: None,
                 s: fit.discrepancy,
                 bandwidth: fit.bandwidth,
             },
@@ -147,8 +150,7 @@ impl<'a> Descent<'a> {
             if !differ(bandwidth, self.at.bandwidth) {
                 break;
             }
-            let mut other =
-                Self { at: self.problem.along(&self.at.model, bandwidth, &self.coordinates)?, ..self.clone() };
+            let mut other = Self { at: self.problem.along(&self.at.model, bandwidth)?, ..self.clone() };
             other.steps(SHARPENING, false)?;
             if other.log_likelihood() <= self.log_likelihood() + WORTH {
                 break;
@@ -229,20 +231,20 @@ impl<'a> Descent<'a> {
                 continue;
             }
             let weighed_at = Some(at.rows.weighed_at);
-            if let Some((rows, changes)) = problem.rows_and_changes(&model, at.bandwidth, weighed_at, coordinates) {
+            if let Some((rows, trajectory)) = problem.rows_along_motion(&model, at.bandwidth, weighed_at) {
                 let s = band.rescaled(at.s, &at.model, &model);
                 let after = cost(&rows, s, &y);
                 if after < before {
                     *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
-                    next = Some((model, rows, changes, s, before - after));
+                    next = Some((model, rows, trajectory, s, before - after));
                     break;
                 }
             }
             *damping = (10.0 * *damping).max(1e-3);
         }
         self.leaves = leaves;
-        Some(next.map(|(model, rows, changes, s, gain)| {
-            self.at = Along { model, rows, changes, s, bandwidth: self.at.bandwidth };
+        Some(next.map(|(model, rows, trajectory, s, gain)| {
+            self.at = Along { model, rows, trajectory, s, bandwidth: self.at.bandwidth };
             gain
         }))
     }
@@ -315,6 +317,9 @@ impl<'a> Descent<'a> {
     /// Follows the record at another bandwidth where that is likelier: at a looser one, tried once from each, or at that of the discrepancy.
     fn follow(&mut self) -> bool {
         let (problem, at) = (self.problem, &mut self.at);
+        if problem.is_without_simulation(&at.model) {
+            return false;
+        }
         let least = problem.bandwidth([0.0; 2]);
         let own = problem.band.log_likelihood(&at.rows, at.s);
         let looser = [0, 1].map(|i| (LOOSER * at.bandwidth[i]).max(least[i]));
@@ -322,11 +327,10 @@ impl<'a> Descent<'a> {
         for bandwidth in again.then_some(looser).into_iter().chain([problem.bandwidth(at.s)]) {
             let weighed_at = Some(at.rows.weighed_at);
             if differ(bandwidth, at.bandwidth)
-                && let Some((rows, changes)) =
-                    problem.rows_and_changes(&at.model, bandwidth, weighed_at, &self.coordinates)
+                && let Some((rows, trajectory)) = problem.rows_along_motion(&at.model, bandwidth, weighed_at)
                 && problem.band.log_likelihood(&rows, at.s) > own + WORTH
             {
-                (at.rows, at.changes, at.bandwidth) = (rows, changes, bandwidth);
+                (at.rows, at.trajectory, at.bandwidth) = (rows, trajectory, bandwidth);
                 return true;
             }
         }

@@ -9,10 +9,12 @@ use rustfft::FftPlanner;
 use super::Hypothesis;
 use super::descent::{Along, Descent, differ};
 use super::discrepancy::Discrepancy;
+use super::inverse_dynamics::InverseDynamics;
 use super::likelihood::{Band, C, MotionSpectra, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scales::Scales;
-use super::tracking::{Bandwidth, Resolution, Torques, Tracked, parts, track, track_with_perturbations};
+use super::tracking::{Bandwidth, Resolution, Tracked, parts, track, track_step_by_step};
+use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
@@ -106,6 +108,8 @@ pub struct Problem<'a> {
     /// Spectra of the measured motion; `None` where it is not measured whole.
     motion: Option<Arc<MotionSpectra>>,
     resolution: Resolution,
+    /// The run along which models are compared without a simulation of each, where they are.
+    dynamics: Option<Arc<InverseDynamics>>,
     /// Whether every column is simulated.
     exact: bool,
     /// Whether the axis' own parameters stay at what a model begins with.
@@ -140,6 +144,7 @@ impl<'a> Problem<'a> {
             scales: None,
             motion: band.motion(record).map(Arc::new),
             resolution: Resolution::Full,
+            dynamics: None,
             exact: false,
             holds_parameters: false,
             steps: Arc::default(),
@@ -152,6 +157,18 @@ impl Problem<'_> {
     #[must_use]
     pub fn coarse(&self) -> Self {
         Self { resolution: Resolution::Coarse, ..self.clone() }
+    }
+
+    /// The same for looks beside a fit of a rigid axis, whose motion others are compared along. Of two inertias what an effect does to the
+    /// motion between them is as large as what is left.
+    #[must_use]
+    pub fn along_the_motion_of(&self, fit: &Fit) -> Self {
+        let dynamics = || {
+            self.motion.as_ref().filter(|_| self.nominal.structure == Structure::Rigid)?;
+            let (tracked, trajectory) = self.track_step_by_step(&fit.model, fit.bandwidth)?;
+            InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.band, self.record)
+        };
+        Self { dynamics: dynamics().map(Arc::new), ..self.clone() }
     }
 
     /// The same for fits that are made to their end.
@@ -180,6 +197,19 @@ impl Problem<'_> {
     pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
         self.count(model);
         track(model, self.record, bandwidth, self.resolution)
+    }
+
+    fn track_step_by_step(&self, model: &Model, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
+        self.count(model);
+        track_step_by_step(model, self.record, bandwidth, self.resolution)
+    }
+
+    /// Motion of a fit along the record, `[theta1, omega1, theta2, omega2]` a sample.
+    pub fn motion_of(&self, fit: &Fit) -> Option<Vec<[f64; 4]>> {
+        match &self.dynamics {
+            Some(dynamics) => Some(dynamics.motion.clone()),
+            None => self.track(&fit.model, fit.bandwidth).map(|t| t.motion),
+        }
     }
 
     pub fn base(&self) -> Vec<Free> {
@@ -211,8 +241,45 @@ impl Problem<'_> {
 
     /// What a model lacks, beside what hidden inertias began with as it is at a discrepancy.
     pub fn rows(&self, model: &Model, bandwidth: Bandwidth, weighed_at: Option<Discrepancy>) -> Option<TorqueResidual> {
-        let tracked = self.track(model, bandwidth)?;
-        Some(self.residual(model, &tracked, weighed_at))
+        self.without_simulation(model, weighed_at).map(|(rows, _)| rows).or_else(|| {
+            let tracked = self.track(model, bandwidth)?;
+            Some(self.residual(model, &tracked, weighed_at))
+        })
+    }
+
+    /// The same with the motion that it lacks that along, where columns are told along that.
+    pub fn rows_along_motion(
+        &self,
+        model: &Model,
+        bandwidth: Bandwidth,
+        weighed_at: Option<Discrepancy>,
+    ) -> Option<(TorqueResidual, Option<Arc<Trajectory>>)> {
+        if let Some((rows, dynamics)) = self.without_simulation(model, weighed_at) {
+            return Some((rows, Some(dynamics.trajectory.clone())));
+        }
+        if !self.has_columns_along_motion(model) {
+            return Some((self.rows(model, bandwidth, weighed_at)?, None));
+        }
+        let (tracked, trajectory) = self.track_step_by_step(model, bandwidth)?;
+        Some((self.residual(model, &tracked, weighed_at), Some(Arc::new(trajectory))))
+    }
+
+    /// What a model lacks along the motion of another's run, and that, where models are compared so.
+    fn without_simulation(
+        &self,
+        model: &Model,
+        weighed_at: Option<Discrepancy>,
+    ) -> Option<(TorqueResidual, &InverseDynamics)> {
+        let (dynamics, measured) = (self.dynamics.as_deref()?, self.motion.as_ref()?);
+        PLANNER.with_borrow_mut(|planner| {
+            let rows = dynamics.rows(model, self.band, self.record, measured, planner)?;
+            Some((self.band.residual_of_rows(model, rows, &dynamics.motion, weighed_at, planner), dynamics))
+        })
+    }
+
+    /// Whether a model is compared along the motion of another's run, whatever bandwidth it would follow the record at.
+    pub fn is_without_simulation(&self, model: &Model) -> bool {
+        self.dynamics.is_some() && InverseDynamics::has_a_place_for(model)
     }
 
     fn residual(&self, model: &Model, tracked: &Tracked, weighed_at: Option<Discrepancy>) -> TorqueResidual {
@@ -242,7 +309,7 @@ impl Problem<'_> {
     }
 
     /// What each coordinate changes of what a model lacks. The axis' own parameters act along the motion as measured, which is the model's
-    /// own nearly, effects along the model's own where that is told ([`Self::perturbed`]); all else is simulated.
+    /// own nearly, effects along the model's own where that is kept ([`Self::has_columns_along_motion`]); all else is simulated.
     pub fn columns(&self, at: &Along, coordinates: &[Coordinate]) -> Option<Vec<[Vec<C>; 2]>> {
         let motion = self.motion.as_ref().filter(|_| !has_mode(&at.model));
         (0..coordinates.len())
@@ -250,10 +317,7 @@ impl Problem<'_> {
             .map(|i| {
                 let c = &coordinates[i];
                 let x = c.x(&at.model);
-                let along = at.changes.get(i).and_then(Option::as_ref).map(|change| {
-                    let by = 1.0 / self.step_within(c, &at.model);
-                    PLANNER.with_borrow_mut(|planner| self.band.rows(change, by, planner))
-                });
+                let along = self.column_along_motion(c, at);
                 if let (Free::Base(p), Some(motion)) = (c.free, motion)
                     && (along.is_some() || coupling_effects(&at.model).next().is_none() || is_inertia(p))
                 {
@@ -273,26 +337,38 @@ impl Problem<'_> {
             .collect()
     }
 
+    /// What a coordinate changes of what the effects that it is one of resist the model's motion with, where that was kept.
+    fn column_along_motion(&self, c: &Coordinate, at: &Along) -> Option<[Vec<C>; 2]> {
+        let trajectory = at.trajectory.as_ref().filter(|_| !has_mode(&at.model))?;
+        let effects: Vec<Effect> = match c.free {
+            Free::Base(p) if is_inertia(p) => Vec::new(),
+            Free::Base(_) => coupling_effects(&at.model).collect(),
+            Free::Effect(e, _) | Free::Loop(e) => {
+                Some(e).filter(|e| e.info().place != Place::Sensor).into_iter().collect()
+            }
+        };
+        if effects.is_empty() {
+            return None;
+        }
+        let h = self.step_within(c, &at.model);
+        let mut change = trajectory.resisted(&moved(&at.model, c, h), effects.iter().copied());
+        for (change, own) in change.iter_mut().zip(trajectory.resisted(&at.model, effects)) {
+            change.iter_mut().zip(own).for_each(|(c, o)| *c -= o);
+        }
+        Some(PLANNER.with_borrow_mut(|planner| self.band.rows(&change, 1.0 / h, planner)))
+    }
+
     /// The step of a coordinate for its column, inside its bounds.
     fn step_within(&self, c: &Coordinate, model: &Model) -> f64 {
         let h = self.step(c, model);
         if c.x(model) + h > c.bounds[1] { -h } else { h }
     }
 
-    /// The model with a coordinate a step further, and the effects that it is one of, where what that changes is told along the motion of
-    /// the model: in looks, which only rank, and on a rigid axis on the way to a fit's end. There, and near the noise where the axis has two
-    /// inertias, what an effect does to the motion is as large as what is left.
-    fn perturbed(&self, c: &Coordinate, model: &Model) -> Option<(Model, Vec<Effect>)> {
+    /// Whether what effects change is told along the motion of the model itself: in looks, which only rank, and on a rigid axis on the way to
+    /// a fit's end. There, and near the noise where the axis has two inertias, what an effect does to the motion is as large as what is left.
+    fn has_columns_along_motion(&self, model: &Model) -> bool {
         let is_far = self.nominal.structure == Structure::Rigid || self.resolution == Resolution::Coarse;
-        self.motion.as_ref().filter(|_| is_far && !self.exact && !has_mode(model))?;
-        let effects: Vec<Effect> = match c.free {
-            Free::Base(p) if is_inertia(p) => Vec::new(),
-            Free::Base(_) => coupling_effects(model).collect(),
-            Free::Effect(e, _) | Free::Loop(e) => {
-                Some(e).filter(|e| e.info().place != Place::Sensor).into_iter().collect()
-            }
-        };
-        (!effects.is_empty()).then(|| (moved(model, c, self.step_within(c, model)), effects))
+        self.motion.is_some() && is_far && !self.exact && !has_mode(model)
     }
 
     pub fn log_prior(&self, coordinates: &[Coordinate], x: &[f64]) -> f64 {
@@ -313,14 +389,14 @@ impl Problem<'_> {
         tracked.torque[0].copy_from_slice(&self.record.torque);
         let rows = PLANNER.with_borrow_mut(|planner| self.band.torque_residual(&self.nominal, &tracked, None, planner));
         let s = self.band.discrepancy(&rows);
-        self.unfitted(Along { model: self.nominal, rows, changes: Vec::new(), s, bandwidth: self.bandwidth(s) })
+        self.unfitted(Along { model: self.nominal, rows, trajectory: None, s, bandwidth: self.bandwidth(s) })
     }
 
     /// The hypothesis without anything fitted.
     pub fn given(&self, model: &Model) -> Option<Fit> {
-        let mut at = self.along(model, self.bandwidth([f64::MAX; 2]), &[])?;
+        let mut at = self.along(model, self.bandwidth([f64::MAX; 2]))?;
         for _ in 0..2 {
-            at = self.along(model, self.bandwidth(at.s), &[])?;
+            at = self.along(model, self.bandwidth(at.s))?;
         }
         Some(self.unfitted(at))
     }
@@ -330,7 +406,7 @@ impl Problem<'_> {
     pub fn along_the_record(&self, fit: &Fit) -> Fit {
         let bandwidth = self.bandwidth(fit.discrepancy);
         let followed = || {
-            let at = self.along(&fit.model, bandwidth, &fit.coordinates)?;
+            let at = self.along(&fit.model, bandwidth)?;
             let columns = self.columns(&at, &fit.coordinates)?;
             Some(Fit { discrepancy: at.s, rows: at.rows, columns, bandwidth, ..fit.clone() })
         };
@@ -399,29 +475,12 @@ impl Problem<'_> {
     }
 
     /// A model along the record, and the discrepancy that it leaves.
-    pub fn along(&self, model: &Model, bandwidth: Bandwidth, coordinates: &[Coordinate]) -> Option<Along> {
-        let (mut rows, changes) = self.rows_and_changes(model, bandwidth, None, coordinates)?;
+    pub fn along(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
+        let (mut rows, trajectory) = self.rows_along_motion(model, bandwidth, None)?;
         let s = self.band.discrepancy(&rows);
         self.band.weigh(&mut rows, s);
-        Some(Along { model: *model, rows, changes, s, bandwidth })
-    }
-
-    /// What a model lacks, and for each coordinate what a step of it changes of that, N.m, where it is told along the same motion.
-    pub fn rows_and_changes(
-        &self,
-        model: &Model,
-        bandwidth: Bandwidth,
-        weighed_at: Option<Discrepancy>,
-        coordinates: &[Coordinate],
-    ) -> Option<(TorqueResidual, Vec<Option<Torques>>)> {
-        let perturbed: Vec<Option<(Model, Vec<Effect>)>> =
-            coordinates.iter().map(|c| self.perturbed(c, model)).collect();
-        let others: Vec<(Model, Vec<Effect>)> = perturbed.iter().flatten().cloned().collect();
-        self.count(model);
-        let (tracked, changes) = track_with_perturbations(model, self.record, bandwidth, self.resolution, &others)?;
-        let mut changes = changes.into_iter();
-        let changes = perturbed.iter().map(|p| p.as_ref().and_then(|_| changes.next())).collect();
-        Some((self.residual(model, &tracked, weighed_at), changes))
+        let given = self.dynamics.as_ref().filter(|_| self.is_without_simulation(model));
+        Some(Along { model: *model, rows, trajectory, s, bandwidth: given.map_or(bandwidth, |d| d.bandwidth) })
     }
 
     /// What an effect costs: one of some fifty, at one of so many lines.

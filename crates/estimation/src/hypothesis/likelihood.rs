@@ -287,7 +287,7 @@ impl Band {
         rows
     }
 
-    /// Spectra of the equations. What hidden inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
+    /// What a model lacks in a run. What hidden inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
     pub fn torque_residual(
         &self,
         model: &Model,
@@ -296,10 +296,23 @@ impl Band {
         planner: &mut FftPlanner<f64>,
     ) -> TorqueResidual {
         let rows = self.rows(&tracked.torque, 1.0, planner);
+        self.residual_of_rows(model, rows, &tracked.motion, weighed_at, planner)
+    }
+
+    /// The same from the spectra of the equations, whatever hidden inertias began with in them, and the motion,
+    /// `[theta1, omega1, theta2, omega2]` a sample.
+    pub fn residual_of_rows(
+        &self,
+        model: &Model,
+        rows: [Vec<C>; 2],
+        motion: &[[f64; 4]],
+        weighed_at: Option<Discrepancy>,
+        planner: &mut FftPlanner<f64>,
+    ) -> TorqueResidual {
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };
-        let vibrations = vibrations(self, model, &tracked.motion, planner);
+        let vibrations = vibrations(self, model, motion, planner);
         let whole = if vibrations.is_empty() { [Vec::new(), Vec::new()] } else { rows.clone() };
         let weights = self.weights(model);
         let known = weighed_at.is_some();

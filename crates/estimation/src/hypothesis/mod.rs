@@ -12,15 +12,16 @@ pub(crate) mod determined;
 pub(crate) mod discrepancy;
 pub(crate) mod fit;
 pub(crate) mod hidden;
+mod inverse_dynamics;
 pub(crate) mod likelihood;
 pub(crate) mod model;
 mod parameters;
-mod perturbation;
 pub(crate) mod scales;
 pub(crate) mod scatter;
 mod series;
 pub(crate) mod starts;
 pub(crate) mod tracking;
+mod trajectory;
 
 use std::fmt;
 

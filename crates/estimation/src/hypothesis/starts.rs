@@ -35,6 +35,7 @@ impl<'a> Look<'a> {
         let problem = problem.coarse();
         problem.scales.as_ref()?;
         let fit = problem.along_the_record(fit);
+        let problem = problem.along_the_motion_of(&fit);
         let regression = Regression::new(&problem, &fit);
         Some(Self { problem, fit, regression })
     }
@@ -52,7 +53,7 @@ impl<'a> Look<'a> {
         let coupled = self.problem.nominal.structure == Structure::TwoInertia;
         let first = if coupled && self.fit.coordinates.is_empty() { First::Effects } else { First::Sizes };
         let mut descent = Descent::new(&self.problem, &start.model, &terms, from)?.holding(first);
-        descent.run(PROBE)?;
+        descent.run(if self.problem.is_without_simulation(&start.model) { 3 * PROBE } else { PROBE })?;
         Some(descent.done())
     }
 }
@@ -190,7 +191,7 @@ fn peaks(power: &[f64], most: usize) -> Vec<usize> {
 
 /// Orders (periods per radian over 2 pi: as the effect's own unit, 1/rad) at which the residual is periodic in the angle.
 fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Vec<f64>> {
-    let t = p.track(&fit.model, fit.bandwidth)?;
+    let motion = p.motion_of(fit)?;
     let band = p.band;
     let per = 2 * band.equations();
     let eq = if band.equations() == 2 { side } else { 0 };
@@ -202,18 +203,18 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
         }
     }
     FftPlanner::new().plan_fft_inverse(band.n).process(&mut z);
-    let low = t.motion.iter().map(|m| m[2 * side]).fold(f64::INFINITY, f64::min);
-    let high = t.motion.iter().map(|m| m[2 * side]).fold(f64::NEG_INFINITY, f64::max);
+    let low = motion.iter().map(|m| m[2 * side]).fold(f64::INFINITY, f64::min);
+    let high = motion.iter().map(|m| m[2 * side]).fold(f64::NEG_INFINITY, f64::max);
     let range = (high - low).max(1e-12);
     const BINS: usize = 4096;
     let mut bins = vec![C::default(); 4 * BINS];
-    for (k, m) in t.motion.iter().enumerate() {
+    for (k, m) in motion.iter().enumerate() {
         let at = ((m[2 * side] - low) / range * (BINS as f64 - 1.0)) as usize;
         bins[at.min(BINS - 1)] += C::new(z[k].re * band.taper[k], 0.0);
     }
     FftPlanner::new().plan_fft_forward(4 * BINS).process(&mut bins);
     // Not faster than the band where the axis is slow, at least half a period over the range.
-    let speed = slow(t.motion.iter().map(|m| m[2 * side + 1])).max(1e-12);
+    let speed = slow(motion.iter().map(|m| m[2 * side + 1])).max(1e-12);
     let step = std::f64::consts::TAU / (4.0 * range);
     let top = ((band.omega.last()? / speed / step) as usize).min(BINS / 2);
     let power: Vec<f64> = (0..=top).map(|m| if m < 3 { 0.0 } else { bins[m].norm_sqr() }).collect();
@@ -229,9 +230,9 @@ const MODES: usize = 3;
 
 /// Third inertias on a spring at a side whose torque, along the motion, follows the residual best: inertia, stiffness, damping.
 fn modes(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Vec<[f64; 3]>> {
-    let t = p.track(&fit.model, fit.bandwidth)?;
+    let motion = p.motion_of(fit)?;
     let side = if p.nominal.structure == Structure::Rigid { 0 } else { side };
-    let acceleration = p.band.acceleration(&t.motion.iter().map(|m| m[2 * side]).collect::<Vec<f64>>());
+    let acceleration = p.band.acceleration(&motion.iter().map(|m| m[2 * side]).collect::<Vec<f64>>());
     let looked_at = |w: f64, ratio: f64| -> Option<(f64, f64, [f64; 3])> {
         let column = p.band.mode_column(side, &acceleration, [1.0, w * w, 2.0 * ratio * w]);
         let (size, gain) = reg.alone(p, &column)?;

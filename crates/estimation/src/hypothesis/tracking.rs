@@ -14,10 +14,10 @@
 
 use super::hidden::Hidden;
 use super::model::Model;
-use super::perturbation::Perturbation;
+use super::trajectory::Trajectory;
 use crate::axis::{Axis, Scheme, Structure, substeps_at_speed};
 use crate::conditioning::Record;
-use crate::effects::{Effect, Memory, TorqueHistory};
+use crate::effects::{Memory, TorqueHistory};
 
 /// Torques at motor and table, N.m, one a sample each.
 pub type Torques = [Vec<f64>; 2];
@@ -72,24 +72,21 @@ pub fn parts(model: &Model, record: &Record, resolution: Resolution) -> usize {
 #[must_use]
 pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth, resolution: Resolution) -> Option<Tracked> {
     let held = Held { model, record, bandwidth, resolution };
-    Some(held.track(&[], &mut [])?.0)
+    Some(held.track(&[], None)?.0)
 }
 
-/// The same, with what models that differ from it in some effects lack beyond it along the same motion.
+/// The same with the motion step by step.
 #[must_use]
-pub fn track_with_perturbations(
+pub fn track_step_by_step(
     model: &Model,
     record: &Record,
     bandwidth: Bandwidth,
     resolution: Resolution,
-    others: &[(Model, Vec<Effect>)],
-) -> Option<(Tracked, Vec<Torques>)> {
+) -> Option<(Tracked, Trajectory)> {
     let held = Held { model, record, bandwidth, resolution };
-    let per = parts(model, record, resolution);
-    let mut perturbations: Vec<Perturbation> =
-        others.iter().map(|(other, of)| Perturbation::new([model, other], of, record, per)).collect();
-    let (tracked, _) = held.track(&[], &mut perturbations)?;
-    Some((tracked, perturbations.into_iter().map(Perturbation::into_torques).collect()))
+    let mut trajectory = Trajectory::new(record, parts(model, record, resolution));
+    let (tracked, _) = held.track(&[], Some(&mut trajectory))?;
+    Some((tracked, trajectory))
 }
 
 /// A model held to a record.
@@ -101,8 +98,8 @@ struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// The torque that it lacks, with the effects' internal states at some samples, in order; perturbations are taken along.
-    fn track(&self, kept: &[usize], perturbations: &mut [Perturbation]) -> Option<(Tracked, Vec<Memory<f64>>)> {
+    /// The torque that it lacks, with the effects' internal states at some samples, in order; its steps are added to a trajectory.
+    fn track(&self, kept: &[usize], mut trajectory: Option<&mut Trajectory>) -> Option<(Tracked, Vec<Memory<f64>>)> {
         let &Self { model, record, bandwidth, resolution } = self;
         // What a log holds early is followed with the torque to come.
         let (model, ahead) = &model.on_time();
@@ -186,8 +183,8 @@ impl Held<'_> {
                 };
                 let begin = time + j as f64 * h;
                 let next = axis.advance(&state, ramp, begin);
-                for other in perturbations.iter_mut() {
-                    other.step(&axis, (k, j), [&state, &next], [logged, ramp], begin + h);
+                if let Some(trajectory) = &mut trajectory {
+                    trajectory.push(&axis, [&state, &next], logged, begin + h);
                 }
                 state = next;
             }
@@ -275,7 +272,7 @@ const STARTING: f64 = 0.1;
 #[must_use]
 pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<Run> {
     let held = Held { model, record, bandwidth: [STARTING / record.dt; 2], resolution: Resolution::Full };
-    match held.track(samples, &mut []) {
+    match held.track(samples, None) {
         Some((t, memories)) => {
             samples.iter().zip(memories).map(|(&k, memory)| Run { motion: t.motion[k], memory }).collect()
         }

@@ -1,62 +1,40 @@
-//! What other parameters of effects make of their torques along a motion that is given.
+//! What effects make of their torques along a motion that is given.
 
 use super::axis_model::State;
 use super::mechanics::{base, motions};
 use super::parameters::{Parameters, Structure};
-use crate::effects::{Base, Effect, Memory, Settings, StepMotion};
+use crate::effects::{Effect, Memory, Settings, StepMotion};
 
-/// Parameters of an axis and of its effects, and what the effects remember.
-#[derive(Debug, Clone, Copy)]
-struct Variant {
-    effects: Settings,
-    base: Base<f64>,
-    memory: Memory<f64>,
+/// A motion of an axis, step by step: along it an effect's torque is told without solving for the motion.
+#[derive(Debug, Clone, Default)]
+pub struct Course {
+    steps: Vec<StepMotion<f64>>,
 }
 
-/// Some effects with one set of parameters and with another, both along the motion of one axis.
-#[derive(Debug, Clone)]
-pub struct TorqueChange {
-    effects: Vec<Effect>,
-    variants: [Variant; 2],
-    /// At the end of the last step, on motor and table, N.m.
-    last: [f64; 2],
-}
-
-impl TorqueChange {
-    /// From one axis to another of the same structure, of some forces and dry frictions, which remember what they do when the motion begins.
+impl Course {
+    /// An empty one for so many steps.
     #[must_use]
-    pub fn new(
-        effects: Vec<Effect>,
-        structure: Structure,
-        variants: [(&Parameters, Settings, Memory<f64>); 2],
-    ) -> Self {
-        let variants = variants.map(|(p, effects, memory)| Variant { effects, base: base(p, structure), memory });
-        Self { effects, variants, last: [0.0; 2] }
+    pub fn with_capacity(steps: usize) -> Self {
+        Self { steps: Vec::with_capacity(steps) }
     }
 
-    /// What the other resists more on motor and table, N.m, as its mean over a step of `h` s of the axis between two states, which ends at
-    /// `time` s; dry friction slides as the axis does.
-    #[must_use]
-    pub fn step(&mut self, from: &State, to: &State, h: f64, time: f64) -> [f64; 2] {
+    /// Adds a step of `h` s of the axis between two states, which ends at `time` s.
+    pub fn push(&mut self, [from, to]: [&State; 2], h: f64, time: f64) {
         let (start, end) = (motions(&from.linear), motions(&to.linear));
-        let step = StepMotion { start, end, time, h, modes: to.modes };
-        let mut change = [0.0; 2];
-        for &effect in &self.effects {
-            let coordinate = effect.info().place.coordinate();
-            let [own, other] = self.variants.each_mut().map(|v| v.torque(effect, &step));
-            let push = coordinate.push();
-            for i in 0..2 {
-                change[i] += push[i] * (other - own);
-            }
-        }
-        let mean = [0, 1].map(|i| 0.5 * (self.last[i] + change[i]));
-        self.last = change;
-        mean
+        self.steps.push(StepMotion { start, end, time, h, modes: to.modes });
     }
-}
 
-impl Variant {
-    fn torque(&mut self, effect: Effect, step: &StepMotion<f64>) -> f64 {
-        self.effects.torque_of(effect, &self.base, step, &mut self.memory)
+    /// What an effect of an axis resists with at the end of each step, N.m against its coordinate; it remembers `memory` when the motion
+    /// begins, and dry friction slides as the axis does.
+    #[must_use]
+    pub fn torques(
+        &self,
+        effect: Effect,
+        parameters: &Parameters,
+        structure: Structure,
+        settings: &Settings,
+        memory: &Memory<f64>,
+    ) -> Vec<f64> {
+        settings.torques_of(effect, &base(parameters, structure), &self.steps, memory)
     }
 }

@@ -26,7 +26,7 @@ mod single_law;
 mod step;
 mod stick;
 
-pub use along::TorqueChange;
+pub use along::Course;
 pub use axis_model::{Axis, State};
 pub use criterion::{dt_criterion, period_elongation};
 pub use mechanics::AxisKinematics;

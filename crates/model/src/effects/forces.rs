@@ -118,28 +118,28 @@ impl<S: Scalar> Settings<S> {
         sum
     }
 
-    /// Torque of one effect against its coordinate at the end of a step, N.m, zero of a dry friction that holds; its internal states go on
-    /// to that end.
-    pub(crate) fn torque_of(&self, effect: Effect, base: &Base<S>, step: &StepMotion<S>, memory: &mut Memory<S>) -> S {
-        let coordinate = effect.info().place.coordinate();
-        let load = if self.is_loaded(effect) {
-            self.transmitted(&self.active(), base, step).torque[0].abs()
-        } else {
-            S::default()
-        };
-        let moment = step.moment(coordinate, load);
-        if effect.is_dry() && moment.slides == 0.0 {
-            return S::default();
-        }
-        let own = &mut memory[memory_of(effect)];
-        let mut internals = [Internal::default(); MEMORY_OF_ONE];
-        for (internal, start) in internals.iter_mut().zip(own.iter()) {
-            *internal = Internal::at(*start);
-        }
-        let torque =
-            effect.with_law(React { p: self.of(effect), base, moment: &moment, memory: &mut internals }).torque;
-        own.iter_mut().zip(&internals).for_each(|(state, internal)| *state = internal.end);
-        torque
+    /// Torque of one effect against its coordinate at the end of each step of a motion, N.m, zero of a dry friction that holds; it remembers
+    /// `memory` when the motion begins.
+    pub(crate) fn torques_of(
+        &self,
+        effect: Effect,
+        base: &Base<S>,
+        steps: &[StepMotion<S>],
+        memory: &Memory<S>,
+    ) -> Vec<S> {
+        let on = self.active();
+        let load = |step: &StepMotion<S>| self.transmitted(&on, base, step).torque[0].abs();
+        let loads = if self.is_loaded(effect) { steps.iter().map(load).collect() } else { Vec::new() };
+        let mut internals = [S::default(); MEMORY_OF_ONE];
+        internals.iter_mut().zip(&memory[memory_of(effect)]).for_each(|(own, state)| *own = *state);
+        effect.with_law(Along {
+            p: self.of(effect),
+            base,
+            steps,
+            loads: &loads,
+            memory: internals,
+            dry: effect.is_dry(),
+        })
     }
 
     /// The torque of one effect on the motion; it sets its internal states' end on trial.
@@ -164,6 +164,36 @@ impl<S: Scalar> WithLaw for React<'_, S> {
     #[inline]
     fn with<L: Law>(self) -> Reaction<S> {
         L::react(self.p, self.base, self.moment, self.memory)
+    }
+}
+
+/// A law's torque at the end of each step of a motion.
+struct Along<'a, S> {
+    p: &'a [S],
+    base: &'a Base<S>,
+    steps: &'a [StepMotion<S>],
+    /// Torque transmitted in each step, N.m; empty where the law does not depend on it.
+    loads: &'a [S],
+    memory: [S; MEMORY_OF_ONE],
+    dry: bool,
+}
+
+impl<S: Scalar> WithLaw for Along<'_, S> {
+    type Output = Vec<S>;
+
+    fn with<L: Law>(mut self) -> Vec<S> {
+        let mut torques = Vec::with_capacity(self.steps.len());
+        for (k, step) in self.steps.iter().enumerate() {
+            let moment = step.moment(L::COORDINATE, self.loads.get(k).copied().unwrap_or_default());
+            if self.dry && moment.slides == 0.0 {
+                torques.push(S::default());
+                continue;
+            }
+            let mut internals = self.memory.map(Internal::at);
+            torques.push(L::react(self.p, self.base, &moment, &mut internals).torque);
+            self.memory = internals.map(|internal| internal.end);
+        }
+        torques
     }
 }
 
