@@ -1,5 +1,7 @@
 //! A record made ready for the search: in the band of its motion, at the rate of that band, its noise seen through the axis as it is.
 
+use rayon::prelude::*;
+
 use super::assess::Case;
 use super::gap::Gap;
 use super::overlay::Overlay;
@@ -8,6 +10,7 @@ use crate::axis::Structure;
 use crate::conditioning::{Record, TORQUE};
 use crate::effects::Effect;
 use crate::hypothesis::band::{self, Rate, Reach};
+use crate::hypothesis::discrepancy::Discrepancy;
 use crate::hypothesis::fit::{Fit, Problem, largest};
 use crate::hypothesis::likelihood::Band;
 use crate::hypothesis::model::Model;
@@ -110,6 +113,29 @@ impl Prepared {
     /// Share of the torque that a fit leaves.
     pub fn left(&self, fit: &Fit) -> f64 {
         self.band.torque_share(fit.discrepancy, &self.record)
+    }
+
+    /// The part of a record, as long as the one searched and beyond it, in which a model lacks the most, with what it lacks there; `None` where
+    /// the record goes on for less than half of such a part.
+    pub fn worst_beyond(&self, record: &Record, case: &Case<'_>, model: &Model) -> Option<(Self, Discrepancy)> {
+        let whole = record.part(0..band::smooth(record.len()));
+        let slow = band::decimate(&whole, self.limit, self.rate);
+        let (n, all) = (self.record.len(), slow.len());
+        if all < n + n / 2 {
+            return None;
+        }
+        // The last part overlaps the one before it.
+        let parts = all.div_ceil(n);
+        let measured = (1..parts).into_par_iter().filter_map(|i| {
+            let start = (i * n).min(all - n);
+            let part = slow.part(start..start + n);
+            let band = Band::new(&part, model, self.limit, &band::mask(&part, model.structure));
+            let lacks = Problem::of(&part, &band, case.nominal, self.peak).given(model)?.discrepancy;
+            let torque_rms = deviation(&part.torque).max(self.torque_rms);
+            Some((Self { record: part, band, torque_rms, ..*self }, lacks))
+        });
+        let measured: Vec<(Self, Discrepancy)> = measured.collect();
+        measured.into_iter().max_by(|a, b| a.1.iter().sum::<f64>().total_cmp(&b.1.iter().sum::<f64>()))
     }
 
     /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.

@@ -56,13 +56,16 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
         progress("beyond the band that the motion rules");
         let (wide, own) = prepared(&train, &case.nominal, Reach::Whole);
-        let further = decide_further(wide.search(case, suspects, progress), &decision.chosen);
+        let further = decide_further(wide.search(case, suspects.clone(), progress), &decision.chosen);
         if let Some((wide, other)) = further.map(|d| settled(wide, own, d))
             // More to explain and less left of it: what was missing is there.
             && wide.left(&other.chosen) < left
         {
             (searched, decision) = (wide, other);
         }
+    }
+    if let Some((part, other)) = further_on(&searched, &train, case, suspects, &decision.chosen, progress) {
+        (searched, decision) = (part, other);
     }
     progress("held-out data");
     let fits = [&decision.given, &decision.parameters, &decision.chosen];
@@ -81,6 +84,25 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     overlays.insert(first, of_torque);
     let replay = Replay { initial: on_held.shown().initial, record: held };
     Outcome { diagnosis, improved: models[2], models, decision, overlays, replay }
+}
+
+/// What joins the causes of the searched part of a record where their model lacks materially more, further on in it.
+fn further_on(
+    searched: &Prepared,
+    train: &Record,
+    case: &Case<'_>,
+    suspects: Vec<Effect>,
+    chosen: &Fit,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Option<(Prepared, Decision)> {
+    let (part, lacks) = searched.worst_beyond(train, case, &chosen.model)?;
+    let search = part.search(case, suspects, progress);
+    if !search.is_material_beside(&lacks, chosen) {
+        return None;
+    }
+    progress("a later part of the record");
+    let other = decide_further(search, chosen)?;
+    Some((part, other))
 }
 
 /// The record that the fits see, and the one that they do not.

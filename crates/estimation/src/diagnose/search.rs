@@ -70,11 +70,14 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
     decide_from(search, begun, known)
 }
 
-/// The same where a cause joins those of the hypothesis that is `known` from another look; `None` where none does.
+/// The same where a cause joins those of the hypothesis that is `known` from another look; `None` where none does, or too little is left.
 #[must_use]
 pub fn decide_further(mut search: Search<'_>, known: &Fit) -> Option<Decision> {
     let mut begun = search.begun();
     let known = search.resumed(known)?;
+    if search.at_floor(&known) || search.is_negligible(&known) {
+        return None;
+    }
     search.joined(&known, &mut begun.pool)?;
     Some(decide_from(search, begun, Some(known)))
 }

@@ -4,9 +4,10 @@ use super::assess::{Case, Outcome};
 use super::diagnose;
 use super::diagnosis::{ClosureOf, Site};
 use super::prepared::prepared;
+use super::search::{decide, decide_further};
 use super::verdict::Verdict;
 use crate::axis::{Axis, AxisKind, Hold, Parameters, Scheme, Structure};
-use crate::conditioning::{Record, estimate_noise};
+use crate::conditioning::{NoiseEstimate, Record, estimate_noise};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::{Fit, Problem};
@@ -76,18 +77,23 @@ fn led(
     of_one_encoder(0.0, torque, theta)
 }
 
+/// A record to be diagnosed without held-out data, any effect suspected.
+fn case<'a>(record: &'a Record, nominal: Model, noise: &'a NoiseEstimate) -> Case<'a> {
+    Case {
+        machine: "axis".to_owned(),
+        nominal,
+        motion: AxisKind::Rotary,
+        train: record,
+        noise,
+        holdout: None,
+        suspects: EFFECTS.to_vec(),
+    }
+}
+
 fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> Outcome {
     let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
     let noise = estimate_noise(&record.torque, &channels, None);
-    let case = Case {
-        machine: "axis".to_owned(),
-        nominal: Model::new(nominal, structure, Settings::default()),
-        motion: AxisKind::Rotary,
-        train: record,
-        noise: &noise,
-        holdout: None,
-        suspects: EFFECTS.to_vec(),
-    };
+    let case = case(record, Model::new(nominal, structure, Settings::default()), &noise);
     let o = diagnose(&case, &|_| ());
     // What stays open is not named as a cause.
     if let Some(open) = &o.diagnosis.undecided {
@@ -186,6 +192,28 @@ fn what_another_model_lacks_along_the_motion_of_one_is_what_its_own_simulation_l
         let changed = [0, 1].map(|e| own[e].iter().zip(&given.rows.rows[e]).map(|(a, b)| a - b).collect());
         let most = share * power(&changed) + 1e-18 * power(&own);
         assert!(power(&off) <= most, "{i}: {} of {}", power(&off), power(&changed));
+    }
+}
+
+#[test]
+fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
+    let effects = with(&[(Effect::CoulombMotor, 0, 3.0), (Effect::EndStop, 0, 200.0), (Effect::EndStop, 1, 1.4)]);
+    // The way reaches the stop in its second half.
+    let way = |t: f64| (0.9 * t).sin() * if t < 6.0 { 0.8 } else { 1.5 };
+    for (effects, late) in [(effects, true), (with(&[(Effect::CoulombMotor, 0, 3.0)]), false)] {
+        let record = led(way, effects, 0.0, |_| 0.0, 5);
+        let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+        let noise = estimate_noise(&record.torque, &channels, None);
+        let nominal = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
+        let case = case(&record, nominal, &noise);
+        let (searched, _) = prepared(&record.part(0..2800), &nominal, Reach::Ruled);
+        let found = decide(searched.search(&case, EFFECTS.to_vec(), &|_| ()), None).chosen;
+        assert_eq!(found.effects(), [Effect::CoulombMotor]);
+        let (part, lacks) = searched.worst_beyond(&record, &case, &found.model).expect("a further part");
+        let search = part.search(&case, EFFECTS.to_vec(), &|_| ());
+        assert!(!late || search.is_material_beside(&lacks, &found));
+        let all = decide_further(search, &found).map(|d| d.chosen.effects());
+        assert_eq!(all, late.then(|| vec![Effect::CoulombMotor, Effect::EndStop]));
     }
 }
 
