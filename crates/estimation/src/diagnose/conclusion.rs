@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::diagnosis::Undecided;
 use super::material::MINOR;
 use super::pool::likeliest_of;
-use super::search::{ALIKE, MOVED_BESIDE, Search, is_extension};
+use super::search::{ALIKE, MOVED_WITH_EFFECTS, Search, is_extension};
 use super::verdict::Verdict;
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
@@ -142,7 +142,7 @@ impl Search<'_> {
         let chosen = if chosen.terms.is_empty() || is_run_off(&chosen, nominal) { plain.clone() } else { chosen };
         let explained = self.explained(&parameters, &chosen);
         let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
-        let settled = self.at_floor(&chosen) || white;
+        let is_complete = self.at_floor(&chosen) || white;
         let left = self.left(&chosen);
         // What the chosen hypothesis lacks no material part of is no rival of it, only itself and something small.
         // Of accounts that leave next to nothing of the gap the shorter is told.
@@ -166,7 +166,7 @@ impl Search<'_> {
                     None if determined(i) => 1.0,
                     None => 0.0,
                 };
-                beside_remainder(effect, steadiness(&finished, effect, independent) * decisive)
+                discounted(effect, steadiness(&finished, effect, independent) * decisive)
             })
             .collect();
         let twins: Vec<Option<Confusable>> =
@@ -207,19 +207,19 @@ impl Search<'_> {
                 && instead(&ranking, &chosen, i, twins[i]).len() > 1
         });
         // It is told, too, where one of them is likelier than not.
-        let told = open.and_then(|i| {
+        let shorter = open.and_then(|i| {
             let best = with_one_instead(&ranking, &chosen, i).next()?;
             likely(&(best.probability * decisive[i] * doubt)).then(|| best.fit.clone())
         });
-        if let Some(told) = told.filter(|f| f.terms != chosen.terms && f.settled) {
+        if let Some(shorter) = shorter.filter(|f| f.terms != chosen.terms && f.converged) {
             let pool = ranking.into_iter().map(|w| w.fit).collect();
-            return self.conclude(given, parameters, told, pool);
+            return self.conclude(given, parameters, shorter, pool);
         }
         let refitted = |i: usize| match &nested[i] {
             Some(without) if without.refitted => Some(without.fit.clone()),
             _ => self.refitted(&chosen, i),
         };
-        let understood = left <= 1.0 - EXPLAINED && (settled || explained >= EXPLAINED);
+        let understood = left <= 1.0 - EXPLAINED && (is_complete || explained >= EXPLAINED);
         if chosen.terms.len() > 1
             && open.is_none()
             && let Some(least) = least
@@ -230,7 +230,7 @@ impl Search<'_> {
                 self.concluded_without(&chosen, least, refitted, &ranking, [&given, &parameters], independent);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
             let others = probabilities.iter().filter(|p| likely(p)).count();
-            let is_its_own = inertia_off(&chosen, nominal) < MOVED_BESIDE;
+            let is_its_own = inertia_off(&chosen, nominal) < MOVED_WITH_EFFECTS;
             if others + 1 < probabilities.len() || !understood || !is_its_own || without.named() >= others {
                 return without;
             }
@@ -416,7 +416,7 @@ impl Search<'_> {
 
 /// Probability that an effect is there, and what no cause explains does not do as it would: of what the record says for it, and of how
 /// often machines have it. Friction is named that explains half of what is left without it, a spring is not.
-fn beside_remainder(effect: Effect, decisive: f64) -> f64 {
+fn discounted(effect: Effect, decisive: f64) -> f64 {
     let odds = effect.info().odds;
     odds * decisive / (odds * decisive + (1.0 - decisive))
 }
@@ -506,20 +506,21 @@ mod tests {
 
     fn fit(effects: &[Effect], log_likelihood: f64) -> Fit {
         let terms: Vec<(Effect, usize)> = effects.iter().map(|e| (*e, 0)).collect();
-        Fit::told(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), &terms, log_likelihood)
+        Fit::of_likelihood(
+            Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()),
+            &terms,
+            log_likelihood,
+        )
     }
 
     #[test]
     fn friction_needs_less_beside_a_remainder_than_what_few_machines_have() {
         // Odds of 3 and of one to one: 0.6 of it is 1.8/2.2.
-        assert!((beside_remainder(Effect::CoulombMotor, 0.6) - 1.8 / 2.2).abs() < 1e-12);
+        assert!((discounted(Effect::CoulombMotor, 0.6) - 1.8 / 2.2).abs() < 1e-12);
         let spring = Effect::ExternalSpring.info().odds;
-        assert!((beside_remainder(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
-        assert!(
-            beside_remainder(Effect::ExternalSpring, 0.6) < LIKELY
-                && LIKELY < beside_remainder(Effect::ViscousTable, 0.5)
-        );
-        assert_eq!([0.0, 1.0].map(|p| beside_remainder(Effect::ExternalSpring, p)), [0.0, 1.0]);
+        assert!((discounted(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
+        assert!(discounted(Effect::ExternalSpring, 0.6) < LIKELY && LIKELY < discounted(Effect::ViscousTable, 0.5));
+        assert_eq!([0.0, 1.0].map(|p| discounted(Effect::ExternalSpring, p)), [0.0, 1.0]);
     }
 
     fn decision(parameters: Fit) -> Decision {

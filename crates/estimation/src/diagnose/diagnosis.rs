@@ -126,7 +126,7 @@ pub struct Cause {
 impl Cause {
     /// The one cause of a gap, told by one parameter with its standard error.
     #[must_use]
-    pub fn alone(effect: Effect, parameter: usize, value: f64, std: f64, motion: AxisKind) -> Self {
+    pub fn sole(effect: Effect, parameter: usize, value: f64, std: f64, motion: AxisKind) -> Self {
         let info = effect.info();
         let unit = info.parameters[parameter].unit_on(motion);
         let estimate = Estimate { value, std: Some(std).filter(|s| s.is_finite()), unit };

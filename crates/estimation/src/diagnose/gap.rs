@@ -32,7 +32,7 @@ const RESAMPLINGS: usize = 400;
 /// Its seed: the interval is the same from run to run.
 const SEED: u64 = 20_060_718;
 /// Error of a free run, as a share of the signal, up to which it says more than how fast a model drifts away.
-const FOLLOWS: f64 = 0.5;
+const TRACKING: f64 = 0.5;
 
 /// Squared errors by channel, summed over some samples.
 type Errors = Vector4<f64>;
@@ -113,7 +113,7 @@ impl Gaps {
 
 impl Gap {
     fn is_followed(&self) -> bool {
-        self.figures.combined.after < FOLLOWS
+        self.figures.combined.after < TRACKING
     }
 
     /// Its figures alone.
@@ -221,7 +221,7 @@ fn pieces(record: &Record, model: &Model, ranges: &[std::ops::Range<usize>]) -> 
     let begins: Vec<usize> = ranges.iter().map(|r| r.start).collect();
     let starts = start_states(model, record, &begins);
     let done: Vec<(Vec<[f64; 4]>, [f64; 4])> =
-        ranges.par_iter().zip(&starts).map(|(range, start)| settled(record, model, range, start)).collect();
+        ranges.par_iter().zip(&starts).map(|(range, start)| with_fitted_start(record, model, range, start)).collect();
     let mut errors = Vec::new();
     let mut of = Vec::new();
     for (range, (readings, _)) in ranges.iter().zip(&done) {
@@ -249,7 +249,12 @@ fn pieces(record: &Record, model: &Model, ranges: &[std::ops::Range<usize>]) -> 
 const SETTLING: usize = 3;
 
 /// The model over a piece, its initial state where the squared error is least.
-fn settled(record: &Record, model: &Model, range: &std::ops::Range<usize>, start: &Run) -> (Vec<[f64; 4]>, [f64; 4]) {
+fn with_fitted_start(
+    record: &Record,
+    model: &Model,
+    range: &std::ops::Range<usize>,
+    start: &Run,
+) -> (Vec<[f64; 4]>, [f64; 4]) {
     let weight = record.noise.map(|s| 1.0 / s.max(f64::MIN_POSITIVE));
     let present: Vec<usize> = (0..4).filter(|c| record.channels[*c].is_some()).collect();
     let cost = |r: &[[f64; 4]]| -> f64 {

@@ -20,7 +20,7 @@ pub const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
 /// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
 /// remainder is that small.
-const TELLING: f64 = 5e-3;
+const DISTINCT: f64 = 5e-3;
 
 impl Search<'_> {
     pub fn at_floor(&self, fit: &Fit) -> bool {
@@ -50,7 +50,7 @@ impl Search<'_> {
 
     /// Whether a fit leaves so little of the torque that another account may be told from it.
     pub fn is_exact(&self, fit: &Fit) -> bool {
-        self.left(fit) < TELLING
+        self.left(fit) < DISTINCT
     }
 
     /// Share of the torque that a fit leaves.
@@ -59,7 +59,7 @@ impl Search<'_> {
     }
 
     /// Whether a fit leaves materially less than what another left.
-    pub fn is_material_beside(&self, left: &Discrepancy, fit: &Fit) -> bool {
+    pub fn leaves_materially_less(&self, left: &Discrepancy, fit: &Fit) -> bool {
         (0..self.band().equations()).any(|i| fit.discrepancy[i] < (1.0 - MATERIAL) * left[i])
     }
 

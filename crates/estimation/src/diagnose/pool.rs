@@ -38,8 +38,8 @@ impl Pool {
     }
 
     /// The likeliest fit of these effects in these forms that was made to its end.
-    pub fn settled(&self, terms: &[Term]) -> Option<&Fit> {
-        likeliest_of(terms, self.fits.iter().filter(|f| f.settled))
+    pub fn converged(&self, terms: &[Term]) -> Option<&Fit> {
+        likeliest_of(terms, self.fits.iter().filter(|f| f.converged))
     }
 
     /// All of them.

@@ -31,7 +31,7 @@ const NEAR: f64 = 30.0;
 /// it lacks may be the edge of a cause that lies beyond.
 const UNDERSTOOD: f64 = 0.1;
 /// Hypotheses that are told, each with its own run over the held-out data.
-pub const TOLD: usize = 12;
+pub const REPORTED: usize = 12;
 
 /// Diagnoses a record of a rigid axis.
 #[must_use]
@@ -41,7 +41,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
     let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
-    let settled = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
+    let refined = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
         let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
         let decision = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
@@ -51,13 +51,13 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let rigid = case.nominal.structure == Structure::Rigid;
     let (searched, own) = prepared(&train, &case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
     let decision = decide(searched.search(case, suspects.clone(), progress), None);
-    let (mut searched, mut decision) = settled(searched, own, decision);
+    let (mut searched, mut decision) = refined(searched, own, decision);
     let left = searched.left(&decision.chosen);
     if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
         progress("beyond the band that the motion rules");
         let (wide, own) = prepared(&train, &case.nominal, Reach::Whole);
         let further = decide_further(wide.search(case, suspects.clone(), progress), &decision.chosen);
-        if let Some((wide, other)) = further.map(|d| settled(wide, own, d))
+        if let Some((wide, other)) = further.map(|d| refined(wide, own, d))
             // More to explain and less left of it: what was missing is there.
             && wide.left(&other.chosen) < left
         {
@@ -97,7 +97,7 @@ fn further_on(
 ) -> Option<(Prepared, Decision)> {
     let (part, lacks) = searched.worst_beyond(train, case, &chosen.model)?;
     let search = part.search(case, suspects, progress);
-    if !search.is_material_beside(&lacks, chosen) {
+    if !search.leaves_materially_less(&lacks, chosen) {
         return None;
     }
     progress("a later part of the record");
@@ -122,7 +122,7 @@ fn split(case: &Case<'_>) -> (Record, Record) {
 /// The effects of the likeliest hypotheses.
 fn likely(decision: &Decision) -> Vec<Effect> {
     let mut effects: Vec<Effect> =
-        decision.ranking.iter().take(TOLD).flat_map(|w| w.fit.terms.iter().map(|t| t.0)).collect();
+        decision.ranking.iter().take(REPORTED).flat_map(|w| w.fit.terms.iter().map(|t| t.0)).collect();
     effects.sort_unstable();
     effects.dedup();
     effects

@@ -42,7 +42,7 @@ pub fn attribute(case: &Case<'_>, diagnosis: &mut Diagnosis) {
         RoundingRole::Noise => return,
         RoundingRole::Cause => {
             diagnosis.verdict = Verdict::Effect;
-            diagnosis.causes = vec![Cause::alone(effect, parameter, step, 0.0, case.motion)];
+            diagnosis.causes = vec![Cause::sole(effect, parameter, step, 0.0, case.motion)];
         }
         RoundingRole::Withheld => diagnosis.verdict = Verdict::Unexplained,
     }

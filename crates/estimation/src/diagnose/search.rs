@@ -22,7 +22,7 @@ use crate::hypothesis::fit::{Fit, PROBE, Problem, STEPS, Term};
 use crate::hypothesis::likelihood::Band;
 use crate::hypothesis::model::{Coordinate, Model};
 use crate::hypothesis::scales::Scales;
-use crate::hypothesis::starts::{Look, StartPoint};
+use crate::hypothesis::starts::{Screening, StartPoint};
 
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
@@ -35,11 +35,11 @@ const BUDGET: u64 = 150_000_000;
 /// Most ways on from a hypothesis that was passed by.
 const AGAIN: usize = 3;
 /// Simulated steps from which no further one is: a dozen seconds on two cores.
-const BUDGET_BESIDE: u64 = 40_000_000;
+const BUDGET_OF_RIVALS: u64 = 40_000_000;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 const MOVED: f64 = 0.2;
 /// The same beside effects, which let most parameters be what they are: a factor of two.
-pub const MOVED_BESIDE: f64 = 0.7;
+pub const MOVED_WITH_EFFECTS: f64 = 0.7;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
 
@@ -65,32 +65,32 @@ pub struct Search<'a> {
 /// Finds the hypothesis of largest evidence; from the one that is `known` from another look at the record, where there is one.
 #[must_use]
 pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
-    let begun = search.begun();
+    let baseline = search.baseline();
     let known = known.and_then(|k| search.resumed(k));
-    decide_from(search, begun, known)
+    decide_from(search, baseline, known)
 }
 
 /// The same where a cause joins those of the hypothesis that is `known` from another look; `None` where none does, or too little is left.
 #[must_use]
 pub fn decide_further(mut search: Search<'_>, known: &Fit) -> Option<Decision> {
-    let mut begun = search.begun();
+    let mut baseline = search.baseline();
     let known = search.resumed(known)?;
     if search.at_floor(&known) || search.is_negligible(&known) {
         return None;
     }
-    search.joined(&known, &mut begun.pool)?;
-    Some(decide_from(search, begun, Some(known)))
+    search.joined(&known, &mut baseline.pool)?;
+    Some(decide_from(search, baseline, Some(known)))
 }
 
 /// The axis without any effect.
-struct Begun {
+struct Baseline {
     given: Fit,
     parameters: Fit,
     pool: Pool,
 }
 
-fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision {
-    let Begun { given, parameters, mut pool } = begun;
+fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> Decision {
+    let Baseline { given, parameters, mut pool } = baseline;
     let known = known.map(|k| search.pruned(k, &mut pool));
     if known.is_some() {
         // What it is likelier than must be known.
@@ -101,7 +101,7 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
     let coupled = search.problem.nominal.structure == Structure::TwoInertia;
     if coupled && !search.at_floor(&chosen) && !search.is_negligible(&chosen) && search.have_moved(&parameters, MOVED) {
         (search.progress)("beside the data sheet's parameters");
-        if let Some(other) = search.beside_the_data_sheet(&given) {
+        if let Some(other) = search.from_nominal_parameters(&given) {
             pool.push(other.clone());
             if search.is_likelier(&other, &chosen) {
                 chosen = search.stepwise(other, &mut pool);
@@ -112,7 +112,7 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
         // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
         // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
-        let most = if chosen.terms.len() == 1 { search.longest_beside(&chosen) } else { MOST };
+        let most = if chosen.terms.len() == 1 { search.longest_rival(&chosen) } else { MOST };
         let textbook = search.textbook(&parameters, &chosen);
         pool.extend(textbook.iter().cloned());
         let share = search.independent(&textbook);
@@ -142,7 +142,7 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
         if search.is_over_budget() {
             break;
         }
-        search.look_beside(&chosen, &mut pool);
+        search.extend_rivals(&chosen, &mut pool);
         let Some(better) = search.better_in_pool(&chosen, &pool) else { break };
         let better = search.pruned(better, &mut pool);
         let other = search.stepwise(better, &mut pool);
@@ -158,7 +158,7 @@ fn decide_from(search: Search<'_>, begun: Begun, known: Option<Fit>) -> Decision
 
 impl Search<'_> {
     /// Fits the axis without any effect, which everything else is measured by.
-    fn begun(&mut self) -> Begun {
+    fn baseline(&mut self) -> Baseline {
         (self.progress)("the model as given");
         let nominal = self.problem.nominal;
         let given = self.problem.given(&nominal).unwrap_or_else(|| self.problem.nothing());
@@ -168,7 +168,7 @@ impl Search<'_> {
         let mut pool = Pool::default();
         pool.extend([given.clone(), parameters.clone()]);
         self.gap = self.dynamic_gap(&parameters);
-        Begun { given, parameters, pool }
+        Baseline { given, parameters, pool }
     }
 
     /// A fit from another look at the record, made to its end.
@@ -224,14 +224,14 @@ impl Search<'_> {
         while !shorter.is_empty() {
             let longer: Vec<(Fit, usize)> = shorter
                 .par_iter()
-                .filter_map(|(fit, next)| Some((fit, next, Look::beside(&self.problem, fit)?)))
-                .flat_map(|(fit, next, look)| {
-                    let begun = |(i, term): (usize, &Term)| -> Option<(Fit, usize)> {
-                        let start = look.starts(*term).into_iter().next()?;
-                        Some((look.fitted(&start, fit.terms.len(), fit.discrepancy)?, i + 1))
+                .filter_map(|(fit, next)| Some((fit, next, Screening::of(&self.problem, fit)?)))
+                .flat_map(|(fit, next, screening)| {
+                    let fitted = |(i, term): (usize, &Term)| -> Option<(Fit, usize)> {
+                        let start = screening.starts(*term).into_iter().next()?;
+                        Some((screening.fitted(&start, fit.terms.len(), fit.discrepancy)?, i + 1))
                     };
                     let joining = own.par_iter().enumerate().skip(*next);
-                    joining.filter(|(_, t)| self.may_join(&fit.terms, t.0)).filter_map(begun).collect::<Vec<_>>()
+                    joining.filter(|(_, t)| self.may_join(&fit.terms, t.0)).filter_map(fitted).collect::<Vec<_>>()
                 })
                 .collect();
             all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
@@ -284,7 +284,7 @@ impl Search<'_> {
     }
 
     /// Effects that another account may have at most: of those that leave next to nothing the shorter is told.
-    fn longest_beside(&self, chosen: &Fit) -> usize {
+    fn longest_rival(&self, chosen: &Fit) -> usize {
         if self.leaves_little(chosen) { chosen.terms.len() } else { MOST }
     }
 
@@ -294,7 +294,7 @@ impl Search<'_> {
             return None;
         }
         let share = self.independent(std::slice::from_ref(chosen));
-        let most = self.longest_beside(chosen);
+        let most = self.longest_rival(chosen);
         // A longer account is believed, as several at once are, where it explains the torque.
         let is_rival = |f: &&Fit| !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f));
         let rivals: Vec<Fit> = pool.fits().iter().filter(is_rival).cloned().collect();
@@ -335,14 +335,14 @@ impl Search<'_> {
 
     /// Looks for one effect more beside the likeliest hypotheses that the chosen way passed by, as long as that is cheap: two causes that
     /// are each a poor account alone are found beside one another only.
-    fn look_beside(&self, chosen: &Fit, pool: &mut Pool) {
+    fn extend_rivals(&self, chosen: &Fit, pool: &mut Pool) {
         if self.at_floor(chosen) || self.is_negligible(chosen) {
             return;
         }
         let share = self.independent(std::slice::from_ref(chosen));
         for size in 1..=chosen.terms.len().max(1) {
             for fit in self.likeliest(size, share, pool) {
-                if self.problem.steps() > BUDGET_BESIDE {
+                if self.problem.steps() > BUDGET_OF_RIVALS {
                     return;
                 }
                 self.extended(&fit, size, pool);
@@ -366,7 +366,7 @@ impl Search<'_> {
     /// The fits with one effect more, each looked for once; anew beside a fit that leaves materially less than the one beside which they
     /// were looked for, which is not what they would have to explain.
     fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
-        if let Some(known) = pool.extensions(&fit.terms, |left| !self.is_material_beside(left, fit)) {
+        if let Some(known) = pool.extensions(&fit.terms, |left| !self.leaves_materially_less(left, fit)) {
             return known;
         }
         let mut added = self.added(fit, keep);
@@ -385,7 +385,7 @@ impl Search<'_> {
 
     /// Effects added beside the axis as its data sheet has it, and only then its parameters freed: of several causes each shows itself
     /// beside the true parameters, while free ones run off with what all of them do.
-    fn beside_the_data_sheet(&self, given: &Fit) -> Option<Fit> {
+    fn from_nominal_parameters(&self, given: &Fit) -> Option<Fit> {
         let held = Search {
             problem: self.problem.with_parameters_held(),
             reference: self.reference,
@@ -403,16 +403,16 @@ impl Search<'_> {
     }
 
     #[cfg(test)]
-    pub fn alone_beside_the_data_sheet(&mut self) -> Option<Fit> {
-        let begun = self.begun();
-        self.beside_the_data_sheet(&begun.given)
+    pub fn only_from_nominal_parameters(&mut self) -> Option<Fit> {
+        let baseline = self.baseline();
+        self.from_nominal_parameters(&baseline.given)
     }
 
     /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what
     /// an effect does, and free beside it take it again.
     fn put_back(&self, fit: &Fit) -> Vec<Fit> {
         let nominal = &self.problem.nominal;
-        if !self.have_moved(fit, if fit.terms.is_empty() { MOVED } else { MOVED_BESIDE }) {
+        if !self.have_moved(fit, if fit.terms.is_empty() { MOVED } else { MOVED_WITH_EFFECTS }) {
             return Vec::new();
         }
         let back = self.problem.given(&Model { parameters: nominal.parameters, ..fit.model });
@@ -423,10 +423,10 @@ impl Search<'_> {
 
     /// The fit with each effect that may join it, a few steps from the best starts of all.
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
-        let Some(look) = Look::beside(&self.problem, fit) else { return Vec::new() };
+        let Some(screening) = Screening::of(&self.problem, fit) else { return Vec::new() };
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
         let of = |terms: Vec<Term>| -> Vec<StartPoint> {
-            terms.par_iter().flat_map_iter(|t| look.starts(*t).into_iter().take(2)).collect()
+            terms.par_iter().flat_map_iter(|t| screening.starts(*t).into_iter().take(2)).collect()
         };
         // Forms that free more than another are looked at where that other is among the best.
         let mut points = of(suspects.iter().flat_map(|e| forms(*e, false)).collect());
@@ -442,10 +442,10 @@ impl Search<'_> {
         points.extend(richer);
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         points.truncate(FITTED);
-        let from = look.fit.discrepancy;
+        let from = screening.fit.discrepancy;
         let done = AtomicUsize::new(0);
         let probe = |start: &StartPoint| {
-            let fitted = look.fitted(start, keep, from);
+            let fitted = screening.fitted(start, keep, from);
             let n = done.fetch_add(1, Ordering::Relaxed) + 1;
             (self.progress)(&format!("{n} of {} fits of a cause beside {}", points.len(), fit.terms.len()));
             fitted
@@ -462,7 +462,7 @@ impl Search<'_> {
             let at = self.problem.along(&self.bare(fit, i), fit.bandwidth)?;
             Some(self.band().log_likelihood(&at.rows, at.s))
         };
-        let known = pool.settled(&terms).filter(|k| bare().is_none_or(|l| k.log_likelihood >= l));
+        let known = pool.converged(&terms).filter(|k| bare().is_none_or(|l| k.log_likelihood >= l));
         known.cloned().or_else(|| self.refitted(fit, i))
     }
 
@@ -502,18 +502,18 @@ impl Search<'_> {
     }
 
     /// What an effect is looked for in: the fit without one of its effects, everything else from where it stands.
-    fn beside(&self, fit: &Fit, i: usize) -> Option<Look<'_>> {
+    fn screening_without(&self, fit: &Fit, i: usize) -> Option<Screening<'_>> {
         let mut terms = fit.terms.clone();
         terms.remove(i);
         let held = Fit { terms, ..self.problem.given(&self.bare(fit, i))? };
-        Look::beside(&self.problem, &self.problem.freed(&held)?)
+        Screening::of(&self.problem, &self.problem.freed(&held)?)
     }
 
     /// The fit with another effect in the place of one of its own.
     pub fn with_another(&self, fit: &Fit, i: usize, other: Term) -> Option<Fit> {
-        let look = self.beside(fit, i)?;
-        let start = look.starts(other).into_iter().next()?;
-        self.problem.deepen(&look.fitted(&start, i, fit.discrepancy)?)
+        let screening = self.screening_without(fit, i)?;
+        let start = screening.starts(other).into_iter().next()?;
+        self.problem.deepen(&screening.fitted(&start, i, fit.discrepancy)?)
     }
 
     /// The fit with one of its effects in each form that frees more, everything else from where it stands: what the plain form lacks the
@@ -522,10 +522,12 @@ impl Search<'_> {
         let (effect, form) = fit.terms[i];
         let info = effect.info();
         let richer: Vec<usize> = (0..info.variants.len()).filter(|v| info.frees_more(*v, form)).collect();
-        let Some(look) = (!richer.is_empty()).then(|| self.beside(fit, i)).flatten() else { return Vec::new() };
+        let Some(screening) = (!richer.is_empty()).then(|| self.screening_without(fit, i)).flatten() else {
+            return Vec::new();
+        };
         let points: Vec<StartPoint> =
-            richer.par_iter().flat_map_iter(|v| look.starts((effect, *v)).into_iter().take(2)).collect();
-        let probed = points.par_iter().filter_map(|start| look.fitted(start, i, fit.discrepancy)).collect();
+            richer.par_iter().flat_map_iter(|v| screening.starts((effect, *v)).into_iter().take(2)).collect();
+        let probed = points.par_iter().filter_map(|start| screening.fitted(start, i, fit.discrepancy)).collect();
         self.raced(probed, Some(fit))
     }
 
@@ -613,7 +615,7 @@ mod tests {
     use crate::effects::{EFFECTS, Settings};
 
     fn fit(terms: &[Term]) -> Fit {
-        Fit::told(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
+        Fit::of_likelihood(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::gap::{Gap, Gaps};
 use super::location::Location;
 use super::overlay::Overlay;
 use super::prepared::Prepared;
-use super::procedure::TOLD;
+use super::procedure::REPORTED;
 use super::residual::remains;
 use super::verdict::Verdict;
 use crate::axis::{AxisKind, Structure};
@@ -34,7 +34,7 @@ pub fn build(
     let ranking = decision
         .ranking
         .par_iter()
-        .take(TOLD)
+        .take(REPORTED)
         .map(|w| Ranked {
             hypothesis: w.fit.hypothesis(),
             site: w.fit.terms.first().map(|t| Site::of(t.0.info().place, structure)),
@@ -46,7 +46,7 @@ pub fn build(
         .collect();
     let causes = match decision.torque_gain().zip(Effect::of_gain()) {
         Some(((gain, std), (effect, parameter))) if decision.verdict == Verdict::Parameters => {
-            vec![Cause::alone(effect, parameter, gain, std, case.motion)]
+            vec![Cause::sole(effect, parameter, gain, std, case.motion)]
         }
         _ => causes(decision, case.motion),
     };

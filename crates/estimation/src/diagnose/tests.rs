@@ -211,14 +211,14 @@ fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
         assert_eq!(found.effects(), [Effect::CoulombMotor]);
         let (part, lacks) = searched.worst_beyond(&record, &case, &found.model).expect("a further part");
         let search = part.search(&case, EFFECTS.to_vec(), &|_| ());
-        assert!(!late || search.is_material_beside(&lacks, &found));
+        assert!(!late || search.leaves_materially_less(&lacks, &found));
         let all = decide_further(search, &found).map(|d| d.chosen.effects());
         assert_eq!(all, late.then(|| vec![Effect::CoulombMotor, Effect::EndStop]));
     }
 }
 
 /// What was tried, for a test that fails.
-fn told(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
+fn ranking(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
     let line = |w: &super::conclusion::Weighed| {
         let values = w.fit.terms.iter().map(|(e, _)| w.fit.model.effects.of(*e).to_vec()).collect();
         (w.fit.hypothesis().to_string(), w.evidence, values)
@@ -328,7 +328,7 @@ fn a_friction_and_a_load_are_not_told_apart_where_the_axis_never_goes_back() {
         let o = diagnosed(&onwards(effect, 0.03), INERTIA);
         let families: Vec<[&str; 2]> =
             o.decision.confusable.iter().map(|c| [c.named, c.other].map(|e| e.info().family.as_str())).collect();
-        assert_eq!(families, [["dry_friction", "load_torque"]], "{:?} {:?}", named(&o), told(&o));
+        assert_eq!(families, [["dry_friction", "load_torque"]], "{:?} {:?}", named(&o), ranking(&o));
         // Every axis has friction, few carry a weight, as the effects' own odds have it.
         assert!(o.decision.probabilities.iter().all(|p| (0.5..0.8).contains(p)), "{:?}", o.decision.probabilities);
     }
@@ -339,9 +339,13 @@ fn what_follows_a_wandering_torque_is_no_cause() {
     for effect in [Effect::LoadMotor, Effect::CoulombMotor] {
         let o = diagnosed(&onwards(effect, 0.05), INERTIA);
         let causes: Vec<Effect> = o.diagnosis.causes.iter().map(|c| c.effect).collect();
-        assert!([vec![Effect::CoulombMotor], vec![Effect::LoadMotor]].contains(&causes), "{causes:?} {:?}", told(&o));
+        assert!(
+            [vec![Effect::CoulombMotor], vec![Effect::LoadMotor]].contains(&causes),
+            "{causes:?} {:?}",
+            ranking(&o)
+        );
         let pair = |c: &super::conclusion::Confusable| [c.named, c.other] == [Effect::CoulombMotor, Effect::LoadMotor];
-        assert!(o.decision.confusable.iter().any(pair), "{:?}", told(&o));
+        assert!(o.decision.confusable.iter().any(pair), "{:?}", ranking(&o));
     }
 }
 
@@ -358,7 +362,7 @@ fn a_stage_with_nothing_hidden_has_no_cause_whatever_the_noise_of_its_torque() {
 fn friction_and_a_bias_are_named_with_their_sizes_at_the_axis() {
     let hidden = [(Effect::CoulombMotor, 0, 1.5), (Effect::ViscousMotor, 0, 2.0), (Effect::LoadMotor, 0, 0.8)];
     let o = diagnosed(&logged(with(&hidden), 1.0, 0.02, |t| 0.02 * (0.31 * t * t).sin(), 2), 1.1 * INERTIA);
-    assert_eq!(named(&o), ["dry_friction", "load_torque", "viscous_friction"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["dry_friction", "load_torque", "viscous_friction"], "{:#?}", ranking(&o));
     for (effect, i, value) in hidden {
         let got = o.improved.effects.of(effect)[i];
         assert!((got / value - 1.0).abs() < 0.03, "{effect:?} {got}");
@@ -394,7 +398,7 @@ fn a_torque_that_the_library_has_no_law_for_is_not_named() {
 fn a_third_inertia_on_a_spring_is_found_at_its_frequency() {
     let hidden = [(Effect::MotorMode, 0, 0.8), (Effect::MotorMode, 1, 12.8), (Effect::MotorMode, 2, 0.16)];
     let o = diagnosed(&logged(with(&hidden), 1.0, 0.01, |_| 0.0, 5), INERTIA);
-    assert_eq!(named(&o), ["flexible_mode"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["flexible_mode"], "{:#?}", ranking(&o));
     let [inertia, stiffness, _] = *o.improved.effects.of(Effect::MotorMode) else { unreachable!() };
     assert!(((stiffness / inertia).sqrt() / 4.0 - 1.0).abs() < 0.02, "{inertia} {stiffness}");
     // The held-out third begins while it swings: that is no torque that the model lacks.
@@ -407,7 +411,7 @@ fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
     // Up to 50 rad/s, under a motion of 0.9 and 2.3.
     let hidden = [(Effect::TorqueRipple, 0, 0.06), (Effect::TorqueRipple, 1, 30.0), (Effect::TorqueRipple, 2, 0.5)];
     let o = diagnosed(&logged(with(&hidden), 1.0, 1e-9, |_| 0.0, 6), INERTIA);
-    assert_eq!(named(&o), ["torque_ripple"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["torque_ripple"], "{:#?}", ranking(&o));
     assert!((o.improved.effects.of(Effect::TorqueRipple)[1] / 30.0 - 1.0).abs() < 1e-3);
 }
 
@@ -420,7 +424,7 @@ fn a_small_cause_that_explains_next_to_all_that_a_large_one_leaves_is_named_besi
         (Effect::TorqueRipple, 2, 0.4),
     ];
     let o = diagnosed(&logged(with(&hidden), 1.0, 1e-3, |_| 0.0, 9), INERTIA);
-    assert_eq!(named(&o), ["dry_friction", "torque_ripple"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["dry_friction", "torque_ripple"], "{:#?}", ranking(&o));
     // A fiftieth of what the friction makes.
     assert!((o.improved.effects.of(Effect::TorqueRipple)[0] / 0.8 - 1.0).abs() < 0.05);
 }
@@ -447,7 +451,7 @@ fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free
     let suspects =
         EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
     let mut search = searched.search(&case, suspects, &|_| ());
-    let fit = search.alone_beside_the_data_sheet().expect("causes");
+    let fit = search.only_from_nominal_parameters().expect("causes");
     assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
     assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
     assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
@@ -521,7 +525,7 @@ fn of_an_axis_that_swings_too_fast_to_be_held_to_the_stiffness_is_found_from_afa
     let torque: Vec<f64> = (0..n).map(|_| noise(&mut rng, 20.0 * p.i1 / dt)).collect();
     let record = moved(fast, Settings::default(), &|t| torque[((t / dt).round() as usize).min(torque.len() - 1)], 0);
     let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 0.5 * k, ..fast });
-    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", told(&o));
+    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", ranking(&o));
     let found = o.improved.parameters.k;
     assert!((found / k - 1.0).abs() < 1e-3, "{found} {k}");
 }
@@ -532,7 +536,7 @@ fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
     let light = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5e-4, k: 0.018, rho: 1.0 };
     let friction = with(&[(Effect::CoulombMotor, 0, 2e-3)]);
     let o = diagnosed_as(&of_two_inertias(light, friction, 8e-3, 3), Structure::TwoInertia, light);
-    assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", ranking(&o));
     let delay = o.improved.effects.of(Effect::SensorDelay)[0];
     assert!((delay / 3e-3 - 1.0).abs() < 0.05, "{delay}");
 }
@@ -558,7 +562,7 @@ fn samples_taken_late_hide_neither_the_coupling_nor_the_friction_on_its_sides() 
     let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 1500.0, ..stiff });
     let mut effects: Vec<Effect> = o.decision.chosen.terms.iter().map(|t| t.0).collect();
     effects.sort_unstable();
-    assert_eq!(effects, [Effect::CoulombMotor, Effect::CoulombTable], "{:#?}", told(&o));
+    assert_eq!(effects, [Effect::CoulombMotor, Effect::CoulombTable], "{:#?}", ranking(&o));
     let k = o.improved.parameters.k;
     assert!((k / stiff.k - 1.0).abs() < 0.01, "{k}");
 }
@@ -601,7 +605,7 @@ fn of_two_large_causes_both_are_found() {
     ];
     let paper = Parameters::PAPER;
     let o = diagnosed_as(&of_two_inertias(paper, with(&hidden), 0.05, 0), Structure::TwoInertia, paper);
-    assert_eq!(named(&o), ["external_spring", "torque_ripple"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["external_spring", "torque_ripple"], "{:#?}", ranking(&o));
 }
 
 #[test]
@@ -609,7 +613,7 @@ fn inertias_whose_sum_alone_slow_motion_shows_are_told_apart_by_the_little_that_
     let screw = Parameters { i1: 1.63e-3, i2: 9.4e-4, b: 0.038, k: 449.0, rho: 1.0 };
     let nominal = Parameters { i1: 0.72 * screw.i1, i2: 1.1 * screw.i2, k: 0.87 * screw.k, ..screw };
     let o = diagnosed_as(&of_two_inertias(screw, Settings::default(), 0.7, 0), Structure::TwoInertia, nominal);
-    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", told(&o));
+    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", ranking(&o));
     let found = o.models[1].parameters;
     let off = [found.i1 / screw.i1, found.i2 / screw.i2, found.k / screw.k].map(|r| (r - 1.0).abs());
     assert!(off.iter().all(|o| *o < 0.03), "{off:?}");
@@ -624,7 +628,7 @@ fn the_common_factor_of_all_at_the_table_is_found_beside_its_friction() {
     let nominal = Parameters { i2: 0.8 * screw.i2, b: 0.8 * screw.b, k: 0.8 * screw.k, ..screw };
     let friction = with(&[(Effect::CoulombTable, 0, 0.15), (Effect::ViscousMotor, 0, 0.01)]);
     let o = diagnosed_as(&of_two_inertias(screw, friction, 0.7, 0), Structure::TwoInertia, nominal);
-    assert_eq!(named(&o), ["dry_friction", "viscous_friction"], "{:#?}", told(&o));
+    assert_eq!(named(&o), ["dry_friction", "viscous_friction"], "{:#?}", ranking(&o));
     let found = o.improved.parameters;
     let level = o.improved.effects.of(Effect::CoulombTable)[0] / 0.15;
     let off = [found.i2 / screw.i2, found.k / screw.k, level].map(|r| (r - 1.0).abs());
@@ -657,7 +661,7 @@ fn with_a_mode(plucked: bool) -> Record {
 fn a_mode_that_swings_when_a_short_record_begins_is_no_sine_beside_it() {
     for plucked in [false, true] {
         let o = diagnosed(&with_a_mode(plucked), INERTIA);
-        assert_eq!(named(&o), ["flexible_mode"], "{plucked} {:#?}", told(&o));
+        assert_eq!(named(&o), ["flexible_mode"], "{plucked} {:#?}", ranking(&o));
         let mode = o.improved.effects.of(Effect::MotorMode);
         let frequency = (mode[1] / mode[0]).sqrt();
         assert!((frequency / 70.0 - 1.0).abs() < 0.02, "{plucked} {frequency}");

@@ -35,16 +35,16 @@ struct Differences {
     weights: &'static [(i32, f64)],
     /// Samples between the values: half the sampling rate is theirs at that many.
     apart: usize,
-    words: &'static str,
+    name: &'static str,
 }
 
 const OF_POSITION: [Differences; 2] = [
-    Differences { weights: &[(-1, 1.0), (0, -2.0), (1, 1.0)], apart: 1, words: "second differences" },
-    Differences { weights: &[(-2, 1.0), (0, -2.0), (2, 1.0)], apart: 2, words: "second differences over two samples" },
+    Differences { weights: &[(-1, 1.0), (0, -2.0), (1, 1.0)], apart: 1, name: "second differences" },
+    Differences { weights: &[(-2, 1.0), (0, -2.0), (2, 1.0)], apart: 2, name: "second differences over two samples" },
 ];
 const OF_SPEED: [Differences; 2] = [
-    Differences { weights: &[(-1, -1.0), (0, 1.0)], apart: 1, words: "differences" },
-    Differences { weights: &[(-1, -1.0), (1, 1.0)], apart: 2, words: "differences over two samples" },
+    Differences { weights: &[(-1, -1.0), (0, 1.0)], apart: 1, name: "differences" },
+    Differences { weights: &[(-1, -1.0), (1, 1.0)], apart: 2, name: "differences over two samples" },
 ];
 
 /// How the torque is made of differences, `late` samples later: the share of its deviation that they leave, at every `stride`-th sample.
@@ -88,7 +88,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
                 "T",
                 format!(
                     "T is the {} of {} times a number, with the noise of that sensor in it: it was computed from the motion.",
-                    kind.words, channel.name
+                    kind.name, channel.name
                 ),
                 "It is no torque that was measured or commanded: the motion follows it whatever the machine is, and friction, play and every \
                  other effect are not in it.",

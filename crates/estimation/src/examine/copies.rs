@@ -8,7 +8,7 @@
 //! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: they differ by noise, quantisation and the twist of the
 //! coupling.
 
-use super::finding::{Finding, Severity, told};
+use super::finding::{Finding, Severity, rounded};
 use super::least::Line;
 use super::{Channel, Input};
 
@@ -70,8 +70,8 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
             behind.or_else(|| copy(&x.values[tail], &y.values[head]).map(|a| (a, -(lag as i64))))
         })
     };
-    let say = |signal: &'static str, other: &str, factor: f64, lag: i64, means: &str, remedy: &str| {
-        let by = if (factor - 1.0).abs() < 1e-9 { String::new() } else { format!(" times {}", told(factor)) };
+    let report = |signal: &'static str, other: &str, factor: f64, lag: i64, means: &str, remedy: &str| {
+        let by = if (factor - 1.0).abs() < 1e-9 { String::new() } else { format!(" times {}", rounded(factor)) };
         let when = match lag {
             0 => String::new(),
             1.. => format!(", {lag} samples later"),
@@ -92,13 +92,13 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
                       that moves.";
         for other in ["theta1", "omega1", "theta2", "omega2"].into_iter().filter_map(channel) {
             if let Some((factor, lag)) = late(other, t) {
-                findings.push(say("T", other.name, factor, lag, means, remedy));
+                findings.push(report("T", other.name, factor, lag, means, remedy));
                 return;
             }
             if other.name.starts_with("theta") && t.values.len() > 2 {
                 let rate = speed(other.values, input.dt);
                 if let Some(factor) = copy(&rate, &t.values[1..t.values.len() - 1]) {
-                    findings.push(say("T", &format!("the speed of {}", other.name), factor, 0, means, remedy));
+                    findings.push(report("T", &format!("the speed of {}", other.name), factor, 0, means, remedy));
                     return;
                 }
             }
@@ -108,7 +108,7 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
         let (Some(x), Some(y)) = (channel(one), channel(two)) else { continue };
         // One turned round, or in another unit, is told as that where the table has a motion of its own; here it has none.
         if let Some((factor, lag)) = late(x, y) {
-            findings.push(say(
+            findings.push(report(
                 signal,
                 one,
                 factor,

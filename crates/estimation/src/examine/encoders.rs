@@ -117,7 +117,7 @@ const GEAR_RATIO: f64 = 3.0;
 fn unit_finding(input: &Input<'_>, ratio: f64) -> Option<Finding> {
     let rho = input.nominal.map(|n| n.parameters.rho).filter(|r| *r > 0.0 && (r - 1.0).abs() > 0.5);
     let lead = rho.filter(|r| (ratio.abs().ln().abs() - r.ln().abs()).abs() < NEAR);
-    let words = lead
+    let meaning = lead
         .map(|r| format!("{r}, the lead of the screw (x2 for theta2)"))
         .or_else(|| factor_within(ratio, if ratio.abs() < 1.0 { HELD_TOLERANCE } else { NEAR }).map(str::to_owned))
         .filter(|_| ratio.abs() > 4.0 || ratio.abs() < 0.25)?;
@@ -125,7 +125,7 @@ fn unit_finding(input: &Input<'_>, ratio: f64) -> Option<Finding> {
         "units",
         Severity::Refuse,
         "theta2",
-        format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {words}."),
+        format!("theta2 moves {ratio:.4e} times as far as theta1, which looks like a factor of {meaning}."),
         "One of the two columns is in another unit than the file says.",
         "Give the unit in the header or in [signals] (unit = \"deg\"), or scale by the gear ratio.",
     ))

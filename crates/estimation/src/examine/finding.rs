@@ -119,7 +119,7 @@ pub(super) fn runs(n: usize, holds: impl Fn(usize) -> bool) -> Vec<Range<usize>>
 
 /// A size in a sentence: four digits behind the point where that reads well, else with its power of ten; never a number
 /// without bound, which extreme parameters lead to.
-pub(super) fn told(value: f64) -> String {
+pub(super) fn rounded(value: f64) -> String {
     match value.abs() {
         size if size > 1e300 => "more than 1e300".to_owned(),
         size if size == 0.0 || (1e-2..1e5).contains(&size) => format!("{value:.4}"),

@@ -200,7 +200,7 @@ const MAX_FORCE: f64 = 1e10;
 fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let linear = input.motion == AxisKind::Linear;
     let unit = |rotary| AxisKind::unit(input.motion, rotary);
-    let say = |signal: &'static str, seen: String, remedy: &str| {
+    let report = |signal: &'static str, seen: String, remedy: &str| {
         Finding::new(
             "magnitude",
             Severity::Refuse,
@@ -214,8 +214,8 @@ fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
         if channel.name == "T" {
             let typical = robust::quantile(channel.values.iter().copied(), 0.9);
             if typical > if linear { MAX_FORCE } else { MAX_TORQUE } {
-                let seen = format!("T is about {} {}: no drive gives that.", finding::told(typical), unit("N.m"));
-                findings.push(say(
+                let seen = format!("T is about {} {}: no drive gives that.", finding::rounded(typical), unit("N.m"));
+                findings.push(report(
                     "T",
                     seen,
                     "Give its unit in the header, or the drive's own factor as scale of T in [signals].",
@@ -234,13 +234,13 @@ fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
         };
         if speed > if linear { MAX_SPEED_LINEAR } else { MAX_SPEED_ROTARY } {
             let seen =
-                format!("{} moves at about {} {}: no axis does.", channel.name, finding::told(speed), unit("rad/s"));
+                format!("{} moves at about {} {}: no axis does.", channel.name, finding::rounded(speed), unit("rad/s"));
             let remedy = if linear {
                 "Give its unit in the header; of an encoder's counts the length of one (m) as scale in [signals]."
             } else {
                 "Give its unit in the header; of an encoder's counts the angle of one (2*pi over the counts of a turn) as scale in [signals]."
             };
-            findings.push(say(channel.name, seen, remedy));
+            findings.push(report(channel.name, seen, remedy));
         }
     }
 }

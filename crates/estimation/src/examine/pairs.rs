@@ -26,7 +26,7 @@ pub(super) fn factor(ratio: f64) -> Option<&'static str> {
 /// The factor that a ratio, or its inverse, is as near to as told, in their logarithms.
 pub(super) fn factor_within(ratio: f64, near: f64) -> Option<&'static str> {
     let size = ratio.abs().ln().abs();
-    FACTORS.iter().find(|(f, _)| (size - f.ln()).abs() < near).map(|(_, words)| *words)
+    FACTORS.iter().find(|(f, _)| (size - f.ln()).abs() < near).map(|(_, meaning)| *meaning)
 }
 
 /// Regression of the differences of an angle on the integral of a speed over as many samples, `dt` in s: the gain (1 where both are in one unit)
@@ -76,7 +76,7 @@ fn against(angle: &[f64], speed: &[f64], dt: f64) -> Option<(f64, f64)> {
 }
 
 /// Squared correlation from which a speed is the derivative of its angle.
-const FOLLOWS: f64 = 0.8;
+const COHERENT: f64 = 0.8;
 /// Squared correlation below which it is another signal.
 const FOREIGN: f64 = 0.3;
 
@@ -111,7 +111,7 @@ pub(super) fn speeds(input: &Input<'_>, findings: &mut Vec<Finding>) {
             findings.push(Finding::new(id, severity, speed, seen, means, remedy));
         };
         let leave = "Leave the column out of [signals], or map the right one.";
-        if alike >= FOLLOWS {
+        if alike >= COHERENT {
             if (gain + 1.0).abs() < 0.3 {
                 add(
                     findings,
@@ -121,13 +121,13 @@ pub(super) fn speeds(input: &Input<'_>, findings: &mut Vec<Finding>) {
                     "One of the two columns has its sign turned.",
                     "Give the turned column scale = -1 in [signals] of the axis file.",
                 );
-            } else if let Some(words) = factor(gain) {
+            } else if let Some(meaning) = factor(gain) {
                 add(
                     findings,
                     "units",
                     Severity::Refuse,
                     format!(
-                        "{angle} changes {gain:.4} times as fast as {speed} says, which looks like a factor of {words}."
+                        "{angle} changes {gain:.4} times as fast as {speed} says, which looks like a factor of {meaning}."
                     ),
                     "One of the two columns is in another unit than the file says.",
                     "Give the unit in the header or in [signals] (unit = \"deg\", \"rpm\", ...).",

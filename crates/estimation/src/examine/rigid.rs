@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::finding::{Finding, Severity, told};
+use super::finding::{Finding, Severity, rounded};
 use super::least::{bounded, standard_error};
 use super::motor_side::fits_better_as_logged;
 use super::pairs::{FACTORS, factor};
@@ -246,13 +246,14 @@ pub(super) fn inertia_finding(
         return None;
     }
     let unit = AxisKind::unit(input.motion, "kg.m2");
-    let seen = format!("The inertia that moves is {:.4e} {unit}, {} times the nominal one", found.value, told(ratio));
+    let seen =
+        format!("The inertia that moves is {:.4e} {unit}, {} times the nominal one", found.value, rounded(ratio));
     // Sizes of the factors, in their logarithms, that the interval lets in; of an inertia that may be none, all.
     let [least, most] = if ratio > 1.0 { [low, high] } else { [1.0 / high, 1.0 / low.max(0.0)] }.map(f64::ln);
     let let_in = FACTORS.iter().filter(|(f, _)| (least..=most).contains(&f.ln())).count();
-    let words = factor(ratio).filter(|_| let_in <= 1);
+    let meaning = factor(ratio).filter(|_| let_in <= 1);
     let beyond = low >= MAX_NOMINAL_ERROR || low > 0.0 && high <= 1.0 / MAX_NOMINAL_ERROR;
-    if words.is_none() && !(sure && beyond) {
+    if meaning.is_none() && !(sure && beyond) {
         return Some(Finding::new(
             "inertia",
             Severity::Warn,
@@ -262,9 +263,9 @@ pub(super) fn inertia_finding(
             "Check [parameters] and the scale of T in [signals]; `eixo identify` reads the inertia from this record.",
         ));
     }
-    let like = words.map_or_else(
+    let like = meaning.map_or_else(
         || "further off than a nominal value is".to_owned(),
-        |words| format!("which looks like a factor of {words}"),
+        |meaning| format!("which looks like a factor of {meaning}"),
     );
     Some(Finding::new(
         "units",

@@ -8,7 +8,7 @@
 //! I2*(a1 - d'') = B*d' + K*d
 //! ```
 
-use super::finding::{Finding, Severity, told};
+use super::finding::{Finding, Severity, rounded};
 use super::motor_side::fit_as_twist;
 use super::rigid::{MotionLines, rigid_band};
 use super::{Input, NOMINAL_OFF};
@@ -17,7 +17,7 @@ use crate::numerics::level::deviation;
 /// Standard deviation over that of the motor angle up to which a column may be the twist: at half the antiresonance it is a third.
 const SMALL: f64 = 0.5;
 /// Share of the power of the table's acceleration, over all lines of slow motion, that the column must explain.
-const FOLLOWS: f64 = 0.8;
+const EXPLAINED: f64 = 0.8;
 /// Least number of lines for that share to be significant.
 const LEAST: usize = 6;
 
@@ -41,7 +41,7 @@ pub(super) fn logged(input: &Input<'_>) -> Option<Finding> {
         "theta2",
         format!(
             "theta2 goes {} times as far as theta1, as the twist of the coupling does and no table: it is {difference}.",
-            told(share)
+            rounded(share)
         ),
         "The column holds the difference of the two encoders and not the table's angle.",
         format!(
@@ -72,6 +72,6 @@ fn accelerates_the_table(input: &Input<'_>, sign: f64) -> bool {
     }
     let (k, b) = ((by_twist / twists).max(0.0), (by_rate / rates).max(0.0));
     let stiffness = nominal.parameters.k / nominal.parameters.i2;
-    k * by_twist + b * by_rate > FOLLOWS * accelerations
+    k * by_twist + b * by_rate > EXPLAINED * accelerations
         && (NOMINAL_OFF.recip()..NOMINAL_OFF).contains(&(k / stiffness))
 }

@@ -46,8 +46,8 @@ pub fn mask(record: &Record, structure: Structure) -> Vec<f64> {
     let mut mask: Vec<f64> = (0..n).map(|k| if outside(k) < 0.0 { 0.0 } else { rise(outside(k), edge) }).collect();
     for idle in &record.idle {
         for (k, w) in mask.iter_mut().enumerate().take(idle.end + SOFT).skip(idle.start.saturating_sub(SOFT)) {
-            let beside = idle.start.saturating_sub(k + 1).max(k.saturating_sub(idle.end));
-            *w *= if idle.contains(&k) { 0.0 } else { rise(beside as f64, SOFT as f64) };
+            let distance = idle.start.saturating_sub(k + 1).max(k.saturating_sub(idle.end));
+            *w *= if idle.contains(&k) { 0.0 } else { rise(distance as f64, SOFT as f64) };
         }
     }
     mask

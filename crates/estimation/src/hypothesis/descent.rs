@@ -27,8 +27,8 @@ const FIRST_STEPS: usize = 1;
 const FARTHEST_STEP: f64 = 0.5;
 /// Share of a discrepancy's variance that is left at least from one step to the next.
 const SHRINKS: f64 = 0.01;
-/// Change of a discrepancy, in the logarithm of its variance, below which it is settled.
-const SETTLED: f64 = 0.05;
+/// Change of a discrepancy, in the logarithm of its variance, below which it is converged.
+const CONVERGED: f64 = 0.05;
 /// Gain in log likelihood below which a fit is done.
 const WORTH: f64 = 0.05;
 /// Change of the feedback's bandwidth, in its logarithm, from which the motion is followed anew.
@@ -164,7 +164,7 @@ impl<'a> Descent<'a> {
         self.problem.band.log_likelihood(&self.at.rows, self.at.s)
     }
 
-    fn steps(&mut self, effort: usize, follows: bool) -> Option<()> {
+    fn steps(&mut self, effort: usize, adapts: bool) -> Option<()> {
         let band = self.problem.band;
         let mut damping = 0.0;
         for i in 0..effort {
@@ -174,11 +174,11 @@ impl<'a> Descent<'a> {
             let likelier = band.log_likelihood(&self.at.rows, found) > self.log_likelihood();
             let s = if likelier { found } else { self.at.s };
             let least = self.at.s.map(|v| SHRINKS * v);
-            let settled = (0..band.equations()).all(|i| (s[i].max(1e-300) / self.at.s[i]).ln().abs() < SETTLED);
+            let converged = (0..band.equations()).all(|i| (s[i].max(1e-300) / self.at.s[i]).ln().abs() < CONVERGED);
             self.at.s = [s[0].max(least[0]), s[1].max(least[1])];
             band.weigh(&mut self.at.rows, self.at.s);
-            let followed = follows && self.follow();
-            if settled && !followed && gained.is_none_or(|g| g < WORTH) {
+            let adapted = adapts && self.adapt_bandwidth();
+            if converged && !adapted && gained.is_none_or(|g| g < WORTH) {
                 break;
             }
             if gained.is_none() {
@@ -315,7 +315,7 @@ impl<'a> Descent<'a> {
     }
 
     /// Follows the record at another bandwidth where that is likelier: at a looser one, tried once from each, or at that of the discrepancy.
-    fn follow(&mut self) -> bool {
+    fn adapt_bandwidth(&mut self) -> bool {
         let (problem, at) = (self.problem, &mut self.at);
         if problem.is_without_simulation(&at.model) {
             return false;
@@ -359,7 +359,7 @@ impl<'a> Descent<'a> {
             bandwidth: self.at.bandwidth,
             rows: self.at.rows,
             iterations: self.iterations,
-            settled: false,
+            converged: false,
             at_bound,
         }
     }

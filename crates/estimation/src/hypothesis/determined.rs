@@ -58,7 +58,7 @@ mod tests {
     use crate::effects::Settings;
 
     fn fit(terms: &[Term]) -> Fit {
-        Fit::told(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
+        Fit::of_likelihood(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
     }
 
     #[test]

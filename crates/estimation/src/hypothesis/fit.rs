@@ -69,7 +69,7 @@ pub struct Fit {
     /// Steps that the fit took.
     pub iterations: usize,
     /// Whether it was made to its end.
-    pub settled: bool,
+    pub converged: bool,
     /// Whether an effect stands where physics would not let it go on to where the record wants it: at the limit where it is another.
     pub at_bound: bool,
 }
@@ -437,7 +437,7 @@ impl Problem<'_> {
             log_prior: 0.0,
             rows: at.rows,
             iterations: 0,
-            settled: false,
+            converged: false,
             at_bound: false,
         }
     }
@@ -455,7 +455,7 @@ impl Problem<'_> {
         let mut descent = Descent::new(&exact, &fit.model, &fit.terms, fit.discrepancy)?;
         descent.run(STEPS)?;
         descent.sharpen(false)?;
-        Some(Fit { settled: true, ..descent.done() })
+        Some(Fit { converged: true, ..descent.done() })
     }
 
     /// The fit decided for, along the model's own motion as far as that is likelier, with its standard errors. Below the floor of the noise no
@@ -466,7 +466,7 @@ impl Problem<'_> {
         let mut descent = Descent::resumed(&exact, fit);
         descent.sharpen(true)?;
         let std = descent.standard_errors(independent)?;
-        Some(Fit { std, settled: fit.settled, at_bound: fit.at_bound, ..descent.done() })
+        Some(Fit { std, converged: fit.converged, at_bound: fit.at_bound, ..descent.done() })
     }
 
     /// Whether physics lets the effects be what they are in a model.
@@ -537,7 +537,7 @@ pub fn largest(series: &[f64]) -> f64 {
 #[cfg(test)]
 impl Fit {
     /// A fit of effects that is as likely as told, of a model with its base parameters free.
-    pub fn told(model: Model, terms: &[Term], log_likelihood: f64) -> Self {
+    pub fn of_likelihood(model: Model, terms: &[Term], log_likelihood: f64) -> Self {
         let base = BaseParameter::of(model.structure);
         let coordinates: Vec<Coordinate> = base.iter().map(|p| Coordinate::new(Free::Base(*p), &model)).collect();
         Self {
@@ -552,7 +552,7 @@ impl Fit {
             log_likelihood,
             log_prior: 0.0,
             iterations: 1,
-            settled: true,
+            converged: true,
             at_bound: false,
         }
     }

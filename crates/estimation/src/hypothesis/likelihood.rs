@@ -198,10 +198,10 @@ impl Band {
             Sight::Table => (1, 0),
         };
         let d = of(model);
-        let follows = d[side][hidden] / d[hidden][hidden];
+        let transfer = d[side][hidden] / d[hidden][hidden];
         let mut seen = [[C::default(); 2]; 2];
         seen[0][0] = self.combine[m][side]
-            * (x[side][side] - x[side][hidden] * follows * 2.0 + x[hidden][hidden] * follows * follows);
+            * (x[side][side] - x[side][hidden] * transfer * 2.0 + x[hidden][hidden] * transfer * transfer);
         seen
     }
 
@@ -236,11 +236,11 @@ impl Band {
                 let [n1, n2] = self.seen(m);
                 let (noise, det) = if self.sight == Sight::Both {
                     // Moved together the sides do not strain the spring.
-                    let together = v.map(|row| row[0] + row[1]);
+                    let in_phase = v.map(|row| row[0] + row[1]);
                     let of = |i: usize, j: usize| {
                         v[i][0] * v[j][0].conj() * n1
                             + v[i][1] * v[j][1].conj() * n2
-                            + together[i] * together[j].conj() * self.common
+                            + in_phase[i] * in_phase[j].conj() * self.common
                     };
                     ((of(0, 0).re, of(1, 1).re, of(0, 1)), v[0][0] * v[1][1] - v[0][1] * v[1][0])
                 } else {

@@ -21,7 +21,7 @@ pub struct Scales {
     pub length: f64,
     pub top: f64,
     pub fastest: [f64; 2],
-    /// Speeds of motor and table below which a fifth of the way is gone.
+    /// Speeds of motor and table below which a fifth of the path is covered.
     slow: [f64; 2],
     /// Positions of motor and table, sorted.
     positions: [Vec<f64>; 2],
@@ -36,35 +36,35 @@ pub struct Scales {
     /// Square of the speed at which the record begins, (rad/s)^2.
     begins: f64,
     /// Way of motor and table to and fro, rad, and reversals.
-    ways: [(f64, f64); 2],
+    paths: [(f64, f64); 2],
     structure: Structure,
 }
 
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
-/// Share of the travel by which the way is longer where the motion goes back at all: the hundredth from which the examination of a
+/// Share of the travel by which the path is longer where the motion goes back at all: the hundredth from which the examination of a
 /// record counts a direction as one.
 const BACK: f64 = 0.01;
 
-/// Share of the way on which a torque that goes with the position must be in the band for it to be seen.
+/// Share of the path on which a torque that goes with the position must be in the band for it to be seen.
 const SEEN: f64 = 0.2;
 
-/// Speed below which that share of the way is gone, of speeds at equal intervals.
+/// Speed below which that share of the path is covered, of speeds at equal intervals.
 pub fn slow(speeds: impl Iterator<Item = f64>) -> f64 {
     let mut speeds: Vec<f64> = speeds.map(f64::abs).collect();
     speeds.sort_by(f64::total_cmp);
-    let way: f64 = speeds.iter().sum();
+    let path: f64 = speeds.iter().sum();
     let mut gone = 0.0;
     let seen = speeds.into_iter().find(|v| {
         gone += v;
-        gone >= SEEN * way
+        gone >= SEEN * path
     });
     seen.unwrap_or(0.0)
 }
 
-/// The way of a motion, and its reversals, those below a threshold left out.
-fn way(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
-    let (mut way, mut reversals) = (0.0, 0.0);
+/// The path of a motion, and its reversals, those below a threshold left out.
+fn path(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
+    let (mut path, mut reversals) = (0.0, 0.0);
     // Where the motion turned last, how far it has come since, and which way.
     let mut from: Option<f64> = None;
     let (mut farthest, mut towards) = (0.0, 0.0);
@@ -80,12 +80,12 @@ fn way(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
         } else if (x - farthest) * towards > 0.0 {
             farthest = x;
         } else if (farthest - x) * towards > threshold {
-            way += (farthest - start).abs();
+            path += (farthest - start).abs();
             reversals += 1.0;
             (from, towards, farthest) = (Some(farthest), -towards, x);
         }
     }
-    (way + from.map_or(0.0, |start| (farthest - start).abs()), reversals)
+    (path + from.map_or(0.0, |start| (farthest - start).abs()), reversals)
 }
 
 /// Whether the torque acts in a model when and as it was logged.
@@ -95,19 +95,19 @@ fn is_as_logged(model: &Model) -> bool {
 }
 
 /// Work of the torque that acts in a model along a motion, J: what comes late, through a lag or cut off did other work than what was
-/// logged, where the motion swings as fast as that even of the other sign. `moved`: way from sample to sample, rad.
+/// logged, where the motion swings as fast as that even of the other sign. `moved`: path from sample to sample, rad.
 fn work_of(model: &Model, record: &Record, moved: &[f64]) -> f64 {
     let (model, ahead) = model.on_time();
     let per = record.instants();
     let h = record.dt / per as f64;
     let on = model.effects.active();
-    let mut history = TorqueHistory::settled(record.torque[0]);
+    let mut history = TorqueHistory::constant(record.torque[0]);
     let mut work = 0.0;
-    for (k, way) in moved.iter().enumerate() {
+    for (k, path) in moved.iter().enumerate() {
         for j in 0..per {
             let logged = record.ramp(k, j, per, ahead);
             let acts = model.effects.transform_input(&on, logged, h, &mut history);
-            work += 0.5 * (acts.start + acts.end) * way / per as f64;
+            work += 0.5 * (acts.start + acts.end) * path / per as f64;
         }
     }
     work
@@ -134,9 +134,9 @@ impl Scales {
         let work = work_of(&p.nominal, p.record, &moved);
         let shifted = (t.motion[last][2 * driven] - t.motion[0][2 * driven]).abs();
         let peak = p.peak;
-        let ways = [0, 1].map(|i: usize| {
+        let paths = [0, 1].map(|i: usize| {
             let noise = p.record.channels[2 * i].as_ref().map_or(0.0, |_| p.record.noise[2 * i]);
-            way(t.motion.iter().map(|m| m[2 * i]), TURN * noise)
+            path(t.motion.iter().map(|m| m[2 * i]), TURN * noise)
         });
         let sorted = |mut x: Vec<f64>| {
             x.sort_by(f64::total_cmp);
@@ -153,7 +153,7 @@ impl Scales {
             given: peak * shifted,
             moved,
             begins: t.motion[0][2 * driven + 1].powi(2),
-            ways,
+            paths,
             speed: [rms(&|m| m[1]), rms(&|m| m[3])],
             twist: rms(&|m| m[0] - m[2]).max(1e-15),
             rotation: [r1, r2],
@@ -201,7 +201,7 @@ impl Scales {
                 ],
                 stiffness: if rigid { 0.0 } else { p.k },
                 energy: work.max(0.0) + self.given + 0.5 * all * self.begins,
-                way: self.ways[side],
+                path: self.paths[side],
             };
             (info.bounds)(model.effects.of(e), &extent)
         })
@@ -211,7 +211,7 @@ impl Scales {
     pub fn goes_back(&self, effect: Effect) -> bool {
         let side = usize::from(effect.info().place == Place::Table);
         let [low, high] = self.travel[side];
-        self.ways[side].0 > (1.0 + BACK) * (high - low)
+        self.paths[side].0 > (1.0 + BACK) * (high - low)
     }
 
     /// The value that is a fraction of a scale.
@@ -237,8 +237,8 @@ mod tests {
     use crate::effects::Settings;
 
     #[test]
-    fn a_fifth_of_the_way_is_gone_below_a_speed() {
-        // A speed that grows evenly goes a fifth of its way below the root of a fifth of its end; one that is constant all of it at that.
+    fn a_fifth_of_the_path_is_covered_below_a_speed() {
+        // A speed that grows evenly goes a fifth of its path below the root of a fifth of its end; one that is constant all of it at that.
         let grows = slow((0..=1000).map(f64::from));
         assert!((grows / (1000.0 * 0.2_f64.sqrt()) - 1.0).abs() < 2e-3, "{grows}");
         assert_eq!(slow([2.0, -2.0, 2.0].into_iter()), 2.0);

@@ -54,12 +54,12 @@ pub fn in_frequency(scores: &[Vec<f64>], information: &[Vec<f64>]) -> Scores {
     let bins = scores.first().map_or(0, Vec::len);
     let totals: Vec<f64> = information.iter().map(|i| i.iter().sum::<f64>().max(f64::MIN_POSITIVE)).collect();
     let mut parts = vec![[0.0; STRETCHES]; scores.len()];
-    let mut told = 0.0;
+    let mut covered = 0.0;
     for m in 0..bins {
         let own: f64 =
             information.iter().zip(&totals).map(|(i, total)| i[m] / total).sum::<f64>() / scores.len() as f64;
-        let stretch = (((told + 0.5 * own) * STRETCHES as f64) as usize).min(STRETCHES - 1);
-        told += own;
+        let stretch = (((covered + 0.5 * own) * STRETCHES as f64) as usize).min(STRETCHES - 1);
+        covered += own;
         for (part, score) in parts.iter_mut().zip(scores) {
             part[stretch] += score[m];
         }
@@ -142,8 +142,11 @@ mod tests {
     #[test]
     fn stretches_of_the_band_tell_as_much_as_one_another() {
         // All that is told is told in the first eight bins.
-        let told: Vec<f64> = (0..64).map(|m| if m < 8 { 1.0 } else { 0.0 }).collect();
-        assert_eq!(in_frequency(std::slice::from_ref(&told), std::slice::from_ref(&told)), [[1.0; STRETCHES]]);
+        let information: Vec<f64> = (0..64).map(|m| if m < 8 { 1.0 } else { 0.0 }).collect();
+        assert_eq!(
+            in_frequency(std::slice::from_ref(&information), std::slice::from_ref(&information)),
+            [[1.0; STRETCHES]]
+        );
         assert!(in_frequency(&[], &[]).is_empty());
     }
 

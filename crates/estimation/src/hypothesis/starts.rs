@@ -22,16 +22,16 @@ pub struct StartPoint {
 }
 
 /// A fit beside which effects are looked for: along the motion as measured, stepped coarsely.
-pub struct Look<'a> {
+pub struct Screening<'a> {
     problem: Problem<'a>,
     /// The fit, along the motion as measured.
     pub fit: Fit,
     regression: Regression,
 }
 
-impl<'a> Look<'a> {
+impl<'a> Screening<'a> {
     /// `None` before the scales of the record are known.
-    pub fn beside(problem: &Problem<'a>, fit: &Fit) -> Option<Self> {
+    pub fn of(problem: &Problem<'a>, fit: &Fit) -> Option<Self> {
         let problem = problem.coarse();
         problem.scales.as_ref()?;
         let fit = problem.along_the_record(fit);
@@ -125,7 +125,7 @@ impl Regression {
     }
 
     /// Size of one column for the residual torque to vanish, and the gain in log likelihood.
-    fn alone(&self, p: &Problem<'_>, column: &[Vec<C>; 2]) -> Option<(f64, f64)> {
+    fn single(&self, p: &Problem<'_>, column: &[Vec<C>; 2]) -> Option<(f64, f64)> {
         let v = p.band.whiten(column, &self.weights, self.s);
         let own = dot(&v, &v) - self.q.iter().map(|q| dot(q, &v).powi(2)).sum::<f64>();
         let along = -dot(&v, &self.z);
@@ -235,7 +235,7 @@ fn modes(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Ve
     let acceleration = p.band.acceleration(&motion.iter().map(|m| m[2 * side]).collect::<Vec<f64>>());
     let looked_at = |w: f64, ratio: f64| -> Option<(f64, f64, [f64; 3])> {
         let column = p.band.mode_column(side, &acceleration, [1.0, w * w, 2.0 * ratio * w]);
-        let (size, gain) = reg.alone(p, &column)?;
+        let (size, gain) = reg.single(p, &column)?;
         (size > 0.0).then_some((gain, w, [size, size * w * w, size * 2.0 * ratio * w]))
     };
     let best_of = |frequencies: Vec<f64>, ratios: &[f64]| -> Vec<(f64, f64, [f64; 3])> {

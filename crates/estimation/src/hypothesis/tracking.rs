@@ -125,7 +125,7 @@ impl Held<'_> {
         };
         let first = initial(record);
         let mut state = axis.resume(first, &model.memory, record.start + ahead);
-        let mut inputs = TorqueHistory::settled(*record.torque.first()?);
+        let mut inputs = TorqueHistory::constant(*record.torque.first()?);
         let sensed = !axis.on().sensors().is_empty();
         let mut history = sensed.then(|| model.effects.initial_readings(axis.on(), state.reading(), dt));
         let mut error = [vec![0.0; n], vec![0.0; n]];
@@ -300,7 +300,7 @@ impl Run {
         let mut state = axis.resume(motion, &self.memory, record.time(range.start) + ahead);
         // What the torque's way in remembers comes from the samples before.
         let warm = range.start.saturating_sub(WARM);
-        let mut inputs = TorqueHistory::settled(record.torque[warm]);
+        let mut inputs = TorqueHistory::constant(record.torque[warm]);
         let torque = |k: usize, inputs: &mut TorqueHistory<f64>, j: usize| {
             let ramp = record.ramp(k, j, per, *ahead);
             if axis.on().inputs().is_empty() { ramp } else { model.effects.transform_input(axis.on(), ramp, h, inputs) }

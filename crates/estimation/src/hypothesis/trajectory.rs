@@ -63,7 +63,7 @@ impl Trajectory {
         }
         if changes_input {
             let on = model.effects.active();
-            let mut history = TorqueHistory::settled(self.logged.first().map_or(0.0, |r| r.start));
+            let mut history = TorqueHistory::constant(self.logged.first().map_or(0.0, |r| r.start));
             self.add(&mut resisted, [1.0, 0.0], |i| {
                 let logged = self.logged[i];
                 let arrived = model.effects.transform_input(&on, logged, self.h, &mut history);

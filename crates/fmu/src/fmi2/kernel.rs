@@ -116,7 +116,7 @@ impl Kernel {
         if self.live {
             self.state = axis.take_over(&self.state, self.time);
             if axis.on().inputs() != self.axis.on().inputs() {
-                self.torques = TorqueHistory::settled(values.of(Slot::Torque));
+                self.torques = TorqueHistory::constant(values.of(Slot::Torque));
             }
             if axis.on().sensors() != self.axis.on().sensors() {
                 self.readings = axis.effects().initial_readings(axis.on(), self.state.reading(), h);

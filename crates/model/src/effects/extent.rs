@@ -30,7 +30,7 @@ pub struct Extent<'a> {
     /// Most that friction can have taken out of the axis over the record, J: the work of the torque, and what was stored before.
     pub energy: f64,
     /// Length of that side's path to and fro, rad, and its number of reversals.
-    pub way: (f64, f64),
+    pub path: (f64, f64),
 }
 
 /// Factor by which the energy that friction took may seem to exceed what there was: torque and path are measured.
@@ -66,20 +66,20 @@ impl Extent<'_> {
         self.positions.last().unwrap_or(&0.0) - self.positions.first().unwrap_or(&0.0)
     }
 
-    /// Whether a dry friction of a level, N.m, can have dissipated no more energy than there was. It slides over the whole way but for the
+    /// Whether a dry friction of a level, N.m, can have dissipated no more energy than there was. It slides over the whole path but for the
     /// presliding at every reversal, of the displacement `presliding`, rad; a level above every torque would not slide.
     #[must_use]
-    pub fn feeds_dry(&self, level: f64, presliding: f64) -> bool {
-        let (way, reversals) = self.way;
-        level.abs() * (way - 4.0 * presliding * (1.0 + reversals)).max(0.0) <= MEASURED * self.energy
+    pub fn can_dissipate_dry(&self, level: f64, presliding: f64) -> bool {
+        let (path, reversals) = self.path;
+        level.abs() * (path - 4.0 * presliding * (1.0 + reversals)).max(0.0) <= MEASURED * self.energy
     }
 
     /// The same of a friction that grows with a power of the speed, of `coefficient*speed^power`: at the least that of a steady motion over
-    /// the same way.
+    /// the same path.
     #[must_use]
-    pub fn feeds(&self, coefficient: f64, power: i32) -> bool {
-        let (way, _) = self.way;
-        coefficient * (way / self.length).powi(power) * way <= MEASURED * self.energy
+    pub fn can_dissipate(&self, coefficient: f64, power: i32) -> bool {
+        let (path, _) = self.path;
+        coefficient * (path / self.length).powi(power) * path <= MEASURED * self.energy
     }
 
     /// Share of the samples beyond two positions.
@@ -125,7 +125,7 @@ impl Extent<'_> {
     /// friction has a shape of its own there: its rms speed counts instead.
     #[must_use]
     pub fn turns(&self, order: f64) -> bool {
-        let (_, reversals) = self.way;
+        let (_, reversals) = self.path;
         let speed = if reversals > 0.0 { self.slow } else { self.speed };
         order * self.travel() >= 0.75 * std::f64::consts::TAU && order * speed <= self.band
     }
@@ -151,7 +151,7 @@ mod tests {
             inertia: [1.0; 2],
             stiffness: 0.0,
             energy: 1.0,
-            way: (1.0, 0.0),
+            path: (1.0, 0.0),
         }
     }
 
@@ -164,7 +164,7 @@ mod tests {
             length: 10.0,
             band: 100.0,
             energy: 2.0,
-            way: (20.0, 9.0),
+            path: (20.0, 9.0),
             ..resting()
         };
         let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);
@@ -228,7 +228,7 @@ mod tests {
     fn a_ripple_faster_than_the_band_at_the_rms_speed_is_seen_where_the_axis_is_slow() {
         // At a radian a second, in a band of 1000 rad/s.
         let admits = |order: f64, reversals: f64| {
-            let extent = Extent { way: (10.0, reversals), ..resting() };
+            let extent = Extent { path: (10.0, reversals), ..resting() };
             (Effect::TorqueRipple.info().bounds)(&[0.5, order, 0.0], &extent)
         };
         assert!(admits(900.0, 5.0) && admits(2000.0, 5.0) && !admits(4000.0, 5.0));

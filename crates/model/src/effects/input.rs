@@ -61,14 +61,14 @@ pub struct TorqueHistory<S> {
 
 impl<S: Scalar> Default for TorqueHistory<S> {
     fn default() -> Self {
-        Self::settled(S::default())
+        Self::constant(S::default())
     }
 }
 
 impl<S: Scalar> TorqueHistory<S> {
     /// A history in which the torque has always been `torque`.
     #[must_use]
-    pub fn settled(torque: S) -> Self {
+    pub fn constant(torque: S) -> Self {
         Self {
             past: [Ramp::held(torque); LONGEST_DELAY + 1],
             lengths: [f64::INFINITY; LONGEST_DELAY + 1],

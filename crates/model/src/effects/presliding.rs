@@ -46,7 +46,7 @@ impl<I: Side> Force for Presliding<I> {
         // A bristle that is more than critically damped on its own side's inertia is a dashpot: viscous friction by another name.
         bounds: |p, x| {
             let critical = 2.0 * (p[0] / p[1] * x.inertia[0]).sqrt();
-            p[0] <= x.torque && x.feeds_dry(p[0], p[1]) && p[1] <= 0.2 * x.travel() && p[2] <= critical
+            p[0] <= x.torque && x.can_dissipate_dry(p[0], p[1]) && p[1] <= 0.2 * x.travel() && p[2] <= critical
         },
         example: [&[0.006, 0.012, 1e-4], &[0.001, 0.01, 1e-5]][I::INDEX],
         variants: VARIANTS,

@@ -24,7 +24,7 @@ impl Force for QuadraticDrag {
         named: true,
         textbook: false,
         odds: 0.3,
-        bounds: |p, x| x.feeds(p[0], 2),
+        bounds: |p, x| x.can_dissipate(p[0], 2),
         example: &[1e-5],
         variants: &[Variant { name: "", free: &[0] }],
     };

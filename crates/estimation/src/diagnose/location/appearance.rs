@@ -6,7 +6,7 @@ use super::by_state::{Shape, StateCurve, StateVariable, shape};
 use super::by_time::Spread;
 
 /// A curve or a part of the spectrum is told from this share of the residual on.
-const TOLD: f64 = 0.5;
+const REPORTED: f64 = 0.5;
 /// Of two variables that explain alike to within this share, the earlier in the list is told.
 const ALIKE: f64 = 0.03;
 
@@ -61,7 +61,7 @@ pub fn dependence(curves: &[StateCurve], side: Side) -> Option<Dependence> {
     let most = all().map(|c| c.explained).fold(0.0, f64::max);
     let rank = |c: &&StateCurve| own(side).iter().position(|v| *v == c.against).unwrap_or(own(side).len());
     let best = all().filter(|c| c.explained >= most - ALIKE).min_by_key(rank)?;
-    (best.explained >= TOLD).then(|| Dependence {
+    (best.explained >= REPORTED).then(|| Dependence {
         shape: shape(best),
         against: best.against,
         explained: best.explained,
@@ -76,13 +76,13 @@ pub fn frequency(parts: &[FrequencyPart], side: Side) -> Option<OwnFrequency> {
         _ => None,
     });
     if let Some((order, share)) = orders.max_by(|a, b| a.1.total_cmp(&b.1))
-        && share > TOLD
+        && share > REPORTED
     {
         return Some(OwnFrequency::OfTheTurn { order, share });
     }
     let part = all().find(|p| p.of == PartOf::Foreign)?;
     let line = part.peak_rms * part.peak_rms / (part.rms * part.rms).max(f64::MIN_POSITIVE);
-    (part.share > TOLD && line > TOLD).then_some(OwnFrequency::Foreign(part.peak))
+    (part.share > REPORTED && line > REPORTED).then_some(OwnFrequency::Foreign(part.peak))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Conditions of the experiment that limit what it identifies: time scale, directions of motion, excited band.
 
 use crate::axis::Structure;
-use crate::examine::finding::{Finding, Severity, told};
+use crate::examine::finding::{Finding, Severity, rounded};
 use crate::examine::robust::{quantile, span};
 use crate::examine::{Input, Nominal};
 
@@ -10,7 +10,7 @@ pub(super) fn check_time_scale(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let Some(Nominal { structure: Structure::TwoInertia, parameters: p }) = input.nominal else { return };
     let natural = (p.k * (1.0 / p.i1 + 1.0 / p.i2)).sqrt();
     let duration = input.dt * input.len() as f64;
-    let say = |seen: String| {
+    let report = |seen: String| {
         Finding::new(
             "units",
             Severity::Refuse,
@@ -22,13 +22,13 @@ pub(super) fn check_time_scale(input: &Input<'_>, findings: &mut Vec<Finding>) {
     };
     if natural * input.dt > std::f64::consts::PI {
         let hertz = natural / std::f64::consts::TAU;
-        findings.push(say(format!(
+        findings.push(report(format!(
             "The nominal axis swings at {} Hz, the record is sampled every {} s: it could not show it.",
-            told(hertz),
-            told(input.dt)
+            rounded(hertz),
+            rounded(input.dt)
         )));
     } else if natural * duration < 1.0 {
-        findings.push(say(format!(
+        findings.push(report(format!(
             "The whole record lasts {duration:.3e} s, a small part of one swing of the nominal axis."
         )));
     }
@@ -64,11 +64,11 @@ pub(super) fn check_band(nominal: Option<Nominal>, band: [f64; 2], findings: &mu
             "T",
             format!(
                 "The motion follows the torque up to {} Hz; the nominal coupling shows from some {} Hz on.",
-                told(band[1]),
-                told(0.3 * anti)
+                rounded(band[1]),
+                rounded(0.3 * anti)
             ),
             "Stiffness and damping of the coupling are not determined by this record, nor how the inertia is shared.",
-            format!("Excite up to {} Hz (`eixo excite`), or describe the axis as rigid.", told(1.5 * anti)),
+            format!("Excite up to {} Hz (`eixo excite`), or describe the axis as rigid.", rounded(1.5 * anti)),
         ));
     }
 }
