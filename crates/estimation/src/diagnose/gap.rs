@@ -167,7 +167,8 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
                 return (vec![Errors::from_element(f64::INFINITY); parts], vec![[f64::NAN; 4]; n]);
             };
             let planner = &mut FftPlanner::new();
-            let mut rows = band.torque_residual(&fit.model, &tracked, Some(fit.discrepancy), planner).rows;
+            let mut rows =
+                band.torque_residual(&fit.model, &tracked.torque, &tracked.motion, Some(fit.discrepancy), planner).rows;
             for vibration in any_vibrations(band, &fits[2].model, planner) {
                 vibration.take_out(band, &weights, fits[2].discrepancy, &mut rows);
             }

@@ -13,7 +13,7 @@ use super::inverse_dynamics::InverseDynamics;
 use super::likelihood::{Band, C, MotionSpectra, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scales::Scales;
-use super::tracking::{Bandwidth, Resolution, Tracked, parts, track, track_step_by_step};
+use super::tracking::{Bandwidth, LARGEST, Resolution, Torques, Tracked, parts, track, track_step_by_step};
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
@@ -159,14 +159,16 @@ impl Problem<'_> {
         Self { resolution: Resolution::Coarse, ..self.clone() }
     }
 
-    /// The same for looks beside a fit of a rigid axis, whose motion others are compared along. Of two inertias what an effect does to the
+    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared. Of two inertias what an effect does to the
     /// motion between them is as large as what is left.
     #[must_use]
     pub fn along_the_motion_of(&self, fit: &Fit) -> Self {
         let dynamics = || {
-            self.motion.as_ref().filter(|_| self.nominal.structure == Structure::Rigid)?;
+            if self.nominal.structure != Structure::Rigid {
+                return None;
+            }
             let (tracked, trajectory) = self.track_step_by_step(&fit.model, fit.bandwidth)?;
-            InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.band, self.record)
+            InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.record)
         };
         Self { dynamics: dynamics().map(Arc::new), ..self.clone() }
     }
@@ -270,11 +272,10 @@ impl Problem<'_> {
         model: &Model,
         weighed_at: Option<Discrepancy>,
     ) -> Option<(TorqueResidual, &InverseDynamics)> {
-        let (dynamics, measured) = (self.dynamics.as_deref()?, self.motion.as_ref()?);
-        PLANNER.with_borrow_mut(|planner| {
-            let rows = dynamics.rows(model, self.band, self.record, measured, planner)?;
-            Some((self.band.residual_of_rows(model, rows, &dynamics.motion, weighed_at, planner), dynamics))
-        })
+        let dynamics = self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model))?;
+        let torque = dynamics.torque(model, self.record);
+        let is_bounded = torque.iter().flatten().all(|t| t.abs() < LARGEST);
+        is_bounded.then(|| (self.residual_along(model, &torque, &dynamics.motion, weighed_at), dynamics))
     }
 
     /// Whether a model is compared along the motion of another's run, whatever bandwidth it would follow the record at.
@@ -283,7 +284,17 @@ impl Problem<'_> {
     }
 
     fn residual(&self, model: &Model, tracked: &Tracked, weighed_at: Option<Discrepancy>) -> TorqueResidual {
-        PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, tracked, weighed_at, planner))
+        self.residual_along(model, &tracked.torque, &tracked.motion, weighed_at)
+    }
+
+    fn residual_along(
+        &self,
+        model: &Model,
+        torque: &Torques,
+        motion: &[[f64; 4]],
+        weighed_at: Option<Discrepancy>,
+    ) -> TorqueResidual {
+        PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, torque, motion, weighed_at, planner))
     }
 
     /// Step of a coordinate for its column.
@@ -387,7 +398,7 @@ impl Problem<'_> {
     pub fn nothing(&self) -> Fit {
         let mut tracked = Tracked::nothing(self.record.len());
         tracked.torque[0].copy_from_slice(&self.record.torque);
-        let rows = PLANNER.with_borrow_mut(|planner| self.band.torque_residual(&self.nominal, &tracked, None, planner));
+        let rows = self.residual(&self.nominal, &tracked, None);
         let s = self.band.discrepancy(&rows);
         self.unfitted(Along { model: self.nominal, rows, trajectory: None, s, bandwidth: self.bandwidth(s) })
     }

@@ -7,12 +7,8 @@
 
 use std::sync::Arc;
 
-use rustfft::FftPlanner;
-
-use super::hidden::Hidden;
-use super::likelihood::{Band, C, MotionSpectra};
-use super::model::{BaseParameter, Model};
-use super::tracking::{Bandwidth, Torques, Tracked};
+use super::model::Model;
+use super::tracking::{Bandwidth, Torques, Tracked, add_linear, measured_positions};
 use super::trajectory::Trajectory;
 use crate::conditioning::Record;
 use crate::effects::{EFFECTS, Effect};
@@ -20,33 +16,42 @@ use crate::effects::{EFFECTS, Effect};
 /// A run along which other models are compared.
 #[derive(Debug)]
 pub struct InverseDynamics {
-    model: Model,
     /// Bandwidth at which it followed the record, rad/s.
     pub bandwidth: Bandwidth,
     /// Its motion at the samples, `[theta1, omega1, theta2, omega2]`.
     pub motion: Vec<[f64; 4]>,
     pub trajectory: Arc<Trajectory>,
-    /// What it lacks beside its own effects and third inertias: torques on motor and table, N.m.
-    without_effects: Torques,
+    /// Positions as measured, rad; zero of a side that is not.
+    measured: Torques,
+    /// What it lacks beside its own parameters and effects: torques on motor and table, N.m.
+    rest: Torques,
 }
 
 impl InverseDynamics {
-    /// Of a run of a model; `None` where its encoders read anything but its positions.
+    /// Of a run of a model; `None` where the model is none of those that can be compared.
     pub fn new(
         model: &Model,
         bandwidth: Bandwidth,
         tracked: Tracked,
         trajectory: Trajectory,
-        band: &Band,
         record: &Record,
     ) -> Option<Self> {
         if !Self::has_a_place_for(model) {
             return None;
         }
-        let own = resisted(&trajectory, model, band, record);
-        let mut without_effects = tracked.torque;
-        add(&mut without_effects, &own, -1.0);
-        Some(Self { model: *model, bandwidth, motion: tracked.motion, trajectory: trajectory.into(), without_effects })
+        let mut of = Self {
+            bandwidth,
+            motion: tracked.motion,
+            trajectory: trajectory.into(),
+            measured: measured_positions(record),
+            rest: [vec![0.0; record.len()], vec![0.0; record.len()]],
+        };
+        let mut rest = tracked.torque;
+        for (rest, own) in rest.iter_mut().zip(of.torque(model, record)) {
+            rest.iter_mut().zip(own).for_each(|(r, o)| *r -= o);
+        }
+        of.rest = rest;
+        Some(of)
     }
 
     /// Whether a model can be compared: its encoder reads its position when the torque says.
@@ -54,49 +59,14 @@ impl InverseDynamics {
         model.effects.active().sensors().is_empty()
     }
 
-    /// Spectra of what a model lacks, whatever inertias without an encoder began with in it; `None` where its encoders read anything but its
-    /// positions, or where it lacks no number.
-    pub fn rows(
-        &self,
-        model: &Model,
-        band: &Band,
-        record: &Record,
-        measured: &MotionSpectra,
-        planner: &mut FftPlanner<f64>,
-    ) -> Option<[Vec<C>; 2]> {
-        if !Self::has_a_place_for(model) {
-            return None;
+    /// What a model lacks, on motor and table, N.m.
+    pub fn torque(&self, model: &Model, record: &Record) -> Torques {
+        let acts = |e: &Effect| model.effects.is_on(*e) && !e.is_mode();
+        let mut torque = self.trajectory.resisted(model, EFFECTS.iter().copied().filter(acts));
+        add_linear(model, record, &self.measured, &mut torque);
+        for (torque, rest) in torque.iter_mut().zip(&self.rest) {
+            torque.iter_mut().zip(rest).for_each(|(t, r)| *t += r);
         }
-        let mut torque = resisted(&self.trajectory, model, band, record);
-        add(&mut torque, &self.without_effects, 1.0);
-        let mut rows = band.rows(&torque, 1.0, planner);
-        for p in [BaseParameter::I1, BaseParameter::I2, BaseParameter::B, BaseParameter::K] {
-            let by = p.value(&model.parameters) - p.value(&self.model.parameters);
-            if by != 0.0 {
-                let column = band.base_column(p, measured, by);
-                for (row, column) in rows.iter_mut().zip(&column) {
-                    row.iter_mut().zip(column).for_each(|(r, c)| *r += c);
-                }
-            }
-        }
-        rows.iter().flatten().all(|r| r.is_finite()).then_some(rows)
-    }
-}
-
-/// What the effects of a model resist a trajectory with, third inertias by the measured motion, N.m.
-fn resisted(trajectory: &Trajectory, model: &Model, band: &Band, record: &Record) -> Torques {
-    let acts = |e: &Effect| model.effects.is_on(*e) && !e.is_mode();
-    let mut torque = trajectory.resisted(model, EFFECTS.iter().copied().filter(acts));
-    for mode in Hidden::modes(model, band.sides()) {
-        let position = [mode.side, 1 - mode.side].iter().find_map(|side| record.channels[2 * side].as_deref());
-        let pull = position.map(|y| mode.pull(y, record.dt)).unwrap_or_default();
-        torque[mode.side].iter_mut().zip(pull).for_each(|(t, p)| *t += p);
-    }
-    torque
-}
-
-fn add(torque: &mut Torques, other: &Torques, by: f64) {
-    for (torque, other) in torque.iter_mut().zip(other) {
-        torque.iter_mut().zip(other).for_each(|(t, o)| *t += by * o);
+        torque
     }
 }

@@ -19,7 +19,7 @@ use rustfft::{FftPlanner, num_complex::Complex};
 use super::discrepancy::Discrepancy;
 use super::hidden::{Hidden, Vibration, vibrations};
 use super::model::{BaseParameter, Model};
-use super::tracking::{Torques, Tracked};
+use super::tracking::Torques;
 use crate::axis::{Parameters, Structure};
 use crate::conditioning::Record;
 use crate::numerics::level::deviation;
@@ -287,28 +287,17 @@ impl Band {
         rows
     }
 
-    /// What a model lacks in a run. What hidden inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
+    /// Spectra of the torque on motor and table that a model lacks along a motion, `[theta1, omega1, theta2, omega2]` a sample. What hidden
+    /// inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
     pub fn torque_residual(
         &self,
         model: &Model,
-        tracked: &Tracked,
-        weighed_at: Option<Discrepancy>,
-        planner: &mut FftPlanner<f64>,
-    ) -> TorqueResidual {
-        let rows = self.rows(&tracked.torque, 1.0, planner);
-        self.residual_of_rows(model, rows, &tracked.motion, weighed_at, planner)
-    }
-
-    /// The same from the spectra of the equations, whatever hidden inertias began with in them, and the motion,
-    /// `[theta1, omega1, theta2, omega2]` a sample.
-    pub fn residual_of_rows(
-        &self,
-        model: &Model,
-        rows: [Vec<C>; 2],
+        torque: &Torques,
         motion: &[[f64; 4]],
         weighed_at: Option<Discrepancy>,
         planner: &mut FftPlanner<f64>,
     ) -> TorqueResidual {
+        let rows = self.rows(torque, 1.0, planner);
         let p = &model.parameters;
         let most = p.i1.max(p.i2);
         let alike = if self.sight == Sight::Both { [p.i1, p.i2].map(|i| (i / most).powi(2)) } else { [1.0, 0.0] };

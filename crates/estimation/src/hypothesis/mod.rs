@@ -3,8 +3,8 @@
 //! One likelihood ([`likelihood`]) with the sensors' noise and the model's own discrepancy in it: of the torque that a model lacks to
 //! follow the record ([`tracking`]), in the band of its motion ([`band`]). [`descent`] finds the likeliest parameters, [`scatter`] how well
 //! the record knows them and [`determined`] which of them it does not, [`scales`] what of an effect it could show, [`starts`] where a fit
-//! with one effect more begins. Which hypotheses are compared, and what is concluded from them, is
-//! [`crate::diagnose`]'s.
+//! with one effect more begins; on a rigid axis such fits are compared along the motion of one run ([`inverse_dynamics`]). Which hypotheses
+//! are compared, and what is concluded from them, is [`crate::diagnose`]'s.
 
 pub(crate) mod band;
 pub(crate) mod descent;

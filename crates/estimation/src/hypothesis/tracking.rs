@@ -43,7 +43,7 @@ impl Tracked {
 pub type Bandwidth = [f64; 2];
 
 /// Largest torque and error that are told.
-const LARGEST: f64 = 1e100;
+pub const LARGEST: f64 = 1e100;
 /// Bandwidth times time with which the feedback starts: that of the straight line through all samples so far.
 const GROWING: f64 = 2.5;
 /// Damping ratio of the feedback.
@@ -115,7 +115,7 @@ impl Held<'_> {
         let position = [record.channels[0].as_deref(), record.channels[2].as_deref()];
         // A logged speed is mostly the position's difference, late: it adds nothing where the position itself is there.
         let speed = [record.channels[1].as_deref(), record.channels[3].as_deref()];
-        let sides: Vec<usize> = (0..2).filter(|&i| position[i].is_some() || speed[i].is_some()).collect();
+        let sides = measured_sides(record);
         // From a state that is little known the gain falls, as a Kalman filter's does, to what the bandwidth asks.
         let gains_at = |k: usize| {
             bandwidth.map(|w| {
@@ -195,44 +195,56 @@ impl Held<'_> {
                 return None;
             }
         }
-        let torque = torque_residual(model, dt, inertia, &sides, &error, given);
+        let mut torque = given;
+        add_linear(model, record, &error, &mut torque);
         // Squares of what is larger than this are no numbers.
         let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
         bounded.then_some((Tracked { torque, motion }, memories))
     }
 }
 
-/// Adds `D e` to what was given: along the sides that are measured, what follows them without an encoder goes along.
-fn torque_residual(
-    model: &Model,
-    dt: f64,
-    inertia: [f64; 2],
-    sides: &[usize],
-    error: &[Vec<f64>; 2],
-    given: [Vec<f64>; 2],
-) -> [Vec<f64>; 2] {
-    let n = given[0].len();
+/// Sides of an axis whose motion a record has.
+fn measured_sides(record: &Record) -> Vec<usize> {
+    (0..2).filter(|&i| record.channels[2 * i].is_some() || record.channels[2 * i + 1].is_some()).collect()
+}
+
+/// Positions of both sides as measured, rad, by the speed's sum where that alone is; zero of a side that is not measured.
+pub fn measured_positions(record: &Record) -> Torques {
+    [0, 1].map(|i: usize| match (&record.channels[2 * i], &record.channels[2 * i + 1]) {
+        (Some(position), _) => position.clone(),
+        (None, Some(speed)) => {
+            let sum = |at: &mut f64, v: &f64| Some(std::mem::replace(at, *at + v * record.dt));
+            speed.iter().scan(0.0, sum).collect()
+        }
+        (None, None) => vec![0.0; record.len()],
+    })
+}
+
+/// Adds `D e` of positions `e` to torques on motor and table, N.m: along the sides that are measured, what follows them without an
+/// encoder goes along.
+pub fn add_linear(model: &Model, record: &Record, e: &Torques, torque: &mut Torques) {
+    let (n, dt) = (record.len(), record.dt);
     let p = &model.parameters;
     let coupled = model.structure == Structure::TwoInertia;
-    let mut torque = given;
+    let inertia = if coupled { [p.i1, p.i2] } else { [p.i1 + p.i2, 0.0] };
+    let sides = measured_sides(record);
     for k in 1..n.saturating_sub(1) {
         let second = |e: &[f64]| (e[k + 1] - 2.0 * e[k] + e[k - 1]) / (dt * dt);
         let first = |e: &[f64]| (e[k + 1] - e[k - 1]) / (2.0 * dt);
-        for &i in sides {
-            torque[i][k] += inertia[i] * second(&error[i]);
+        for &i in &sides {
+            torque[i][k] += inertia[i] * second(&e[i]);
         }
         if coupled && sides.len() == 2 {
-            let pull = p.b * (first(&error[0]) - first(&error[1])) + p.k * (error[0][k] - error[1][k]);
+            let pull = p.b * (first(&e[0]) - first(&e[1])) + p.k * (e[0][k] - e[1][k]);
             torque[0][k] += pull;
             torque[1][k] -= pull;
         }
     }
-    for hidden in Hidden::of(model, sides) {
-        for (torque, pull) in torque[hidden.side].iter_mut().zip(hidden.pull(&error[hidden.side], dt)) {
+    for hidden in Hidden::of(model, &sides) {
+        for (torque, pull) in torque[hidden.side].iter_mut().zip(hidden.pull(&e[hidden.side], dt)) {
             *torque += pull;
         }
     }
-    torque
 }
 
 /// The state at the first sample: positions as measured, speeds from the first samples; a side that is not measured moves with the other.
