@@ -101,7 +101,7 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     let coupled = search.problem.nominal.structure == Structure::TwoInertia;
     if coupled && !search.at_floor(&chosen) && !search.is_negligible(&chosen) && search.have_moved(&parameters, MOVED) {
         (search.progress)("beside the data sheet's parameters");
-        if let Some(other) = search.from_nominal_parameters(&given) {
+        if let Some(other) = search.with_nominal_parameters(&given) {
             pool.push(other.clone());
             if search.is_likelier(&other, &chosen) {
                 chosen = search.stepwise(other, &mut pool);
@@ -385,7 +385,7 @@ impl Search<'_> {
 
     /// Effects added beside the axis as its data sheet has it, and only then its parameters freed: of several causes each shows itself
     /// beside the true parameters, while free ones run off with what all of them do.
-    fn from_nominal_parameters(&self, given: &Fit) -> Option<Fit> {
+    fn with_nominal_parameters(&self, given: &Fit) -> Option<Fit> {
         let held = Search {
             problem: self.problem.with_parameters_held(),
             reference: self.reference,
@@ -403,9 +403,9 @@ impl Search<'_> {
     }
 
     #[cfg(test)]
-    pub fn only_from_nominal_parameters(&mut self) -> Option<Fit> {
+    pub fn only_with_nominal_parameters(&mut self) -> Option<Fit> {
         let baseline = self.baseline();
-        self.from_nominal_parameters(&baseline.given)
+        self.with_nominal_parameters(&baseline.given)
     }
 
     /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what

@@ -455,7 +455,7 @@ fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free
     let suspects =
         EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
     let mut search = searched.search(&case, suspects, &|_| ());
-    let fit = search.only_from_nominal_parameters().expect("causes");
+    let fit = search.only_with_nominal_parameters().expect("causes");
     assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
     assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
     assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
