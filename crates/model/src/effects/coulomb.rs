@@ -67,7 +67,10 @@ impl<I: Side> DryFriction for Coulomb<I> {
         textbook: [true, false][I::INDEX],
         odds: 3.0,
         bounds: |p, x| {
-            p[0] <= x.torque && x.can_dissipate_dry(p[0], 0.0) && p[3].abs() <= 0.95 && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest)
+            p[0] <= x.torque
+                && x.can_dissipate_dry(p[0], 0.0)
+                && p[3].abs() <= 0.95
+                && (p[1] == 0.0 || p[2] <= 0.7 * x.fastest)
         },
         example: [&[0.006, 0.4, 2.0, 0.1, 0.2], &[0.001, 0.4, 2.0, 0.1, 0.2]][I::INDEX],
         variants: VARIANTS,
