@@ -11,7 +11,7 @@ use crate::conditioning::{NoiseEstimate, Record, estimate_noise};
 use crate::effects::{EFFECTS, Effect, Ramp, Settings};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::{Fit, Problem};
-use crate::hypothesis::likelihood::C;
+use crate::hypothesis::likelihood::{C, TorqueResidual};
 use crate::hypothesis::model::Model;
 use crate::hypothesis::tracking::{Resolution, track, track_step_by_step};
 use rand::{RngExt, SeedableRng};
@@ -543,6 +543,27 @@ fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
     assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", ranking(&o));
     let delay = o.improved.effects.of(Effect::SensorDelay)[0];
     assert!((delay / 3e-3 - 1.0).abs() < 0.05, "{delay}");
+}
+
+#[test]
+fn a_model_that_reads_late_follows_at_a_bandwidth_at_which_it_is_stable() {
+    let (_, dt) = SAMPLED;
+    // A quarter of a radian a sample, hardly damped, the table read three samples late.
+    let wn = 0.25 / dt;
+    let p = Parameters::PAPER;
+    let k = wn * wn * p.i1 * p.i2 / (p.i1 + p.i2);
+    let swings = Parameters { k, b: 0.02 * k / wn, ..p };
+    let record = of_two_inertias(swings, Settings::default(), 0.02, 6);
+    let nominal = Model::new(swings, Structure::TwoInertia, Settings::default());
+    let late = Model { effects: with(&[(Effect::SensorDelay, 0, 3.0 * dt)]), ..nominal };
+    let (searched, _) = prepared(&record, &nominal, Reach::Shown);
+    let problem = Problem::of(&searched.record, &searched.band, nominal, searched.peak);
+    let tight = problem.bandwidth([f64::MAX; 2]);
+    // Held as tightly as one that reads in time the loop swings up.
+    let left = |rows: &TorqueResidual| searched.band.noise_multiple(rows);
+    assert!(problem.rows(&late, tight, None).is_none_or(|rows| left(&rows) > 100.0));
+    let at = problem.along(&late, tight).expect("a bandwidth");
+    assert!(at.bandwidth[0] < tight[0] && left(&at.rows) < 1.5, "{:?} {}", at.bandwidth, left(&at.rows));
 }
 
 #[test]

@@ -322,7 +322,7 @@ impl<'a> Descent<'a> {
         }
         let least = problem.bandwidth([0.0; 2]);
         let own = problem.band.log_likelihood(&at.rows, at.s);
-        let looser = [0, 1].map(|i| (LOOSER * at.bandwidth[i]).max(least[i]));
+        let looser = looser(at.bandwidth, least);
         let again = self.tight.is_none_or(|tight| differ(tight, at.bandwidth));
         for bandwidth in again.then_some(looser).into_iter().chain([problem.bandwidth(at.s)]) {
             let weighed_at = Some(at.rows.weighed_at);
@@ -374,6 +374,11 @@ impl<'a> Descent<'a> {
 /// Whether two bandwidths are so unlike that the motion is followed anew.
 pub fn differ(a: Bandwidth, b: Bandwidth) -> bool {
     (0..2).any(|i| (a[i] / b[i]).ln().abs() > ANOTHER)
+}
+
+/// The next bandwidth below another, down to the least.
+pub fn looser(bandwidth: Bandwidth, least: Bandwidth) -> Bandwidth {
+    [0, 1].map(|i| (LOOSER * bandwidth[i]).max(least[i]))
 }
 
 /// What the stiffness that the equations show has in it, among the coordinates at x: parameters of the axis and of third inertias; which,

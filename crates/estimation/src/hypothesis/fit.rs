@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 
 use super::Hypothesis;
-use super::descent::{Along, Descent, differ};
+use super::descent::{Along, Descent, differ, looser};
 use super::discrepancy::Discrepancy;
 use super::inverse_dynamics::InverseDynamics;
 use super::likelihood::{Band, C, MotionSpectra, TorqueResidual};
@@ -419,7 +419,7 @@ impl Problem<'_> {
         let followed = || {
             let at = self.along(&fit.model, bandwidth)?;
             let columns = self.columns(&at, &fit.coordinates)?;
-            Some(Fit { discrepancy: at.s, rows: at.rows, columns, bandwidth, ..fit.clone() })
+            Some(Fit { discrepancy: at.s, rows: at.rows, columns, bandwidth: at.bandwidth, ..fit.clone() })
         };
         if self.resolution == Resolution::Coarse || differ(bandwidth, fit.bandwidth) {
             followed().unwrap_or_else(|| fit.clone())
@@ -485,8 +485,30 @@ impl Problem<'_> {
         self.scales.as_ref().is_none_or(|s| s.admit(self.record, model, terms.iter().map(|t| t.0)))
     }
 
-    /// A model along the record, and the discrepancy that it leaves.
+    /// A model along the record, and the discrepancy that it leaves. One that reads its position late swings up where it is held to the record
+    /// tightly: it follows at the likeliest bandwidth up to that.
     pub fn along(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
+        let mut best = self.along_at(model, bandwidth);
+        if !reads_late(model) || self.is_without_simulation(model) {
+            return best;
+        }
+        let least = self.bandwidth([0.0; 2]);
+        let log_likelihood = |at: &Along| self.band.log_likelihood(&at.rows, at.s);
+        let mut tight = bandwidth;
+        while differ(looser(tight, least), tight) {
+            tight = looser(tight, least);
+            let other = self.along_at(model, tight);
+            if let Some(at) = &best
+                && other.as_ref().is_none_or(|other| log_likelihood(other) <= log_likelihood(at))
+            {
+                break;
+            }
+            best = other;
+        }
+        best
+    }
+
+    fn along_at(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
         let (mut rows, trajectory) = self.rows_along_motion(model, bandwidth, None)?;
         let s = self.band.discrepancy(&rows);
         self.band.weigh(&mut rows, s);
@@ -515,6 +537,16 @@ impl Problem<'_> {
             - k * (k + 1.0) / (n - k - 1.0).max(FEWEST)
             - f.terms.iter().map(|t| self.price(*t)).sum::<f64>()
     }
+}
+
+/// Whether a position of a model is read late, or behind a filter.
+fn reads_late(model: &Model) -> bool {
+    let delay = |e: &Effect| -> Option<f64> {
+        let parameter = e.delay_parameter().filter(|_| e.info().place == Place::Sensor)?;
+        Some(model.effects.of(*e)[parameter])
+    };
+    let active = model.effects.active();
+    model.effects.filter(&active) > 0.0 || EFFECTS.iter().filter_map(delay).any(|delay| delay > 0.0)
 }
 
 /// Whether a third inertia is on: what it began with is taken out of what any change lacks, too.
