@@ -118,31 +118,36 @@ impl Prepared {
     /// The part of a record, as long as the one searched and beyond it, in which a model lacks the most, with what it lacks there; `None` where
     /// the record goes on for less than half of such a part.
     pub fn worst_beyond(&self, record: &Record, case: &Case<'_>, model: &Model) -> Option<(Self, Discrepancy)> {
-        let whole = record.part(0..band::smooth(record.len()));
-        let slow = band::decimate(&whole, self.limit, self.rate);
-        let (n, all) = (self.record.len(), slow.len());
-        if all < n + n / 2 {
+        let n = self.record.len();
+        if record.len() as f64 * record.dt < 1.5 * n as f64 * self.record.dt {
             return None;
         }
+        let slow = self.at_its_rate(record);
         // The last part overlaps the one before it.
-        let parts = all.div_ceil(n);
+        let parts = slow.len().div_ceil(n);
         let measured = (1..parts).into_par_iter().filter_map(|i| {
-            let start = (i * n).min(all - n);
-            let part = slow.part(start..start + n);
-            let band = Band::new(&part, model, self.limit, &band::mask(&part, model.structure));
-            let lacks = Problem::of(&part, &band, case.nominal, self.peak).given(model)?.discrepancy;
-            let torque_rms = deviation(&part.torque).max(self.torque_rms);
-            Some((Self { record: part, band, torque_rms, ..*self }, lacks))
+            let start = (i * n).min(slow.len() - n);
+            let part = self.of_another(slow.part(start..start + n), model);
+            let lacks = Problem::of(&part.record, &part.band, case.nominal, self.peak).given(model)?.discrepancy;
+            Some((part, lacks))
         });
         let measured: Vec<(Self, Discrepancy)> = measured.collect();
         measured.into_iter().max_by(|a, b| a.1.iter().sum::<f64>().total_cmp(&b.1.iter().sum::<f64>()))
     }
 
-    /// Another record in the same band, its noise seen through a model. A torque that stands there is no measure of what is lacking.
+    /// Another record in the same band, its noise seen through a model.
     pub fn alike(&self, record: &Record, model: &Model) -> Self {
-        let whole = record.part(0..band::smooth(record.len()));
-        let slow = band::decimate(&whole, self.limit, self.rate);
-        let record = slow.part(0..band::smooth(slow.len()));
+        let slow = self.at_its_rate(record);
+        self.of_another(slow.part(0..band::smooth(slow.len())), model)
+    }
+
+    /// Another record at the rate of this one.
+    fn at_its_rate(&self, record: &Record) -> Record {
+        band::decimate(&record.part(0..band::smooth(record.len())), self.limit, self.rate)
+    }
+
+    /// A record at the same rate and in the same band. A torque that stands there is no measure of what is lacking.
+    fn of_another(&self, record: Record, model: &Model) -> Self {
         let band = Band::new(&record, model, self.limit, &band::mask(&record, model.structure));
         let torque_rms = deviation(&record.torque).max(self.torque_rms);
         Self { record, band, torque_rms, ..*self }

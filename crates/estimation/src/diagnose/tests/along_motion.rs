@@ -1,0 +1,89 @@
+//! What is told along the motion of one run against a simulation of each model.
+
+use super::*;
+
+#[test]
+fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation() {
+    let mut effects = Settings::default();
+    let on: [(Effect, &[f64]); 6] = [
+        (Effect::CoulombMotor, &[3.0, 0.4, 0.3, 0.1, 0.0]),
+        (Effect::ViscousMotor, &[1.5, 0.0]),
+        (Effect::PreslidingMotor, &[2.0, 0.01, 0.0]),
+        (Effect::Gravity, &[4.0, 0.5]),
+        (Effect::Saturation, &[6.0]),
+        (Effect::Delay, &[3e-3]),
+    ];
+    for (effect, values) in on {
+        effects.of_mut(effect)[..values.len()].copy_from_slice(values);
+    }
+    let record = logged(effects, 1.0, 0.0, |_| 0.0, 5);
+    let model = Model::new(parameters(INERTIA), Structure::Rigid, effects);
+    let bandwidth = [0.2 / DT; 2];
+    let simulated = |m: &Model| track(m, &record, bandwidth, Resolution::Full).expect("a run").torque;
+    let own = simulated(&model);
+    let (_, trajectory) = track_step_by_step(&model, &record, bandwidth, Resolution::Full).expect("a run");
+    for (effect, i) in on.iter().flat_map(|(e, values)| (0..values.len()).map(|i| (*e, i))) {
+        let mut other = model;
+        let value = &mut other.effects.of_mut(effect)[i];
+        *value += 0.02 * value.abs().max(effect.info().parameters[i].nominal);
+        let [with, without] = [&other, &model].map(|m| trajectory.resisted(m, [effect]));
+        let along = |k: usize| with[0][k] + with[1][k] - without[0][k] - without[1][k];
+        // As a hat over some samples sees both: where friction turns they differ by a sample.
+        let smooth = |y: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (50..record.len() - 50).step_by(10).map(|k| (k - 20..k + 20).map(y).sum::<f64>() / 40.0).collect()
+        };
+        let moved = simulated(&other);
+        let (a, b) = (smooth(&along), smooth(&|k| moved[0][k] - own[0][k]));
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (size, alike) =
+            (product(&a, &b) / product(&b, &b), product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt());
+        assert!((size - 1.0).abs() < 0.05 && alike > 0.99, "{effect:?} {i}: {size} {alike}");
+    }
+}
+
+/// What is off, in power over what a change of a model makes, where it is told along the motion of a run of the model and not simulated.
+fn off_along_the_motion(record: &Record, model: Model, other: &Model) -> f64 {
+    let (searched, _) = prepared(record, &model, Reach::Ruled);
+    let problem = Problem::of(&searched.record, &searched.band, model, searched.peak);
+    let given = problem.given(&model).expect("a run");
+    let along = problem.along_the_motion_of(&given);
+    let rows = |p: &Problem<'_>| p.rows(other, given.bandwidth, Some(given.discrepancy)).expect("a run").rows;
+    let steps = problem.steps();
+    let told = rows(&along);
+    assert_eq!(problem.steps(), steps, "nothing is simulated");
+    let own = rows(&problem);
+    let power = |a: &[Vec<C>; 2], b: &[Vec<C>; 2]| -> f64 {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).norm_sqr()).sum()
+    };
+    power(&told, &own) / power(&own, &given.rows.rows)
+}
+
+#[test]
+fn what_another_model_lacks_along_the_motion_of_one_is_what_its_own_simulation_lacks() {
+    let effects = with(&[(Effect::CoulombMotor, 0, 3.0), (Effect::ViscousMotor, 0, 1.5)]);
+    let record = logged(effects, 1.0, 0.0, |_| 0.0, 5);
+    let bare = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
+    // Inertia, effects, and the share of what changes, in power, that may be off.
+    type Values = &'static [(Effect, usize, f64)];
+    let others: [(f64, Values, f64); 5] = [
+        (1.4, &[], 1e-9),
+        (1.0, &[(Effect::ActuatorLag, 0, 0.02)], 1e-4),
+        (
+            1.2,
+            &[
+                (Effect::MotorMode, 0, 0.3 * INERTIA),
+                (Effect::MotorMode, 1, 300.0 * INERTIA),
+                (Effect::MotorMode, 2, INERTIA),
+            ],
+            1e-4,
+        ),
+        // A simulation comes to rest at the reversals.
+        (0.8, &[(Effect::CoulombMotor, 0, 2.0)], 1e-2),
+        (1.1, &[(Effect::PreslidingMotor, 0, 3.0), (Effect::PreslidingMotor, 1, 0.02)], 1e-2),
+    ];
+    for (i, (inertia, effects, share)) in others.into_iter().enumerate() {
+        let other = Model { parameters: parameters(inertia * INERTIA), effects: with(effects), ..bare };
+        let off = off_along_the_motion(&record, bare, &other);
+        assert!(off <= share, "{i}: {off}");
+    }
+}

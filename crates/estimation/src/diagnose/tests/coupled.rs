@@ -1,0 +1,311 @@
+//! Two inertias: an encoder on each side, or on the motor alone.
+
+use super::*;
+
+/// A soft belt that a slow controller moves on and on, its motor's encoder alone read.
+fn of_a_belt(belt: Parameters, seed: u64) -> Record {
+    let axis = Axis::new(belt, Structure::TwoInertia, Settings::default(), Scheme::Exact, DT);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut torque, mut theta) = (Vec::new(), Vec::new());
+    for k in 0..3000 {
+        let t = f64::from(k) * DT;
+        let wanted = 2.0 * t - 1.8 * (0.9 * t).sin() + 0.2 * (7.0 * t).sin();
+        theta.push(state.theta1() + noise(&mut rng, 1e-6));
+        torque.push((belt.i1 + belt.i2) * (100.0 * (wanted - state.theta1()) - 14.0 * state.omega1()));
+        state = axis.advance(&state, Ramp { start: torque[k as usize], end: torque[k as usize] }, t);
+    }
+    of_one_encoder(0.0, torque, theta)
+}
+
+const BELT: Parameters = Parameters { i1: 1.26e-3, i2: 9.3e-4, b: 5.8e-4, k: 1.52, rho: 1.0 };
+
+#[test]
+fn an_encoder_on_the_motor_alone_tells_a_coupling_that_is_not_the_nominal_one() {
+    for (seed, nominal) in
+        [Parameters { i1: 1.13e-3, b: 6.8e-4, k: 1.91, ..BELT }, Parameters { i1: 1.4e-3, i2: 1.1e-3, k: 1.0, ..BELT }]
+            .into_iter()
+            .enumerate()
+    {
+        let o = diagnosed_as(&of_a_belt(BELT, seed as u64), Structure::TwoInertia, nominal);
+        let p = &o.models[1].parameters;
+        assert_eq!(o.decision.verdict, Verdict::Parameters, "{seed}: {:?}", named(&o));
+        assert!(
+            (p.k / BELT.k).ln().abs() < 0.03 && (p.i2 / BELT.i2).ln().abs() < 0.03,
+            "{seed}: {p:?} {}",
+            o.diagnosis.remainder.noise_multiple
+        );
+    }
+}
+
+/// What an axis without any effect lacks of a record of it, its parameters the true ones: its mean square in the noise's.
+fn of_the_truth(record: &Record, model: &Model, reach: Reach) -> f64 {
+    let (p, own) = prepared(record, model, reach);
+    assert!(own.is_none());
+    let given = Problem::of(&p.record, &p.band, *model, p.peak).given(model).expect("runs");
+    p.band.noise_multiple(&given.rows).powi(2)
+}
+
+#[test]
+fn an_axis_as_it_is_lacks_nothing_but_the_noise_of_its_encoder() {
+    // The record begins and ends in the midst of a motion, the torque at one end is not the one at the other.
+    let way = |t: f64| 0.5 * (1.1 * t).sin() + 0.2 * (2.3 * t).sin() + 0.02 * t * t;
+    let rigid = |seed| {
+        let record = led(way, Settings::default(), 0.0, |_| 0.0, seed).part(400..5900);
+        of_the_truth(&record, &Model::new(parameters(INERTIA), Structure::Rigid, Settings::default()), Reach::Ruled)
+    };
+    let coupled = |seed| {
+        let model = Model::new(BELT, Structure::TwoInertia, Settings::default());
+        of_the_truth(&of_a_belt(BELT, seed).part(300..3000), &model, Reach::Shown)
+    };
+    // In the mean of as many records as there are, of some thirty values each: one, and not a half or two.
+    for (name, of) in [("rigid", &rigid as &dyn Fn(u64) -> f64), ("coupled", &coupled)] {
+        let found: Vec<f64> = (0..8).map(of).collect();
+        let mean = found.iter().sum::<f64>() / 8.0;
+        assert!((0.5..2.0).contains(&mean), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn a_coupling_that_one_encoder_hardly_shows_is_as_likely_as_it_is() {
+    // Below its resonance the motor shows I1 + I2 and I2^2/K: along that valley no stiffness may be told as far likelier than the true one.
+    for seed in 0..4 {
+        let record = of_a_belt(Parameters { k: 20.0, ..BELT }, seed).part(300..3000);
+        let model = Model::new(Parameters { k: 20.0, ..BELT }, Structure::TwoInertia, Settings::default());
+        let (p, _) = prepared(&record, &model, Reach::Shown);
+        let problem = Problem::of(&p.record, &p.band, model, p.peak);
+        let of = |f: &Fit| f.log_likelihood + f.log_prior;
+        let truth = of(&problem.given(&model).expect("runs"));
+        for fit in [1.06, 1.0 / 1.06].iter().flat_map(|r| problem.held_stiffnesses(*r, [f64::MAX; 2])) {
+            let gained = of(&fit) - truth;
+            assert!(gained < 5.0, "{seed}: {} {gained}", fit.model.parameters.k);
+        }
+    }
+}
+
+#[test]
+fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
+    let paper = Parameters::PAPER;
+    let acts =
+        |t: f64| [(2.1, 0.3), (9.7, 4.1), (31.1, 5.3), (61.0, 1.1)].iter().map(|(w, p)| 0.05 * (w * t + p).sin()).sum();
+    let mut record = moved(paper, with(&[(Effect::CoulombMotor, 0, 0.03)]), &acts, 0);
+    // The drive's torque comes three samples after its command.
+    record.torque = (0..record.torque.len()).map(|k| acts((k as f64 + 3.0) * record.dt)).collect();
+    let nominal = Model::new(paper, Structure::TwoInertia, Settings::default());
+    let case = Case {
+        machine: "axis".to_owned(),
+        nominal,
+        motion: AxisKind::Rotary,
+        train: &record,
+        noise: &estimate_noise(&record.torque, &[0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref()), None),
+        holdout: None,
+        suspects: EFFECTS.to_vec(),
+    };
+    let (searched, _) = prepared(&record, &nominal, Reach::Shown);
+    let suspects =
+        EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
+    let mut search = searched.search(&case, suspects, &|_| ());
+    let fit = search.only_with_nominal_parameters().expect("causes");
+    assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
+    assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
+    assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
+    // Its parameters are free in the end.
+    assert!(fit.coordinates.iter().any(|c| c.is_base()) && (fit.model.parameters.i1 / paper.i1 - 1.0).abs() < 0.02);
+}
+
+/// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.
+fn of_two_inertias(parameters: Parameters, effects: Settings, amplitude: f64, late: usize) -> Record {
+    let acts = |t: f64| {
+        let tones = [(2.1, 0.3), (5.3, 1.7), (9.7, 4.1), (17.3, 2.9), (31.1, 5.3)];
+        amplitude * tones.iter().map(|(w, p)| (w * t + p).sin()).sum::<f64>()
+    };
+    moved(parameters, effects, &acts, late)
+}
+
+/// Samples of an axis, and their interval, s.
+const SAMPLED: (i32, f64) = (3000, 2e-3);
+
+/// The same under a torque over time, which is held from sample to sample.
+fn moved(parameters: Parameters, effects: Settings, acts: &dyn Fn(f64) -> f64, late: usize) -> Record {
+    let (n, dt) = SAMPLED;
+    // Fine enough for all that the effects do.
+    let fine = 16;
+    let h = dt / f64::from(fine);
+    let axis = Axis::new(parameters, Structure::TwoInertia, effects, Scheme::Exact, h);
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let late = late * fine as usize / 2;
+    let mut past = vec![0.0; late + 1];
+    let (mut torque, mut motor, mut table) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..fine * n {
+        let t = h * f64::from(k);
+        past.push(state.theta2());
+        if k % fine == 0 {
+            torque.push(acts(t));
+            motor.push(state.theta1());
+            table.push(past[past.len() - 1 - late]);
+        }
+        let held = acts(t - h * f64::from(k % fine));
+        state = axis.advance(&state, Ramp { start: held, end: held }, t);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for theta in motor.iter_mut().chain(&mut table) {
+        *theta += noise(&mut rng, 1e-5);
+    }
+    let channels = [Some(motor), None, Some(table), None];
+    Record {
+        start: 0.0,
+        dt,
+        hold: Hold::Zoh,
+        torque,
+        between: None,
+        channels,
+        noise: [1e-5; 4],
+        corner: [0.0; 2],
+        common_noise: 0.0,
+        settling: 0.0,
+        idle: Vec::new(),
+    }
+}
+
+#[test]
+fn of_an_axis_that_swings_too_fast_to_be_held_to_the_stiffness_is_found_from_afar() {
+    let (n, dt) = SAMPLED;
+    // A fifth of a turn a sample, hardly damped; from half of its stiffness the nearest hollow is an eighth off.
+    let wn = 1.25 / dt;
+    let p = Parameters::PAPER;
+    let k = wn * wn * p.i1 * p.i2 / (p.i1 + p.i2);
+    let fast = Parameters { k, b: 0.006 * k / wn, ..p };
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    let torque: Vec<f64> = (0..n).map(|_| noise(&mut rng, 20.0 * p.i1 / dt)).collect();
+    let record = moved(fast, Settings::default(), &|t| torque[((t / dt).round() as usize).min(torque.len() - 1)], 0);
+    let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 0.5 * k, ..fast });
+    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", ranking(&o));
+    let found = o.improved.parameters.k;
+    assert!((found / k - 1.0).abs() < 1e-3, "{found} {k}");
+}
+
+#[test]
+fn a_late_encoder_of_a_light_table_is_no_softer_coupling() {
+    // The twist is little more than the table's speed times the delay: free, the stiffness takes that and leaves the delay nothing.
+    let light = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5e-4, k: 0.018, rho: 1.0 };
+    let friction = with(&[(Effect::CoulombMotor, 0, 2e-3)]);
+    let o = diagnosed_as(&of_two_inertias(light, friction, 8e-3, 3), Structure::TwoInertia, light);
+    assert_eq!(named(&o), ["dry_friction", "sensor"], "{:#?}", ranking(&o));
+    let delay = o.improved.effects.of(Effect::SensorDelay)[0];
+    assert!((delay / 3e-3 - 1.0).abs() < 0.05, "{delay}");
+}
+
+#[test]
+fn a_model_that_reads_late_follows_at_a_bandwidth_at_which_it_is_stable() {
+    let (_, dt) = SAMPLED;
+    // A quarter of a radian a sample, hardly damped, the table read three samples late.
+    let wn = 0.25 / dt;
+    let p = Parameters::PAPER;
+    let k = wn * wn * p.i1 * p.i2 / (p.i1 + p.i2);
+    let swings = Parameters { k, b: 0.02 * k / wn, ..p };
+    let record = of_two_inertias(swings, Settings::default(), 0.02, 6);
+    let nominal = Model::new(swings, Structure::TwoInertia, Settings::default());
+    let late = Model { effects: with(&[(Effect::SensorDelay, 0, 3.0 * dt)]), ..nominal };
+    let (searched, _) = prepared(&record, &nominal, Reach::Shown);
+    let problem = Problem::of(&searched.record, &searched.band, nominal, searched.peak);
+    let tight = problem.bandwidth([f64::MAX; 2]);
+    // Held as tightly as one that reads in time the loop swings up.
+    let left = |rows: &TorqueResidual| searched.band.noise_multiple(rows);
+    assert!(problem.rows(&late, tight, None).is_none_or(|rows| left(&rows) > 100.0));
+    let at = problem.along(&late, tight).expect("a bandwidth");
+    assert!(at.bandwidth[0] < tight[0] && left(&at.rows) < 1.5, "{:?} {}", at.bandwidth, left(&at.rows));
+}
+
+#[test]
+fn samples_taken_late_hide_neither_the_coupling_nor_the_friction_on_its_sides() {
+    let stiff = Parameters { i1: 0.03, i2: 1.5e-3, b: 0.11, k: 1100.0, rho: 1.0 };
+    let friction = with(&[(Effect::CoulombMotor, 0, 4.0), (Effect::CoulombTable, 0, 4.0)]);
+    let mut record = of_two_inertias(stiff, friction, 20.0, 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let [Some(motor), _, Some(table), _] = &mut record.channels else { unreachable!() };
+    for k in (1..motor.len()).rev() {
+        let late = noise(&mut rng, 0.05);
+        motor[k] -= late * (motor[k] - motor[k - 1]);
+        table[k] -= late * (table[k] - table[k - 1]);
+    }
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let read = estimate_noise(&record.torque, &channels, None);
+    // A thousand times what the encoders have of their own.
+    assert!(read.std[0] > 1e-2, "{read:?}");
+    (record.noise, record.common_noise) = (read.std, read.common);
+    record.corner = read.corner.map(|c| c / record.dt);
+    let o = diagnosed_as(&record, Structure::TwoInertia, Parameters { k: 1500.0, ..stiff });
+    let mut effects: Vec<Effect> = o.decision.chosen.terms.iter().map(|t| t.0).collect();
+    effects.sort_unstable();
+    assert_eq!(effects, [Effect::CoulombMotor, Effect::CoulombTable], "{:#?}", ranking(&o));
+    let k = o.improved.parameters.k;
+    assert!((k / stiff.k - 1.0).abs() < 0.01, "{k}");
+}
+
+#[test]
+fn noise_of_1_over_f_on_an_axis_that_hardly_moves_is_no_gap() {
+    let paper = Parameters::PAPER;
+    let mut record = of_two_inertias(paper, Settings::default(), 2e-3, 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    for c in [0, 2] {
+        // Octaves of a random walk that forgets: their sum falls with the frequency.
+        let mut octaves = [0.0; 8];
+        for y in record.channels[c].iter_mut().flatten() {
+            for (i, octave) in octaves.iter_mut().enumerate() {
+                let forgets = 0.5_f64.powi(i as i32);
+                *octave += forgets.sqrt() * noise(&mut rng, 1e-3) - forgets * *octave;
+            }
+            *y += octaves.iter().sum::<f64>();
+        }
+    }
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let read = estimate_noise(&record.torque, &channels, None);
+    (record.noise, record.common_noise) = (read.std, read.common);
+    record.corner = read.corner.map(|c| c / record.dt);
+    let o = diagnosed_as(&record, Structure::TwoInertia, paper);
+    assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{:?}", o.decision.verdict);
+    // What is left is the noise, of its colour.
+    let left = o.diagnosis.remainder.noise_multiple;
+    assert!((0.8..1.3).contains(&left), "{left}");
+}
+
+#[test]
+fn of_two_large_causes_both_are_found() {
+    let hidden = [
+        (Effect::ExternalSpring, 0, 0.02),
+        (Effect::ExternalSpring, 1, -1.0),
+        (Effect::TorqueRipple, 0, 0.05),
+        (Effect::TorqueRipple, 1, 4.0),
+        (Effect::TorqueRipple, 2, 0.6),
+    ];
+    let paper = Parameters::PAPER;
+    let o = diagnosed_as(&of_two_inertias(paper, with(&hidden), 0.05, 0), Structure::TwoInertia, paper);
+    assert_eq!(named(&o), ["external_spring", "torque_ripple"], "{:#?}", ranking(&o));
+}
+
+#[test]
+fn inertias_whose_sum_alone_slow_motion_shows_are_told_apart_by_the_little_that_it_shows_of_each() {
+    let screw = Parameters { i1: 1.63e-3, i2: 9.4e-4, b: 0.038, k: 449.0, rho: 1.0 };
+    let nominal = Parameters { i1: 0.72 * screw.i1, i2: 1.1 * screw.i2, k: 0.87 * screw.k, ..screw };
+    let o = diagnosed_as(&of_two_inertias(screw, Settings::default(), 0.7, 0), Structure::TwoInertia, nominal);
+    assert_eq!(o.decision.verdict, Verdict::Parameters, "{:#?}", ranking(&o));
+    let found = o.models[1].parameters;
+    let off = [found.i1 / screw.i1, found.i2 / screw.i2, found.k / screw.k].map(|r| (r - 1.0).abs());
+    assert!(off.iter().all(|o| *o < 0.03), "{off:?}");
+    // The mean of some 150 squares is 1 within two of its standard deviations, sqrt(2/150).
+    assert!(o.diagnosis.remainder.noise_multiple.powi(2) < 1.23, "{:?}", o.diagnosis.remainder);
+}
+
+#[test]
+fn the_common_factor_of_all_at_the_table_is_found_beside_its_friction() {
+    // The table's equation knows no torque but by this factor, and itself a hundred times better than the motor's knows the factor.
+    let screw = Parameters { i1: 1.63e-3, i2: 9.4e-4, b: 0.038, k: 449.0, rho: 1.0 };
+    let nominal = Parameters { i2: 0.8 * screw.i2, b: 0.8 * screw.b, k: 0.8 * screw.k, ..screw };
+    let friction = with(&[(Effect::CoulombTable, 0, 0.15), (Effect::ViscousMotor, 0, 0.01)]);
+    let o = diagnosed_as(&of_two_inertias(screw, friction, 0.7, 0), Structure::TwoInertia, nominal);
+    assert_eq!(named(&o), ["dry_friction", "viscous_friction"], "{:#?}", ranking(&o));
+    let found = o.improved.parameters;
+    let level = o.improved.effects.of(Effect::CoulombTable)[0] / 0.15;
+    let off = [found.i2 / screw.i2, found.k / screw.k, level].map(|r| (r - 1.0).abs());
+    assert!(off.iter().all(|o| *o < 3e-3), "{off:?}");
+}

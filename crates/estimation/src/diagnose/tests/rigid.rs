@@ -1,0 +1,214 @@
+//! Rigid axes: what is named, and what is not.
+
+use super::*;
+
+#[test]
+fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
+    let effects = with(&[(Effect::CoulombMotor, 0, 3.0), (Effect::EndStop, 0, 200.0), (Effect::EndStop, 1, 1.4)]);
+    // The way reaches the stop in its second half.
+    let way = |t: f64| (0.9 * t).sin() * if t < 6.0 { 0.8 } else { 1.5 };
+    for (effects, late) in [(effects, true), (with(&[(Effect::CoulombMotor, 0, 3.0)]), false)] {
+        let record = led(way, effects, 0.0, |_| 0.0, 5);
+        let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+        let noise = estimate_noise(&record.torque, &channels, None);
+        let nominal = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
+        let case = case(&record, nominal, &noise);
+        let (searched, _) = prepared(&record.part(0..2800), &nominal, Reach::Ruled);
+        let found = decide(searched.search(&case, EFFECTS.to_vec(), &|_| ()), None).chosen;
+        assert_eq!(found.effects(), [Effect::CoulombMotor]);
+        let (part, lacks) = searched.worst_beyond(&record, &case, &found.model).expect("a further part");
+        let search = part.search(&case, EFFECTS.to_vec(), &|_| ());
+        assert!(!late || search.leaves_materially_less(&lacks, &found));
+        let all = decide_further(search, &found).map(|d| d.chosen.effects());
+        assert_eq!(all, late.then(|| vec![Effect::CoulombMotor, Effect::EndStop]));
+    }
+}
+
+/// A log of a constant torque, by a load or by friction, along a way on and on, beside a torque that wanders slowly and is small beside it.
+fn onwards(effect: Effect, wander: f64) -> Record {
+    let way = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
+    // Without its start from rest, where friction holds and a load does not.
+    led(way, with(&[(effect, 0, 0.5)]), 1e-4, |t| wander * (1.3 * t).sin(), 5).part(500..6000)
+}
+
+#[test]
+fn a_friction_and_a_load_are_not_told_apart_where_the_axis_never_goes_back() {
+    for effect in [Effect::LoadMotor, Effect::CoulombMotor] {
+        let o = diagnosed(&onwards(effect, 0.03), INERTIA);
+        let families: Vec<[&str; 2]> =
+            o.decision.confusable.iter().map(|c| [c.named, c.other].map(|e| e.info().family.as_str())).collect();
+        assert_eq!(families, [["dry_friction", "load_torque"]], "{:?} {:?}", named(&o), ranking(&o));
+        // Every axis has friction, few carry a weight, as the effects' own odds have it.
+        assert!(o.decision.probabilities.iter().all(|p| (0.5..0.8).contains(p)), "{:?}", o.decision.probabilities);
+    }
+}
+
+#[test]
+fn what_follows_a_wandering_torque_is_no_cause() {
+    for effect in [Effect::LoadMotor, Effect::CoulombMotor] {
+        let o = diagnosed(&onwards(effect, 0.05), INERTIA);
+        let causes: Vec<Effect> = o.diagnosis.causes.iter().map(|c| c.effect).collect();
+        assert!(
+            [vec![Effect::CoulombMotor], vec![Effect::LoadMotor]].contains(&causes),
+            "{causes:?} {:?}",
+            ranking(&o)
+        );
+        let pair = |c: &crate::diagnose::conclusion::Confusable| {
+            [c.named, c.other] == [Effect::CoulombMotor, Effect::LoadMotor]
+        };
+        assert!(o.decision.confusable.iter().any(pair), "{:?}", ranking(&o));
+    }
+}
+
+#[test]
+fn a_stage_with_nothing_hidden_has_no_cause_whatever_the_noise_of_its_torque() {
+    for (noise, nominal) in [(1e-9, INERTIA), (0.2, INERTIA), (0.05, 1.2 * INERTIA)] {
+        let o = diagnosed(&logged(Settings::default(), 1.0, noise, |_| 0.0, 1), nominal);
+        assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{noise}: {:?}", named(&o));
+        assert!((o.models[1].parameters.i1 / INERTIA - 1.0).abs() < 0.02, "{:?}", o.models[1].parameters);
+    }
+}
+
+#[test]
+fn friction_and_a_bias_are_named_with_their_sizes_at_the_axis() {
+    let hidden = [(Effect::CoulombMotor, 0, 1.5), (Effect::ViscousMotor, 0, 2.0), (Effect::LoadMotor, 0, 0.8)];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 0.02, |t| 0.02 * (0.31 * t * t).sin(), 2), 1.1 * INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "load_torque", "viscous_friction"], "{:#?}", ranking(&o));
+    for (effect, i, value) in hidden {
+        let got = o.improved.effects.of(effect)[i];
+        assert!((got / value - 1.0).abs() < 0.03, "{effect:?} {got}");
+    }
+    assert!(o.diagnosis.causes.iter().all(|c| c.site == Site::Axis), "{:?}", o.diagnosis.causes);
+    let remainder = o.diagnosis.remainder;
+    assert!(remainder.share < 0.05 && remainder.site == Site::Axis, "{remainder:?}");
+}
+
+#[test]
+fn gravity_is_told_from_a_spring_where_the_hinge_turns_far_enough() {
+    let hidden = [(Effect::Gravity, 0, 6.0), (Effect::CoulombMotor, 0, 0.5)];
+    let o = diagnosed(&logged(with(&hidden), 1.2, 0.02, |_| 0.0, 3), INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "gravity"]);
+    assert!((o.improved.effects.of(Effect::Gravity)[0] / 6.0 - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_torque_that_the_library_has_no_law_for_is_not_named() {
+    // Wanders with the square root of the position's absolute value, of no sign of its own in time.
+    let o = diagnosed(
+        &logged(Settings::default(), 1.0, 0.01, |t| 2.0 * ((0.31 * t * t).sin() * (1.7 * t).sin()).cbrt(), 4),
+        INERTIA,
+    );
+    assert!(
+        o.decision.verdict == Verdict::Unexplained || o.diagnosis.causes.iter().all(|c| c.probability < 0.9),
+        "{:?}",
+        o.diagnosis.causes
+    );
+}
+
+#[test]
+fn a_third_inertia_on_a_spring_is_found_at_its_frequency() {
+    let hidden = [(Effect::MotorMode, 0, 0.8), (Effect::MotorMode, 1, 12.8), (Effect::MotorMode, 2, 0.16)];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 0.01, |_| 0.0, 5), INERTIA);
+    assert_eq!(named(&o), ["flexible_mode"], "{:#?}", ranking(&o));
+    let [inertia, stiffness, _] = *o.improved.effects.of(Effect::MotorMode) else { unreachable!() };
+    assert!(((stiffness / inertia).sqrt() / 4.0 - 1.0).abs() < 0.02, "{inertia} {stiffness}");
+    // The held-out third begins while it swings: that is no torque that the model lacks.
+    let ways = o.diagnosis.gap.ways;
+    assert!(ways[2].of == ClosureOf::Torque && ways[2].closure > 0.99, "{ways:?}");
+}
+
+#[test]
+fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
+    // Up to 50 rad/s, under a motion of 0.9 and 2.3.
+    let hidden = [(Effect::TorqueRipple, 0, 0.06), (Effect::TorqueRipple, 1, 30.0), (Effect::TorqueRipple, 2, 0.5)];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 1e-9, |_| 0.0, 6), INERTIA);
+    assert_eq!(named(&o), ["torque_ripple"], "{:#?}", ranking(&o));
+    assert!((o.improved.effects.of(Effect::TorqueRipple)[1] / 30.0 - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_small_cause_that_explains_next_to_all_that_a_large_one_leaves_is_named_beside_it() {
+    let hidden = [
+        (Effect::CoulombMotor, 0, 30.0),
+        (Effect::TorqueRipple, 0, 0.8),
+        (Effect::TorqueRipple, 1, 11.0),
+        (Effect::TorqueRipple, 2, 0.4),
+    ];
+    let o = diagnosed(&logged(with(&hidden), 1.0, 1e-3, |_| 0.0, 9), INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "torque_ripple"], "{:#?}", ranking(&o));
+    // A fiftieth of what the friction makes.
+    assert!((o.improved.effects.of(Effect::TorqueRipple)[0] / 0.8 - 1.0).abs() < 0.05);
+}
+
+/// A motor with a third inertia on a spring, which swings from the record's first sample on where it is `plucked`.
+fn with_a_mode(plucked: bool) -> Record {
+    let mode = with(&[(Effect::MotorMode, 0, 0.7), (Effect::MotorMode, 1, 0.7 * 4900.0), (Effect::MotorMode, 2, 1.0)]);
+    let axis = Axis::new(parameters(INERTIA), Structure::Rigid, mode, Scheme::Exact, DT);
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let acts = |t: f64| 3.0 * (4.0 * t).sin() + 2.0 * (9.0 * t + 1.0).cos() + 2.0 * (23.0 * t).sin() + (60.0 * t).cos();
+    let before = if plucked { 140 } else { 0 };
+    let (mut torque, mut theta) = (Vec::new(), Vec::new());
+    for k in 0..before + 500 {
+        let t = DT * f64::from(k);
+        // A blow just before the record begins.
+        let held = if k < before { if k + 12 > before { 40.0 } else { 0.0 } } else { acts(t) };
+        if k >= before {
+            torque.push(held);
+            theta.push(state.theta1() + noise(&mut rng, 1e-6));
+        }
+        state = axis.advance(&state, Ramp { start: held, end: held }, t);
+    }
+    of_one_encoder(DT * f64::from(before), torque, theta)
+}
+
+#[test]
+fn a_mode_that_swings_when_a_short_record_begins_is_no_sine_beside_it() {
+    for plucked in [false, true] {
+        let o = diagnosed(&with_a_mode(plucked), INERTIA);
+        assert_eq!(named(&o), ["flexible_mode"], "{plucked} {:#?}", ranking(&o));
+        let mode = o.improved.effects.of(Effect::MotorMode);
+        let frequency = (mode[1] / mode[0]).sqrt();
+        assert!((frequency / 70.0 - 1.0).abs() < 0.02, "{plucked} {frequency}");
+    }
+}
+
+#[test]
+fn a_log_read_early_is_followed_with_the_torque_to_come() {
+    // Read 1.3 samples after its stamp: coasting there is off by half the acceleration times the square of that time.
+    let (early, n) = (1.3 * DT, 400);
+    let torque = |k: usize| [1.0, -2.0, 0.5, 3.0][k / 7 % 4];
+    let axis = |h: f64| Axis::new(parameters(INERTIA), Structure::Rigid, Settings::default(), Scheme::Exact, h);
+    let (to_reading, on) = (axis(early - DT), axis(2.0 * DT - early));
+    let held = |k: usize| Ramp { start: torque(k), end: torque(k) };
+    // A sample is read within the interval after the next one.
+    let mut state = axis(DT).advance(&axis(DT).state(0.0, 0.0, 0.0, 0.0, 0.0), held(0), 0.0);
+    let mut theta = Vec::new();
+    for k in 0..n {
+        let read = to_reading.advance(&state, held(k + 1), 0.0);
+        theta.push(read.theta1());
+        state = on.advance(&read, held(k + 1), 0.0);
+    }
+    let record = Record {
+        start: 0.0,
+        dt: DT,
+        hold: Hold::Zoh,
+        torque: (0..n).map(torque).collect(),
+        between: None,
+        channels: [Some(theta), None, None, None],
+        noise: [1e-9; 4],
+        corner: [0.0; 2],
+        common_noise: 0.0,
+        settling: 0.0,
+        idle: Vec::new(),
+    };
+    let lacks = |delay: f64| {
+        let latch = with(&[(Effect::Latch, 0, delay)]);
+        let model = Model::new(parameters(INERTIA), Structure::Rigid, latch);
+        let tracked = track(&model, &record, [2.0; 2], Resolution::Full).expect("finite");
+        tracked.torque[0][50..n - 50].iter().fold(0.0, |m: f64, t| m.max(t.abs()))
+    };
+    // What is left is the error of the speed at the record's begin, which the feedback takes out.
+    assert!(lacks(-early) < 1e-3, "{}", lacks(-early));
+    assert!(lacks(-early + 0.1 * DT) > 0.1, "{}", lacks(-early + 0.1 * DT));
+}
