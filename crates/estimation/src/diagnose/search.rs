@@ -100,8 +100,8 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     // A rigid axis has one inertia, which runs off with no more than a share of any cause.
     let coupled = search.problem.nominal.structure == Structure::TwoInertia;
     if coupled && !search.at_floor(&chosen) && !search.is_negligible(&chosen) && search.have_moved(&parameters, MOVED) {
-        (search.progress)("beside the data sheet's parameters");
-        if let Some(other) = search.with_nominal_parameters(&given) {
+        (search.progress)("near the data sheet's parameters");
+        if let Some(other) = search.near_the_data_sheet(&given) {
             pool.push(other.clone());
             if search.is_likelier(&other, &chosen) {
                 chosen = search.stepwise(other, &mut pool);
@@ -383,18 +383,18 @@ impl Search<'_> {
         fit.coordinates.iter().any(moved)
     }
 
-    /// Effects added beside the axis as its data sheet has it, and only then its parameters freed: of several causes each shows itself
-    /// beside the true parameters, while free ones run off with what all of them do.
-    fn with_nominal_parameters(&self, given: &Fit) -> Option<Fit> {
-        let held = Search {
-            problem: self.problem.with_parameters_held(),
+    /// Effects added beside parameters near those of the data sheet, and only then these freed: of several causes each shows itself beside the
+    /// true parameters, while free ones run off with what all of them do.
+    fn near_the_data_sheet(&self, given: &Fit) -> Option<Fit> {
+        let near = Search {
+            problem: self.problem.near_the_data_sheet(),
             reference: self.reference,
             suspects: self.suspects.clone(),
             gap: self.gap,
             cut_short: AtomicBool::new(false),
             progress: self.progress,
         };
-        let fit = held.forward(given.clone(), &|f| held.evidence(f, 1.0), &mut Pool::default());
+        let fit = near.forward(given.clone(), &|f| near.evidence(f, 1.0), &mut Pool::default());
         if fit.terms.is_empty() {
             return None;
         }
@@ -403,9 +403,9 @@ impl Search<'_> {
     }
 
     #[cfg(test)]
-    pub fn only_with_nominal_parameters(&mut self) -> Option<Fit> {
+    pub fn only_near_the_data_sheet(&mut self) -> Option<Fit> {
         let baseline = self.baseline();
-        self.with_nominal_parameters(&baseline.given)
+        self.near_the_data_sheet(&baseline.given)
     }
 
     /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what

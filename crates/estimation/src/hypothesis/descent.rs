@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy::Discrepancy;
-use super::fit::{FARTHEST, Fit, PRIOR, Problem, Term};
+use super::fit::{Fit, PRIOR, Problem, Term};
 use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::scatter;
@@ -93,7 +93,7 @@ impl<'a> Descent<'a> {
     pub fn new(problem: &'a Problem<'a>, start: &Model, terms: &'a [Term], from: Discrepancy) -> Option<Self> {
         let free = problem.free(terms);
         let coordinates: Vec<Coordinate> =
-            free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
+            free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal, problem.farthest)).collect();
         let at = problem.along(start, problem.bandwidth(from))?;
         Some(Self {
             problem,
@@ -502,12 +502,12 @@ impl Normal {
     }
 }
 
-/// The coordinate of a nominal parameter, kept within a factor of its nominal value.
-fn bounded(c: Coordinate, nominal: &Model) -> Coordinate {
+/// The coordinate of a nominal parameter, its logarithm kept within so much of the nominal value's.
+fn bounded(c: Coordinate, nominal: &Model, farthest: f64) -> Coordinate {
     match c.free {
         Free::Base(_) => {
             let at = c.x(nominal);
-            Coordinate { bounds: [at - FARTHEST, at + FARTHEST], ..c }
+            Coordinate { bounds: [at - farthest, at + farthest], ..c }
         }
         Free::Effect(..) | Free::Loop(_) => c,
     }

@@ -22,7 +22,9 @@ use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 /// Prior standard deviation of the logarithm of a nominal parameter.
 pub const PRIOR: f64 = 0.5;
 /// Largest change of a nominal parameter, in its logarithm: a factor of ten.
-pub const FARTHEST: f64 = 2.3;
+const FARTHEST: f64 = 2.3;
+/// The same near the data sheet: a tenth. What is further off may be what an effect does; what is held to it exactly makes an effect of its error.
+const NEAR: f64 = 0.1;
 /// What a form that adds to a nested one costs beside it: as much as an effect of its own, and a little more, so that of two accounts of
 /// one thing (an unlike friction either way, a bias) the one by effects of their own is told.
 const RICHER: f64 = 2.2;
@@ -112,8 +114,8 @@ pub struct Problem<'a> {
     dynamics: Option<Arc<InverseDynamics>>,
     /// Whether every column is simulated.
     exact: bool,
-    /// Whether the axis' own parameters stay at what a model begins with.
-    holds_parameters: bool,
+    /// Largest change of a nominal parameter, in its logarithm.
+    pub farthest: f64,
     /// Steps simulated so far.
     steps: Arc<AtomicU64>,
 }
@@ -146,7 +148,7 @@ impl<'a> Problem<'a> {
             resolution: Resolution::Full,
             dynamics: None,
             exact: false,
-            holds_parameters: false,
+            farthest: FARTHEST,
             steps: Arc::default(),
         }
     }
@@ -178,10 +180,10 @@ impl Problem<'_> {
         Self { exact: true, ..self.clone() }
     }
 
-    /// The same with the axis' own parameters held.
+    /// The same with the axis' own parameters near those of its data sheet.
     #[must_use]
-    pub fn with_parameters_held(&self) -> Self {
-        Self { holds_parameters: true, ..self.clone() }
+    pub fn near_the_data_sheet(&self) -> Self {
+        Self { farthest: NEAR, ..self.clone() }
     }
 
     /// Steps simulated so far: of all that runs side by side only once it has ended the same on any number of threads.
@@ -219,7 +221,7 @@ impl Problem<'_> {
     }
 
     pub fn free(&self, terms: &[Term]) -> Vec<Free> {
-        let mut free = if self.holds_parameters { Vec::new() } else { self.base() };
+        let mut free = self.base();
         for (e, v) in terms {
             free.extend(e.info().variants[*v].free.iter().map(|i| Free::Effect(*e, *i)));
             free.extend(e.loops().then_some(Free::Loop(*e)));

@@ -84,7 +84,7 @@ fn a_coupling_that_one_encoder_hardly_shows_is_as_likely_as_it_is() {
 }
 
 #[test]
-fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
+fn near_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
     let paper = Parameters::PAPER;
     let acts =
         |t: f64| [(2.1, 0.3), (9.7, 4.1), (31.1, 5.3), (61.0, 1.1)].iter().map(|(w, p)| 0.05 * (w * t + p).sin()).sum();
@@ -105,7 +105,7 @@ fn beside_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free
     let suspects =
         EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
     let mut search = searched.search(&case, suspects, &|_| ());
-    let fit = search.only_with_nominal_parameters().expect("causes");
+    let fit = search.only_near_the_data_sheet().expect("causes");
     assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
     assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
     assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
