@@ -88,3 +88,19 @@ impl Search<'_> {
         gap
     }
 }
+
+/// Whether a share of the torque is materially less than another.
+pub fn is_materially_less(share: f64, than: f64) -> bool {
+    share * share < (1.0 - MATERIAL) * than * than
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materially_less_is_less_than_three_quarters_of_the_power() {
+        assert!(is_materially_less(0.86, 1.0) && !is_materially_less(0.87, 1.0));
+        assert!(!is_materially_less(0.1, 0.1));
+    }
+}

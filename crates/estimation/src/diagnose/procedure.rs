@@ -13,7 +13,7 @@ use super::conclusion::Decision;
 use super::diagnosis::ClosureOf;
 use super::gap::{self, Gaps};
 use super::location::without_offset;
-use super::material::NEGLIGIBLE;
+use super::material::{NEGLIGIBLE, is_materially_less};
 use super::prepared::{Prepared, prepared};
 use super::quantisation;
 use super::residual::located;
@@ -44,8 +44,10 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let refined = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
         let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
-        let decision = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
-        (own, decision)
+        let other = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
+        let [left, own_left] = [searched.left(&decision.chosen), own.left(&other.chosen)];
+        // A closer look has no more to explain.
+        if own_left > NEGLIGIBLE && is_materially_less(left, own_left) { (searched, decision) } else { (own, other) }
     };
     // A rigid axis is taken to be under control.
     let rigid = case.nominal.structure == Structure::Rigid;
