@@ -73,18 +73,15 @@ pub fn grid(time: &[f64]) -> Result<Grid, NoGrid> {
     if n < 3 {
         return Err(NoGrid::TooShort);
     }
-    let mut steps = Vec::with_capacity(n - 1);
-    for k in 1..n {
-        let step = time[k] - time[k - 1];
-        if step <= 0.0 {
-            return Err(NoGrid::NotIncreasing { row: k });
-        }
-        steps.push(step);
+    if let Some(k) = (1..n).find(|k| time[*k] - time[k - 1] <= 0.0) {
+        return Err(NoGrid::NotIncreasing { row: k });
     }
-    let middle = steps.len() / 2;
-    let (_, &mut usual, _) = steps.clone().select_nth_unstable_by(middle, f64::total_cmp);
-    if let Some(k) = steps.iter().position(|step| *step > 1.5 * usual) {
-        return Err(NoGrid::Gap { row: k + 1, gap: steps[k], dt: usual });
+    let steps = || time.windows(2).map(|w| w[1] - w[0]);
+    let mut sorted: Vec<f64> = steps().collect();
+    let middle = sorted.len() / 2;
+    let (_, &mut usual, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
+    if let Some((k, gap)) = steps().enumerate().find(|(_, step)| *step > 1.5 * usual) {
+        return Err(NoGrid::Gap { row: k + 1, gap, dt: usual });
     }
     let start = time[0];
     let dt = (time[n - 1] - start) / (n - 1) as f64;
