@@ -314,6 +314,11 @@ impl MotionLines {
     }
 }
 
+/// Accelerations at all samples but the first and the last.
+fn accelerations(x: &[f64], dt: f64) -> impl Iterator<Item = f64> {
+    x.windows(3).map(move |w| (w[2] - 2.0 * w[1] + w[0]) / (dt * dt))
+}
+
 /// The equation above, summed over the lines of motion: columns of unit size.
 struct Balance {
     motion: MotionLines,
@@ -334,20 +339,25 @@ impl Balance {
             return None;
         }
         let dt = input.dt;
-        let acceleration =
-            |x: &[f64]| x.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]) / (dt * dt)).collect::<Vec<f64>>();
-        let speed: Vec<f64> = x.windows(3).map(|w| (w[2] - w[0]) / (2.0 * dt)).collect();
-        let quiet = 0.02 * quantile(speed.iter().copied(), 0.9);
-        let sign: Vec<f64> = speed.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
         let table = input.theta2.filter(|_| input.theta1.is_some() && nominal.structure == Structure::TwoInertia);
         let p = nominal.parameters;
-        let (mean, above) = match table {
-            None => (acceleration(x), rigid_band(nominal)),
-            Some(x2) => {
-                let of = |(a1, a2): (&f64, &f64)| (p.i1 * a1 + p.i2 * a2) / (p.i1 + p.i2);
-                (acceleration(x).iter().zip(&acceleration(x2)).map(of).collect(), f64::INFINITY)
+        let mean = || -> Vec<f64> {
+            match table {
+                None => accelerations(x, dt).collect(),
+                Some(x2) => {
+                    let of = |(a1, a2)| (p.i1 * a1 + p.i2 * a2) / (p.i1 + p.i2);
+                    accelerations(x, dt).zip(accelerations(x2, dt)).map(of).collect()
+                }
             }
         };
+        let speeds = || {
+            let speed: Vec<f64> = x.windows(3).map(|w| (w[2] - w[0]) / (2.0 * dt)).collect();
+            let quiet = 0.02 * quantile(speed.iter().copied(), 0.9);
+            let sign: Vec<f64> = speed.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
+            (speed, sign)
+        };
+        let (mean, (speed, sign)) = rayon::join(mean, speeds);
+        let above = if table.is_some() { f64::INFINITY } else { rigid_band(nominal) };
         let mut columns = vec![&torque[1..n - 1], &mean, &speed, &sign, &x[1..n - 1]];
         columns.extend(table.map(|x2| &x2[1..n - 1]));
         let motion = MotionLines::new(&columns, X..columns.len(), dt, above)?;

@@ -1,8 +1,9 @@
 //! Averaged cross spectra of a few columns (Welch's method: P. D. Welch, IEEE Trans. Audio Electroacoustics 15, 1967): Hann
 //! windows, overlapping by half, means taken off.
 
-use rustfft::FftPlanner;
+use rayon::prelude::*;
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
 
 use crate::numerics::level::deviation;
 
@@ -22,7 +23,53 @@ pub(super) struct Spectra {
     pub resolution: f64,
     /// Independent averages: half-overlapping Hann segments share a sixth of their information (Welch 1967).
     pub averages: f64,
+    /// The lines of every pair `i <= j`, in the order (0, 0), (0, 1), ..., (1, 1), ...
     values: Vec<Complex<f64>>,
+}
+
+/// Segments that are transformed at a time.
+const BATCH: usize = 2;
+
+const ZERO: Complex<f64> = Complex::new(0.0, 0.0);
+
+/// The transforms of one segment of all columns.
+struct Segment {
+    /// Of each column, its lines.
+    spectra: Vec<Vec<Complex<f64>>>,
+    buffer: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+impl Segment {
+    fn new(columns: usize, length: usize, scratch: usize) -> Self {
+        let spectra = vec![vec![ZERO; length / 2 - 1]; columns];
+        Self { spectra, buffer: vec![ZERO; length], scratch: vec![ZERO; scratch] }
+    }
+
+    /// Transforms `parts`, one of each column, less their means, by the window, over the columns' `sizes`.
+    fn transform(&mut self, parts: &[&[f64]], window: &[f64], sizes: &[f64], plan: &dyn Fft<f64>) {
+        let Self { spectra, buffer, scratch } = self;
+        let (length, lines) = (buffer.len(), buffer.len() / 2 - 1);
+        let means: Vec<f64> = parts.iter().map(|part| part.iter().sum::<f64>() / length as f64).collect();
+        let value = |c: usize, k: usize| (parts[c][k] - means[c]) * window[k] / sizes[c];
+        // Two real columns are one complex one: x + j*y, whose transform Z gives
+        // X(f) = (Z(f) + conj Z(-f))/2 and Y(f) = (Z(f) - conj Z(-f))/2j.
+        for x in (0..parts.len()).step_by(2) {
+            let y = (x + 1 < parts.len()).then_some(x + 1);
+            for (k, z) in buffer.iter_mut().enumerate() {
+                *z = Complex::new(value(x, k), y.map_or(0.0, |y| value(y, k)));
+            }
+            plan.process_with_scratch(buffer, scratch);
+            for f in 1..=lines {
+                let (z, mirrored) = (buffer[f], buffer[length - f].conj());
+                spectra[x][f - 1] = (z + mirrored) * (0.5 * sizes[x]);
+                if let Some(y) = y {
+                    let twice = z - mirrored;
+                    spectra[y][f - 1] = Complex::new(twice.im, -twice.re) * (0.5 * sizes[y]);
+                }
+            }
+        }
+    }
 }
 
 impl Spectra {
@@ -37,50 +84,30 @@ impl Spectra {
         let window: Vec<f64> =
             (0..length).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / length as f64).cos()).collect();
         let m = columns.len();
-        let mut values = vec![Complex::new(0.0, 0.0); m * m * lines];
-        let mut buffer = vec![Complex::new(0.0, 0.0); length];
-        let mut transforms = vec![vec![Complex::new(0.0, 0.0); lines]; m];
-        let mut scratch = vec![Complex::new(0.0, 0.0); plan.get_inplace_scratch_len()];
         // Powers of two that bring the columns to about one size: in one transform of two the smaller one is not lost in the rounding
         // of the larger one.
-        let sizes: Vec<f64> = columns.iter().map(|c| power_of_two_above(deviation(c))).collect();
-        for s in 0..count {
-            let first = if count > 1 { s * (n - length) / (count - 1) } else { 0 };
-            let parts: Vec<&[f64]> = columns.iter().map(|column| &column[first..first + length]).collect();
-            let means: Vec<f64> = parts.iter().map(|part| part.iter().sum::<f64>() / length as f64).collect();
-            let value = |c: usize, k: usize| (parts[c][k] - means[c]) * window[k] / sizes[c];
-            // Two real columns are one complex one: x + j*y, whose transform Z gives
-            // X(f) = (Z(f) + conj Z(-f))/2 and Y(f) = (Z(f) - conj Z(-f))/2j.
-            for x in (0..m).step_by(2) {
-                let y = (x + 1 < m).then_some(x + 1);
-                for (k, z) in buffer.iter_mut().enumerate() {
-                    *z = Complex::new(value(x, k), y.map_or(0.0, |y| value(y, k)));
-                }
-                plan.process_with_scratch(&mut buffer, &mut scratch);
-                for f in 1..=lines {
-                    let (z, mirrored) = (buffer[f], buffer[length - f].conj());
-                    transforms[x][f - 1] = (z + mirrored) * (0.5 * sizes[x]);
-                    if let Some(y) = y {
-                        let twice = z - mirrored;
-                        transforms[y][f - 1] = Complex::new(twice.im, -twice.re) * (0.5 * sizes[y]);
-                    }
-                }
-            }
-            for i in 0..m {
-                for j in i..m {
-                    let out = &mut values[(i * m + j) * lines..][..lines];
-                    for ((o, a), b) in out.iter_mut().zip(&transforms[i]).zip(&transforms[j]) {
+        let sizes: Vec<f64> = columns.par_iter().map(|c| power_of_two_above(deviation(c))).collect();
+        let pairs: Vec<(usize, usize)> = (0..m).flat_map(|i| (i..m).map(move |j| (i, j))).collect();
+        let mut values = vec![ZERO; pairs.len() * lines];
+        let mut segments: Vec<Segment> =
+            (0..BATCH.min(count)).map(|_| Segment::new(m, length, plan.get_inplace_scratch_len())).collect();
+        for batch in (0..count).step_by(BATCH) {
+            let batch = batch..(batch + BATCH).min(count);
+            let transforms = &mut segments[..batch.len()];
+            transforms.par_iter_mut().zip(batch).for_each(|(segment, s)| {
+                let first = if count > 1 { s * (n - length) / (count - 1) } else { 0 };
+                let parts: Vec<&[f64]> = columns.iter().map(|column| &column[first..first + length]).collect();
+                segment.transform(&parts, &window, &sizes, plan.as_ref());
+            });
+            let transforms = &*transforms;
+            // In the order of the segments, whichever was transformed first.
+            values.par_chunks_mut(lines).zip(&pairs).for_each(|(out, (i, j))| {
+                for segment in transforms {
+                    for ((o, a), b) in out.iter_mut().zip(&segment.spectra[*i]).zip(&segment.spectra[*j]) {
                         *o += a.conj() * b;
                     }
                 }
-            }
-        }
-        for i in 0..m {
-            for j in 0..i {
-                for f in 0..lines {
-                    values[(i * m + j) * lines + f] = values[(j * m + i) * lines + f].conj();
-                }
-            }
+            });
         }
         let scale = 1.0 / count as f64;
         values.iter_mut().for_each(|v| *v *= scale);
@@ -96,7 +123,10 @@ impl Spectra {
 
     /// Average of `conj(X_i)*X_j` at line `f`, from 0.
     pub fn of(&self, i: usize, j: usize, f: usize) -> Complex<f64> {
-        self.values[(i * self.columns + j) * self.lines + f]
+        if i > j {
+            return self.of(j, i, f).conj();
+        }
+        self.values[(i * (2 * self.columns - i - 1) / 2 + j) * self.lines + f]
     }
 
     /// Variance of a real cross spectrum that is summed over lines, over the sum of the products of the two columns' powers: real and

@@ -33,43 +33,73 @@ pub(super) const MAIN: usize = 1;
 const SIGN: usize = 2;
 pub(super) const TABLE: usize = 3;
 
+/// The rates of motor and table that are compared with the torque, rad/s (m/s), between two samples each.
+struct Rates {
+    /// The motor's, or, where `collocated` is false, the table's.
+    main: Vec<f64>,
+    /// Its sign; zero where it is small.
+    sign: Vec<f64>,
+    /// The table's beside the motor's.
+    table: Option<Vec<f64>>,
+    collocated: bool,
+}
+
+impl Rates {
+    /// None where no motion is measured.
+    fn of(input: &Input<'_>) -> Option<Self> {
+        let rate = |x: Option<&[f64]>, v: Option<&[f64]>| -> Option<Vec<f64>> {
+            match (x, v) {
+                (Some(x), _) => Some(x.windows(2).map(|w| (w[1] - w[0]) / input.dt).collect()),
+                (None, Some(v)) => Some(v.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect()),
+                (None, None) => None,
+            }
+        };
+        let (one, two) = rayon::join(|| rate(input.theta1, input.omega1), || rate(input.theta2, input.omega2));
+        let collocated = one.is_some();
+        let (main, table) = match (one, two) {
+            (Some(one), two) => (one, two),
+            (None, two) => (two?, None),
+        };
+        let quiet = 0.02 * quantile(main.iter().copied(), 0.9);
+        let sign = main.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
+        Some(Self { main, sign, table, collocated })
+    }
+
+    /// The columns of the spectra.
+    fn columns<'a>(&'a self, torque: &'a [f64]) -> Vec<&'a [f64]> {
+        let mut columns: Vec<&[f64]> = vec![&torque[..self.main.len()], &self.main, &self.sign];
+        columns.extend(self.table.as_deref());
+        columns
+    }
+}
+
+/// Averaged spectra with coherent lines, of segments as short as they can be, and those lines; None where there are none.
+fn of_segments(columns: &[&[f64]], dt: f64) -> Option<(Spectra, Vec<usize>)> {
+    let n = columns[0].len();
+    let lengths = [power_of_two(n / 8).clamp(32, 8192), power_of_two(n / 3).clamp(32, 65_536)];
+    lengths.into_iter().find_map(|length| {
+        let spectra = Spectra::new(columns, length, dt);
+        let found = coherent_lines(&spectra);
+        (!found.is_empty()).then_some((spectra, found))
+    })
+}
+
 /// Looks at torque and motion. Gives the band in which they are coherent, Hz, and sets the inertia that moves, kg.m2 (kg), where it is
 /// significant.
 pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
     let torque = input.torque?;
-    let n = torque.len();
-    let rate = |x: Option<&[f64]>, v: Option<&[f64]>| -> Option<Vec<f64>> {
-        match (x, v) {
-            (Some(x), _) => Some((0..n - 1).map(|k| (x[k + 1] - x[k]) / input.dt).collect()),
-            (None, Some(v)) => Some((0..n - 1).map(|k| 0.5 * (v[k] + v[k + 1])).collect()),
-            (None, None) => None,
-        }
-    };
-    let one = rate(input.theta1, input.omega1);
-    let two = rate(input.theta2, input.omega2);
     check_time_scale(input, findings);
-    let collocated = one.is_some();
-    let (main, table) = match (&one, &two) {
-        (Some(a), b) => (a, b.as_ref()),
-        (None, Some(b)) => (b, None),
-        (None, None) => return None,
+    let rates = || {
+        let rates = Rates::of(input)?;
+        let found = of_segments(&rates.columns(torque), input.dt);
+        Some((rates, found))
     };
-    check_directions(main, findings);
-    let quiet = 0.02 * quantile(main.iter().copied(), 0.9);
-    let sign: Vec<f64> = main.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
-    let mut columns: Vec<&[f64]> = vec![&torque[..n - 1], main, &sign];
-    columns.extend(table.map(Vec::as_slice));
-    let lengths = [power_of_two((n - 1) / 8).clamp(32, 8192), power_of_two((n - 1) / 3).clamp(32, 65_536)];
-    let of_lines = || {
-        lengths.into_iter().find_map(|length| {
-            let spectra = Spectra::new(&columns, length, input.dt);
-            let found = coherent_lines(&spectra);
-            (!found.is_empty()).then_some((spectra, found))
-        })
-    };
-    let (nominal, lines) = rayon::join(|| rigid::compare_with_nominal(input), of_lines);
-    let Some((spectra, lines)) = lines else {
-        single_spectrum(input, &columns, collocated, nominal, inertia, findings);
+    let (nominal, rates) = rayon::join(|| rigid::compare_with_nominal(input), rates);
+    let (rates, found) = rates?;
+    let collocated = rates.collocated;
+    check_directions(&rates.main, findings);
+    let Some((spectra, lines)) = found else {
+        single_spectrum(input, &rates.columns(torque), collocated, nominal, inertia, findings);
         return None;
     };
     // A single line without neighbours may pass by chance.
@@ -79,7 +109,7 @@ pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &m
         _ => [lines[0], lines[lines.len() - 1]],
     };
     let band = [first, last].map(|f| spectra.omega(f) / std::f64::consts::TAU);
-    if table.is_some() {
+    if spectra.has(TABLE) {
         compare_encoders(input, &spectra, &lines, findings);
     }
     *inertia = merge_with_nominal(nominal, torque_findings(input, &spectra, &lines, collocated), findings);
