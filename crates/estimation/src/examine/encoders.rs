@@ -21,7 +21,7 @@ use crate::numerics::level::deviation;
 const MAX_RELATIVE_TWIST: f64 = 0.05;
 
 /// Whether the twist is small beside the motor's motion.
-fn table_tracks_motor(input: &Input<'_>) -> bool {
+pub(super) fn table_tracks_motor(input: &Input<'_>) -> bool {
     let (Some(x1), Some(x2)) = (input.theta1, input.theta2) else { return false };
     let twist: Vec<f64> = x1.iter().zip(x2).map(|(a, b)| a - b).collect();
     deviation(&twist) < MAX_RELATIVE_TWIST * deviation(x1)

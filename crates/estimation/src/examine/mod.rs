@@ -23,6 +23,7 @@ mod momentum;
 mod motor_side;
 mod nominal;
 mod pairs;
+mod regression;
 mod rigid;
 mod robust;
 mod slips;

@@ -1,19 +1,18 @@
 //! The motor's equation of motion with the nominal parameters, `T = I1*a1 + B*d' + K*d`, where `d = theta1 - theta2` is the twist (rad, m):
 //! it holds whatever other torque acts on the table. Residuals are ratios of standard deviations, without unit.
 
-use super::rigid::{SAMPLES, SIGNIFICANT};
+use super::regression::Regression;
+use super::rigid::SIGNIFICANT;
 use super::robust::quantile;
 use super::smoothing::{smoothed, widths};
 use super::{Input, NOMINAL_OFF, Nominal, Structure};
-use crate::identify::long_run::Scores;
-use crate::identify::lsq::triangularise;
 use crate::numerics::level::deviation;
 
 /// Residual with a column as logged, over that with the column corrected, below which the column needs no correction.
 const BETTER_FIT: f64 = 0.8;
 
 /// Share of the ninth decile of the speeds up to which friction has no sign: about zero the sign is that of the noise.
-const QUIET: f64 = 0.02;
+pub(super) const QUIET: f64 = 0.02;
 
 /// Residual with the coupling to the table as logged, over that without coupling, below which the column is this axis' table.
 const NEEDED_REDUCTION: f64 = 0.5;
@@ -63,30 +62,15 @@ fn coupling_share(input: &Input<'_>, table: &[f64]) -> Option<CouplingShare> {
         let [t, x, y] = [t, x1, table].map(|v| smoothed(v, width));
         let rate = |v: &[f64], k: usize| (v[k + 1] - v[k - 1]) / (2.0 * dt);
         let quiet = QUIET * quantile((1..x.len() - 1).map(|k| rate(&x, k)), 0.9);
-        let stride = (t.len() / SAMPLES).max(1);
-        let samples: Vec<usize> = (1..t.len() - 1).step_by(stride).collect();
         let row = |k: usize| {
             let v = rate(&x, k);
             let pull = p.b * (v - rate(&y, k)) + p.k * (x[k] - y[k]);
             let sign = if v.abs() <= quiet { 0.0 } else { v.signum() };
-            [pull, p.i1 * (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt), v, sign, 1.0]
+            ([pull, p.i1 * (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt), v, sign, 1.0], t[k])
         };
-        let solution = triangularise(samples.len(), 5, 1, |i, out| {
-            out[..5].copy_from_slice(&row(samples[i]));
-            out[5] = t[samples[i]];
-        })
-        .solve()
-        .ok()?;
-        let mut scores = Scores::new(samples.len(), 5);
-        for (i, k) in samples.iter().enumerate() {
-            let row = row(*k);
-            let left = t[*k] - (0..5).map(|j| solution.phi[(j, 0)] * row[j]).sum::<f64>();
-            (0..5).for_each(|j| scores.add(i, j, left * row[j]));
-        }
-        let covariance = &solution.inverse * scores.omega() * &solution.inverse;
-        let left = (solution.residual[(0, 0)] / samples.len() as f64).sqrt() / deviation(&t);
-        let share = CouplingShare { value: solution.phi[(0, 0)], error: covariance[(0, 0)].sqrt(), left };
-        left.is_finite().then_some(share)
+        let fit = Regression::of(t.len(), row)?;
+        let left = fit.left / deviation(&t);
+        left.is_finite().then(|| CouplingShare { value: fit.values[0], error: fit.errors(row)[0], left })
     };
     widths(x1.len()).filter_map(by).min_by(|a, b| a.left.total_cmp(&b.left))
 }
@@ -97,20 +81,17 @@ pub(super) fn fits_better_as_logged(input: &Input<'_>, table: f64, torque: f64) 
     of(1.0, 1.0).zip(of(table, torque)).is_some_and(|(logged, mended)| logged < BETTER_FIT * mended)
 }
 
-/// How the equation is fulfilled with the table's column taken as the twist.
-pub(super) struct TwistFit {
-    /// The residual is much smaller than with the column as the table's angle.
-    pub(super) better: bool,
-    /// The residual is larger without the coupling's torque.
-    pub(super) needed: bool,
-}
-
-/// The table's column, times `sign`, taken as the twist; `None` without torque, both angles and a nominal model of two inertias.
-pub(super) fn fit_as_twist(input: &Input<'_>, sign: f64) -> Option<TwistFit> {
-    let twist: Vec<f64> = input.theta2?.iter().map(|d| sign * d).collect();
-    let of = |coupling: f64| residual_with_twist(input, &twist, coupling, 1.0);
-    let (logged, with, without) = (motor_side_residual(input, 1.0, 1.0, 1.0)?, of(1.0)?, of(0.0)?);
-    Some(TwistFit { better: with < NEEDED_REDUCTION * logged, needed: with < BETTER_FIT * without })
+/// The first of the multiples of the twist that the table's column is by this equation: the residual is much smaller than with the column as
+/// the table's angle, and it is larger without the coupling's torque. `None` without torque, both angles and a nominal model of two inertias.
+pub(super) fn fitting_twist(input: &Input<'_>, multiples: &[f64]) -> Option<f64> {
+    let column = input.theta2?;
+    let of = |multiple: f64, coupling: f64| {
+        let twist: Vec<f64> = column.iter().map(|y| y / multiple).collect();
+        residual_with_twist(input, &twist, coupling, 1.0)
+    };
+    let (logged, without) = (motor_side_residual(input, 1.0, 1.0, 1.0)?, of(1.0, 0.0)?);
+    let enough = (NEEDED_REDUCTION * logged).min(BETTER_FIT * without);
+    multiples.iter().copied().find(|multiple| of(*multiple, 1.0).is_some_and(|with| with < enough))
 }
 
 /// Residual with the table's angle times `table`, the coupling's torque times `coupling` and the torque times `torque` (factors).

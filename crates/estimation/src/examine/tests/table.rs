@@ -27,20 +27,26 @@ fn a_table_that_goes_five_times_as_far_as_its_motor_is_refused_and_one_that_goes
 }
 
 #[test]
-fn the_twist_in_the_tables_place_is_found_either_way_round_and_whatever_acts_on_the_table() {
+fn the_twist_in_the_tables_place_is_found_either_way_round_in_any_unit_and_whatever_acts_on_the_table() {
     for settings in [
         Settings::default(),
         effect("coulomb_table", &[("level", 0.002)]),
         effect("coulomb_motor", &[("level", 0.002)]),
     ] {
-        for sign in [1.0, -1.0] {
-            let mut c = axis(Kind::RandomPhase, 4096, 2, &settings, 1e-5);
-            c.v[3] = c.v[1].iter().zip(&c.v[3]).map(|(a, b)| sign * (a - b)).collect();
+        let sound = axis(Kind::RandomPhase, 4096, 2, &settings, 1e-5);
+        assert_eq!(refused(&Input { nominal: Some(NOMINAL), ..sound.positions() }), [""; 0]);
+        for (multiple, way_out) in [
+            (1.0, "theta1 less it."),
+            (-1.0, "theta1 plus it."),
+            (10.0, "theta1 less 0.1 times it."),
+            (-0.1, "theta1 plus 10 times it."),
+        ] {
+            let mut c = sound.clone();
+            c.v[3] = c.v[1].iter().zip(&c.v[3]).map(|(a, b)| multiple * (a - b)).collect();
             let found = examine(&Input { nominal: Some(NOMINAL), ..c.positions() });
-            let finding = found.find("twist").unwrap_or_else(|| panic!("{sign}: {:#?}", found.findings));
+            let finding = found.find("twist").unwrap_or_else(|| panic!("{multiple}: {:#?}", found.findings));
             assert_eq!(finding.severity, Severity::Refuse);
-            let way_out = if sign > 0.0 { "theta1 less it" } else { "theta1 plus it" };
-            assert!(finding.remedy.contains(way_out), "{sign}: {finding:#?}");
+            assert!(finding.remedy.contains(way_out), "{multiple}: {finding:#?}");
         }
     }
 }
