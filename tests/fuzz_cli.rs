@@ -280,13 +280,17 @@ fn no_run_panics_dies_hangs_or_leaves_half_an_output() {
 fn what_was_found_once_stays_mended() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let log: String = (0..400)
-        .map(|k| {
+    let log = |blow: f64| -> String {
+        let rows = (0..400).map(|k| {
             let t = f64::from(k) * 1e-3;
-            format!("{t},{},{},{}\n", 0.01 * (37.0 * t).sin(), (30.0 * t).cos(), 0.9 * (30.0 * t).cos())
-        })
-        .collect();
-    std::fs::write(at("log.csv"), format!("time,T,theta1,theta2\n{log}")).unwrap();
+            let torque = if k == 5 { blow } else { 0.01 * (37.0 * t).sin() };
+            format!("{t},{torque},{},{}\n", (30.0 * t).cos(), 0.9 * (30.0 * t).cos())
+        });
+        std::iter::once("time,T,theta1,theta2\n".to_owned()).chain(rows).collect()
+    };
+    std::fs::write(at("log.csv"), log(0.0)).unwrap();
+    // A motion whose square no number holds.
+    std::fs::write(at("blow.csv"), log(1e308)).unwrap();
     // A natural frequency without bound.
     std::fs::write(at("stiff.toml"), AXIS.replace("1.76e-2", "1e308").replace("2.37e-4", "5e-324")).unwrap();
     // An inertia that no number stands beside.
@@ -296,6 +300,7 @@ fn what_was_found_once_stays_mended() {
         "inspect log.csv --axis heavy.toml --report out.html --json out.json",
         "inspect log.csv --axis stiff.toml --report out.html --json out.json",
         "identify log.csv --axis stiff.toml --method oe --trust --report out.html",
+        "identify blow.csv --method oe --trust --json out.json",
         // A circle that no plot has a scale for.
         "circle axis.toml --radius 1e-300 --feed 1e-300 --report out.html -o out.csv",
         "circle axis.toml --radius 1e300 --feed 1e300 --report out.html",

@@ -46,10 +46,12 @@ pub fn straight(
 }
 
 /// Residual of the recommended estimates at the output with the worst fit, per cent of its standard deviation; `None` where nothing was
-/// simulated.
+/// simulated, or beyond what a number holds.
 fn worst_residual(result: &Identification) -> Option<f64> {
     let method = &result.methods[result.recommended.as_ref()?.method];
-    method.outputs.iter().map(|o| 100.0 - o.fit_percent).reduce(f64::max)
+    // Of sums that overflow the residual is no number: a worse one than any.
+    let residual = |fit: f64| if fit.is_finite() { 100.0 - fit } else { f64::INFINITY };
+    method.outputs.iter().map(|o| residual(o.fit_percent)).reduce(f64::max).filter(|worst| worst.is_finite())
 }
 
 /// [`worst_residual`] where a residual is not white, so more than noise.
