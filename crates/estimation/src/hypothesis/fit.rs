@@ -520,10 +520,9 @@ impl Problem<'_> {
 
     /// What an effect costs: one of some fifty, at one of so many lines.
     fn price(&self, (e, v): Term) -> f64 {
-        let lines = e.info().variants[v]
-            .free
-            .iter()
-            .any(|i| matches!(e.info().parameters[*i].start, Start::Grid(Scale::Order | Scale::Frequency, _)));
+        let is_of_line =
+            |i: &usize| matches!(e.info().parameters[*i].start, Start::Grid(Scale::Order | Scale::Frequency, _));
+        let lines = e.is_mode() || e.info().variants[v].free.iter().any(is_of_line);
         let richer = (0..v).any(|plain| e.info().frees_more(v, plain));
         PRICE * if richer { RICHER } else { 1.0 } - e.info().odds.ln()
             + if lines { (self.band.omega.len() as f64).ln() } else { 0.0 }
@@ -533,7 +532,9 @@ impl Problem<'_> {
     /// whatever it is of (Hurvich, Tsai, Biometrika 76, 1989).
     pub fn evidence(&self, f: &Fit, share: f64) -> f64 {
         let n = share * self.band.values();
-        let k = f.coordinates.len() as f64;
+        // How a third inertia swung at first is fitted, too: two values, which are taken out of what is left.
+        let swung = 2 * f.terms.iter().filter(|(e, _)| e.is_mode()).count();
+        let k = (f.coordinates.len() + swung) as f64;
         share * f.log_likelihood + f.log_prior
             - 0.5 * k * n.ln()
             - k * (k + 1.0) / (n - k - 1.0).max(FEWEST)

@@ -174,6 +174,16 @@ fn a_mode_that_swings_when_a_short_record_begins_is_no_sine_beside_it() {
 }
 
 #[test]
+fn a_sine_of_a_few_periods_is_no_mode_that_swung_from_the_beginning() {
+    // Four periods: inertia, stiffness, damping, and how it swung at first follow any of them.
+    let hidden = with(&[(Effect::Disturbance, 0, 0.3), (Effect::Disturbance, 1, 11.0), (Effect::Disturbance, 2, 1.9)]);
+    for seed in [5, 7] {
+        let o = diagnosed(&logged(hidden, 1.0, 1e-2, |_| 0.0, seed).part(0..180), INERTIA);
+        assert!(!named(&o).contains(&"flexible_mode"), "{seed} {:#?}", ranking(&o));
+    }
+}
+
+#[test]
 fn a_log_read_early_is_followed_with_the_torque_to_come() {
     // Read 1.3 samples after its stamp: coasting there is off by half the acceleration times the square of that time.
     let (early, n) = (1.3 * DT, 400);
