@@ -33,6 +33,8 @@ pub const UNCAUSED: f64 = 0.05;
 /// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
 /// that is told at the sampling rate (1/f) a noise has several times as much at the motion's.
 const COLOUR: f64 = 10.0;
+/// Hypotheses that are reported.
+const RANKED: usize = 40;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 
@@ -63,6 +65,72 @@ struct Nested {
     fit: Fit,
     /// Whether it was fitted for the verdict, from where the hypothesis stands.
     refitted: bool,
+}
+
+/// What the record says for each effect of a hypothesis.
+struct Weighing {
+    /// The hypothesis without it, where it is determined.
+    nested: Vec<Option<Nested>>,
+    /// Probability that it is there, and nothing that no cause explains does as it would.
+    standing: Vec<f64>,
+    /// The constant torque that it may be as well.
+    twins: Vec<Option<Confusable>>,
+    /// The hypotheses that it was weighed in.
+    ranking: Vec<Weighed>,
+    /// Its probability.
+    probabilities: Vec<f64>,
+}
+
+impl Weighing {
+    /// The fits that were weighed.
+    fn into_fits(self) -> Vec<Fit> {
+        self.ranking.into_iter().map(|w| w.fit).collect()
+    }
+
+    /// Effects that are likely.
+    fn likely(&self) -> usize {
+        self.probabilities.iter().filter(|p| is_likely(p)).count()
+    }
+
+    /// The least likely effect, where it is not likely.
+    fn least_likely(&self) -> Option<usize> {
+        let p = &self.probabilities;
+        (0..p.len()).min_by(|a, b| p[*a].total_cmp(&p[*b])).filter(|i| !is_likely(&p[*i]))
+    }
+
+    /// Of two that the record cannot tell apart one explains it.
+    fn share_with_twins(&mut self) {
+        for (p, twin) in self.probabilities.iter_mut().zip(&self.twins) {
+            *p = twin.map_or(*p, |t| p.min(of_log_odds(t.difference)));
+        }
+    }
+
+    /// The one of several effects that stays open, and the others are told: others do the same beside them.
+    fn open(&self, chosen: &Fit) -> Option<usize> {
+        self.least_likely().filter(|&i| {
+            is_likely(&self.standing[i])
+                && chosen.terms.len() > 1
+                && self.likely() + 1 == chosen.terms.len()
+                && is_likely(&one_instead(&self.ranking, chosen, i))
+                && instead(&self.ranking, chosen, i, self.twins[i]).len() > 1
+        })
+    }
+
+    /// Another hypothesis with one effect in the place of the open one, which is told, too: likelier than not.
+    fn instead_of_open(&self, chosen: &Fit, open: usize) -> Option<Fit> {
+        let best = with_one_instead(&self.ranking, chosen, open).next()?;
+        let is_told = is_likely(&(best.probability * self.standing[open]));
+        (is_told && best.fit.terms != chosen.terms && best.fit.converged).then(|| best.fit.clone())
+    }
+
+    /// The hypothesis without an effect, where it was fitted from where that stands.
+    fn refitted(&self, without: usize) -> Option<Fit> {
+        self.nested[without].as_ref().filter(|n| n.refitted).map(|n| n.fit.clone())
+    }
+}
+
+fn is_likely(probability: &f64) -> bool {
+    *probability >= LIKELY
 }
 
 /// The decision.
@@ -104,8 +172,7 @@ impl Confusable {
 impl Decision {
     /// Causes that are named.
     fn named(&self) -> usize {
-        let likely = self.probabilities.iter().filter(|p| **p >= LIKELY).count();
-        if self.verdict == Verdict::Effect { likely } else { 0 }
+        if self.verdict == Verdict::Effect { self.probabilities.iter().filter(|p| is_likely(p)).count() } else { 0 }
     }
 
     /// True if the parameters all changed by one factor: a wrong torque constant.
@@ -133,112 +200,46 @@ impl Search<'_> {
     pub fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, mut pool: Vec<Fit>) -> Decision {
         pool.push(chosen.clone());
         let independent = self.independent(std::slice::from_ref(&chosen));
-        let plain = if self.evidence(&parameters, independent) > self.evidence(&given, independent) {
-            &parameters
-        } else {
-            &given
-        };
         let nominal = &self.problem.nominal;
+        let is_off = self.evidence(&parameters, independent) > self.evidence(&given, independent);
+        let plain = if is_off { parameters.clone() } else { given.clone() };
         let chosen = if chosen.terms.is_empty() || is_run_off(&chosen, nominal) { plain.clone() } else { chosen };
-        let explained = self.explained(&parameters, &chosen);
-        let white = self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
-        let is_complete = self.at_floor(&chosen) || white;
-        let left = self.left(&chosen);
-        // What the chosen hypothesis lacks no material part of is no rival of it, only itself and something small.
-        // Of accounts that leave next to nothing of the gap the shorter is told.
-        let little = self.leaves_little(&chosen);
-        let longer = |f: &Fit| f.terms.len() > chosen.terms.len();
-        pool.retain(|f| !(is_extension(f, &chosen) || little && longer(f)));
+        self.retain_rivals(&chosen, &mut pool);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
             return self.conclude(given, parameters, simple, pool);
         }
-        // What is below two of its standard errors, everything free, is no cause.
-        let determined = |i: usize| !is_undetermined(&finished, chosen.terms[i].0, independent);
-        let nested: Vec<Option<Nested>> = (0..chosen.terms.len())
-            .map(|i| determined(i).then(|| self.nested(&chosen, i, &parameters, &pool)).flatten())
-            .collect();
-        let decisive: Vec<f64> = (0..chosen.terms.len())
-            .map(|i| {
-                let effect = chosen.terms[i].0;
-                let decisive = match &nested[i] {
-                    Some(without) => self.decisive(&chosen, &without.fit),
-                    None if determined(i) => 1.0,
-                    None => 0.0,
-                };
-                discounted(effect, steadiness(&finished, effect, independent) * decisive)
-            })
-            .collect();
-        let twins: Vec<Option<Confusable>> =
-            (0..chosen.terms.len()).map(|i| self.constant_instead(&chosen, i, &pool, independent)).collect();
-        let mut ranking = self.weighed(pool, independent);
-        let doubt = (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0);
-        let mut probabilities: Vec<f64> = chosen
-            .terms
-            .iter()
-            .zip(&decisive)
-            .map(|((e, _), decisive)| {
-                let of: f64 = ranking.iter().filter(|w| has_one_like(&w.fit, *e)).map(|w| w.probability).sum();
-                of * decisive * doubt
-            })
-            .collect();
-        let likely = |p: &f64| *p >= LIKELY;
+        let mut weighing = self.weigh(&chosen, &finished, &parameters, pool, independent);
         // One that is not likely explains nothing that needs a cause.
-        if let [only] = probabilities[..]
-            && !likely(&only)
-            && self.needs_no_cause(plain)
+        if let [only] = weighing.probabilities[..]
+            && !is_likely(&only)
+            && self.needs_no_cause(&plain)
         {
-            let pool = ranking.into_iter().map(|w| w.fit).collect();
-            let none = plain.clone();
-            return self.conclude(given, parameters, none, pool);
+            return self.conclude(given, parameters, plain, weighing.into_fits());
         }
-        // Of two that the record cannot tell apart one explains it.
-        for (p, twin) in probabilities.iter_mut().zip(&twins) {
-            *p = twin.map_or(*p, |t| p.min(of_log_odds(t.difference)));
+        weighing.share_with_twins();
+        let mut open = weighing.open(&chosen);
+        if let Some(shorter) = open.and_then(|i| weighing.instead_of_open(&chosen, i)) {
+            return self.conclude(given, parameters, shorter, weighing.into_fits());
         }
-        let least = (0..probabilities.len()).min_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]));
-        // One of several effects that do the same beside the others stays open, and the others are told.
-        let mut open = least.filter(|&i| {
-            !likely(&probabilities[i])
-                && decisive[i] * doubt >= LIKELY
-                && chosen.terms.len() > 1
-                && (0..probabilities.len()).all(|k| k == i || likely(&probabilities[k]))
-                && one_instead(&ranking, &chosen, i) >= LIKELY
-                && instead(&ranking, &chosen, i, twins[i]).len() > 1
-        });
-        // It is told, too, where one of them is likelier than not.
-        let shorter = open.and_then(|i| {
-            let best = with_one_instead(&ranking, &chosen, i).next()?;
-            likely(&(best.probability * decisive[i] * doubt)).then(|| best.fit.clone())
-        });
-        if let Some(shorter) = shorter.filter(|f| f.terms != chosen.terms && f.converged) {
-            let pool = ranking.into_iter().map(|w| w.fit).collect();
-            return self.conclude(given, parameters, shorter, pool);
-        }
-        let refitted = |i: usize| match &nested[i] {
-            Some(without) if without.refitted => Some(without.fit.clone()),
-            _ => self.refitted(&chosen, i),
-        };
-        let understood = left <= 1.0 - EXPLAINED && (is_complete || explained >= EXPLAINED);
-        if chosen.terms.len() > 1
-            && open.is_none()
-            && let Some(least) = least
-            && !likely(&probabilities[least])
-            && let Some(refitted) = refitted(least)
+        let is_understood = self.is_understood(&parameters, &chosen);
+        if open.is_none()
+            && let Some(least) = weighing.least_likely().filter(|_| chosen.terms.len() > 1)
+            && let Some(refitted) = weighing.refitted(least).or_else(|| self.refitted(&chosen, least))
         {
-            let without =
-                self.concluded_without(&chosen, least, refitted, &ranking, [&given, &parameters], independent);
+            let ranking = &weighing.ranking;
+            let without = self.concluded_without(&chosen, least, refitted, ranking, [&given, &parameters], independent);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
-            let others = probabilities.iter().filter(|p| likely(p)).count();
+            let others = weighing.likely();
             let is_its_own = inertia_off(&chosen, nominal) < MOVED_WITH_EFFECTS;
-            if others + 1 < probabilities.len() || !understood || !is_its_own || without.named() >= others {
+            if others + 1 < chosen.terms.len() || !is_understood || !is_its_own || without.named() >= others {
                 return without;
             }
             open = Some(least);
         }
-        let likely = (0..probabilities.len()).all(|i| open == Some(i) || likely(&probabilities[i]));
+        let are_likely = weighing.likely() + usize::from(open.is_some()) == chosen.terms.len();
         let verdict = match chosen.terms.is_empty() {
-            false if likely && understood => Verdict::Effect,
+            false if are_likely && is_understood => Verdict::Effect,
             false => Verdict::Unexplained,
             true if is_run_off(&chosen, nominal) => Verdict::Unexplained,
             true if !self.needs_no_cause(&chosen) => Verdict::Unexplained,
@@ -246,7 +247,8 @@ impl Search<'_> {
             true => Verdict::Parameters,
         };
         let chosen = finished;
-        ranking.truncate(40);
+        let Weighing { mut ranking, twins, probabilities, .. } = weighing;
+        ranking.truncate(RANKED);
         let shares = self.shares(&chosen);
         let effects = |i: usize| instead(&ranking, &chosen, i, twins[i]);
         let undecided = open.map(|i| Undecided { effects: effects(i), share_of_gap: shares[i] });
@@ -266,6 +268,50 @@ impl Search<'_> {
             confusable,
             undecided,
         }
+    }
+
+    /// Keeps the hypotheses that a chosen one is weighed against. What it lacks no material part of is no rival of it, only itself and
+    /// something small; of accounts that leave next to nothing of the gap the shorter is told.
+    fn retain_rivals(&self, chosen: &Fit, pool: &mut Vec<Fit>) {
+        let most = self.longest_rival(chosen);
+        pool.retain(|f| !is_extension(f, chosen) && f.terms.len() <= most);
+    }
+
+    /// What the record says for each effect of a chosen hypothesis, which is `finished` along its own motion.
+    fn weigh(&self, chosen: &Fit, finished: &Fit, parameters: &Fit, pool: Vec<Fit>, independent: f64) -> Weighing {
+        // What is below two of its standard errors, everything free, is no cause.
+        let is_determined = |i: usize| !is_undetermined(finished, chosen.terms[i].0, independent);
+        let all = 0..chosen.terms.len();
+        let nested: Vec<Option<Nested>> = all
+            .clone()
+            .map(|i| is_determined(i).then(|| self.nested(chosen, i, parameters, &pool)).flatten())
+            .collect();
+        let doubt = (1.0 - DOUBT * self.left(chosen).sqrt()).clamp(0.0, 1.0);
+        let standing = |i: usize| {
+            let effect = chosen.terms[i].0;
+            let decisive = match &nested[i] {
+                Some(without) => self.decisive(chosen, &without.fit),
+                None if is_determined(i) => 1.0,
+                None => 0.0,
+            };
+            discounted(effect, steadiness(finished, effect, independent) * decisive) * doubt
+        };
+        let standing: Vec<f64> = all.clone().map(standing).collect();
+        let twins = all.map(|i| self.constant_instead(chosen, i, &pool, independent)).collect();
+        let ranking = self.weighed(pool, independent);
+        let probability = |((e, _), standing): (&(Effect, usize), &f64)| {
+            let of: f64 = ranking.iter().filter(|w| has_one_like(&w.fit, *e)).map(|w| w.probability).sum();
+            of * standing
+        };
+        let probabilities = chosen.terms.iter().zip(&standing).map(probability).collect();
+        Weighing { nested, standing, twins, ranking, probabilities }
+    }
+
+    /// Whether little enough is left of the torque beside a chosen hypothesis, and enough of the gap explained.
+    fn is_understood(&self, parameters: &Fit, chosen: &Fit) -> bool {
+        let white = || self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
+        let is_complete = || self.at_floor(chosen) || white();
+        self.left(chosen) <= 1.0 - EXPLAINED && (self.explained(parameters, chosen) >= EXPLAINED || is_complete())
     }
 
     /// The verdict without one of several effects, from the fit without it.

@@ -13,7 +13,8 @@
 use std::ops::Range;
 
 use super::search::Search;
-use crate::hypothesis::fit::{Fit, PRICE};
+use crate::hypothesis::evidence::PRICE;
+use crate::hypothesis::fit::Fit;
 use crate::hypothesis::likelihood::{Band, TorqueResidual};
 use crate::numerics::distribution::of_log_odds;
 

@@ -11,9 +11,10 @@ use crate::conditioning::{Record, TORQUE};
 use crate::effects::Effect;
 use crate::hypothesis::band::{self, Rate, Reach};
 use crate::hypothesis::discrepancy::Discrepancy;
-use crate::hypothesis::fit::{Fit, Problem, largest};
+use crate::hypothesis::fit::Fit;
 use crate::hypothesis::likelihood::Band;
 use crate::hypothesis::model::Model;
+use crate::hypothesis::problem::{Problem, largest};
 use crate::numerics::level::deviation;
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.

@@ -8,6 +8,7 @@ use crate::effects::Place;
 use crate::hypothesis::fit::Fit;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::tracking::{Resolution, Tracked, track};
+use crate::trace::numerics::dot;
 
 /// What a model lacks along the record, in the band, and where that shows.
 fn residual_torque(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
@@ -51,7 +52,6 @@ const OPPOSITE: f64 = -0.8;
 
 /// Where residual torques show, without knowing any cause.
 fn where_by_torque(series: &[Vec<f64>; 2], rigid: bool) -> Site {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let [motor, table] = [0, 1].map(|i: usize| dot(&series[i], &series[i]).sqrt());
     if rigid {
         Site::Axis

@@ -18,9 +18,10 @@ use crate::axis::Structure;
 use crate::effects::Effect;
 use crate::hypothesis::determined::{is_lost, is_simpler};
 use crate::hypothesis::discrepancy::Discrepancy;
-use crate::hypothesis::fit::{Fit, PROBE, Problem, STEPS, Term};
+use crate::hypothesis::fit::{Fit, PROBE, STEPS, Term};
 use crate::hypothesis::likelihood::Band;
 use crate::hypothesis::model::{Coordinate, Model};
+use crate::hypothesis::problem::Problem;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::starts::{Screening, StartPoint};
 
@@ -284,7 +285,7 @@ impl Search<'_> {
     }
 
     /// Effects that another account may have at most: of those that leave next to nothing the shorter is told.
-    fn longest_rival(&self, chosen: &Fit) -> usize {
+    pub fn longest_rival(&self, chosen: &Fit) -> usize {
         if self.leaves_little(chosen) { chosen.terms.len() } else { MOST }
     }
 

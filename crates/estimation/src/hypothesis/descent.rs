@@ -11,13 +11,16 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, PRIOR, Problem, Term};
+use super::evidence::PRIOR;
+use super::fit::{Fit, Term};
 use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
+use super::problem::Problem;
 use super::scatter;
 use super::tracking::Bandwidth;
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
+use crate::trace::numerics::dot;
 
 /// Steps tried, each shorter than the one before, until one is better.
 const TRIALS: usize = 7;
@@ -301,9 +304,8 @@ impl<'a> Descent<'a> {
         let residual = white(&at.rows.rows);
         let series: Vec<scatter::Series> = columns.iter().map(|c| band.whitened_in_time(c)).collect();
         let per_bin = 2 * band.equations();
-        let dot = |(a, b): (&[f64], &[f64])| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let by_bin = |a: &[f64], b: &[f64]| -> Vec<f64> {
-            a.chunks_exact(per_bin).zip(b.chunks_exact(per_bin)).map(dot).collect()
+            a.chunks_exact(per_bin).zip(b.chunks_exact(per_bin)).map(|(a, b)| dot(a, b)).collect()
         };
         let information: Vec<Vec<f64>> = columns.iter().map(|c| by_bin(c, c)).collect();
         let mut scores: Vec<Vec<f64>> = columns.iter().map(|c| by_bin(c, &residual)).collect();
@@ -441,7 +443,6 @@ impl Normal {
         let whiten = |rows: &[Vec<C>; 2]| problem.band.whiten(rows, &at.rows.weights, at.s);
         let z = whiten(&at.rows.rows);
         let j: Vec<Vec<f64>> = columns.iter().map(whiten).collect();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut a = DMatrix::from_fn(k, k, |p, q| if p <= q { dot(&j[p], &j[q]) } else { 0.0 });
         a.fill_lower_triangle_with_upper_triangle();
         let mut g = DVector::from_fn(k, |p, _| -dot(&j[p], &z));

@@ -1,6 +1,7 @@
 //! What a record does not know of a fit's effects: their sizes and shapes beside the standard errors.
 
-use super::fit::{Fit, PRICE};
+use super::evidence::PRICE;
+use super::fit::Fit;
 use super::model::{Coordinate, Free};
 use super::scatter;
 use crate::effects::Effect;

@@ -7,11 +7,12 @@
 use rustfft::FftPlanner;
 
 use super::discrepancy::Discrepancy;
-use super::fit::largest;
 use super::likelihood::{Band, C, Weight, mode_inertia, square};
 use super::model::Model;
+use super::problem::largest;
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place};
+use crate::trace::numerics::dot;
 
 /// Share of the second sine that must be left beside the first for it to be another one.
 const OWN: f64 = 1e-3;
@@ -161,9 +162,8 @@ impl Vibration {
         let white = |rows: &[Vec<C>; 2]| band.whiten(rows, weights, s);
         let [cosine, sine] = self.parts.each_ref().map(white);
         let rest = white(rows);
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (cc, ss, cs) = (product(&cosine, &cosine), product(&sine, &sine), product(&cosine, &sine));
-        let (cr, sr) = (product(&cosine, &rest), product(&sine, &rest));
+        let (cc, ss, cs) = (dot(&cosine, &cosine), dot(&sine, &sine), dot(&cosine, &sine));
+        let (cr, sr) = (dot(&cosine, &rest), dot(&sine, &rest));
         let determinant = cc * ss - cs * cs;
         // Of a vibration that is one curve within the record, one part.
         let (a, b) = if determinant > OWN * OWN * cc * ss {

@@ -1,21 +1,25 @@
 //! A hypothesis, a set of effects beside the axis' own parameters, fitted to a record; and its evidence.
 //!
 //! One likelihood ([`likelihood`]) with the sensors' noise and the model's own discrepancy in it: of the torque that a model lacks to
-//! follow the record ([`tracking`]), in the band of its motion ([`band`]). [`descent`] finds the likeliest parameters, [`scatter`] how well
-//! the record knows them and [`determined`] which of them it does not, [`scales`] what of an effect it could show, [`starts`] where a fit
-//! with one effect more begins; on a rigid axis such fits are compared along the motion of one run ([`inverse_dynamics`]). Which hypotheses
-//! are compared, and what is concluded from them, is [`crate::diagnose`]'s.
+//! follow the record ([`tracking`]), in the band of its motion ([`band`]). [`problem`] is a record so compared, [`columns`] how what a model
+//! lacks changes with each free value, [`descent`] the way to the likeliest of them and [`fit`] where it ends; [`evidence`] how well the
+//! record speaks for that, [`scatter`] how well it knows the parameters and [`determined`] which of them it does not, [`scales`] what of an
+//! effect it could show, [`starts`] where a fit with one effect more begins; on a rigid axis such fits are compared along the motion of one
+//! run ([`inverse_dynamics`]). Which hypotheses are compared, and what is concluded from them, is [`crate::diagnose`]'s.
 
 pub(crate) mod band;
+mod columns;
 pub(crate) mod descent;
 pub(crate) mod determined;
 pub(crate) mod discrepancy;
+pub(crate) mod evidence;
 pub(crate) mod fit;
 pub(crate) mod hidden;
 mod inverse_dynamics;
 pub(crate) mod likelihood;
 pub(crate) mod model;
 mod parameters;
+pub(crate) mod problem;
 pub(crate) mod scales;
 pub(crate) mod scatter;
 mod series;

@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, HELD, PROBE, Problem};
+use super::fit::{Fit, PROBE};
 use super::likelihood::Sight;
 use super::model::Model;
+use super::problem::{HELD, Problem};
 
 /// Ratio of the stiffnesses that are tried one after the other: 3 % in the resonance's frequency, a cycle in some thirty. Fits from within
 /// that came to the resonance of a record of forty cycles, one from 8 % off in stiffness did not.

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::fit::{Fit, Problem};
+use super::fit::Fit;
 use super::model::Model;
+use super::problem::Problem;
 use crate::axis::Structure;
 use crate::conditioning::Record;
 use crate::effects::{Effect, Extent, Place, Scale, TorqueHistory};

@@ -6,6 +6,7 @@
 use nalgebra::DMatrix;
 
 use crate::numerics::distribution::of_log_odds;
+use crate::trace::numerics::dot;
 
 /// Stretches that are compared.
 const STRETCHES: usize = 8;
@@ -26,9 +27,7 @@ pub fn standard_errors(scores: Scores, information: &DMatrix<f64>) -> Option<Vec
     // In units in which the information has a unit diagonal.
     let scale: Vec<f64> = (0..k).map(|i| information[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = |p: usize, q: usize, value: f64| value / (scale[p] * scale[q]);
-    let spread = DMatrix::from_fn(k, k, |p, q| {
-        scaled(p, q, freedom * scores[p].iter().zip(&scores[q]).map(|(a, b)| a * b).sum::<f64>())
-    });
+    let spread = DMatrix::from_fn(k, k, |p, q| scaled(p, q, freedom * dot(&scores[p], &scores[q])));
     let inverse = DMatrix::from_fn(k, k, |p, q| scaled(p, q, information[(p, q)])).cholesky()?.inverse();
     let covariance = &inverse * spread * &inverse;
     Some((0..k).map(|i| FEW * covariance[(i, i)].max(0.0).sqrt() / scale[i]).collect())

@@ -2,13 +2,15 @@
 
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, PROBE, Problem, Term};
+use super::fit::{Fit, PROBE, Term};
 use super::likelihood::{C, Weight};
 use super::model::Model;
+use super::problem::Problem;
 use super::scales::{Scales, slow};
 
 use crate::axis::Structure;
 use crate::effects::{Place, Role, Scale, Settings, Start};
+use crate::trace::numerics::dot;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -137,9 +139,6 @@ impl Regression {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
 fn orthogonalise(q: &[Vec<f64>], v: &mut [f64]) {
     for _ in 0..2 {
         for u in q {

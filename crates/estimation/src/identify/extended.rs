@@ -17,6 +17,7 @@ use super::regression::{
     Recorder, RegressionError, Scales, Variance, long_enough, motor_row, rows, table_row, variance,
 };
 use super::result::History;
+use crate::trace::numerics::dot;
 
 /// Past residuals in the noise model of ELS.
 pub const NOISE_ORDER: usize = 2;
@@ -162,7 +163,7 @@ impl<const P: usize> Filter<P> {
     fn step(&mut self, x: &[f64], y: f64, theta: &[f64], noise: &[f64]) -> (SVector<f64, P>, SVector<f64, P>, f64) {
         let regressor = SVector::from_fn(|i, _| x.get(i).copied().unwrap_or_else(|| self.residuals[i - x.len()]));
         let mut gradient = regressor;
-        let mut residual = y - x.iter().zip(theta).map(|(a, b)| a * b).sum::<f64>();
+        let mut residual = y - dot(x, &theta[..x.len()]);
         for (l, c) in noise.iter().enumerate() {
             residual -= c * self.residuals[l];
             gradient -= self.gradients[l] * *c;

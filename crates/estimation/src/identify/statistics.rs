@@ -3,6 +3,7 @@
 use super::result::{Series, Whiteness};
 use crate::numerics::distribution::chi_squared_tail;
 use crate::numerics::spectrum::dft;
+use crate::trace::numerics::dot;
 
 /// Level of the whiteness test.
 const LEVEL: f64 = 0.01;
@@ -24,7 +25,7 @@ pub fn whiteness(residual: &[f64]) -> Whiteness {
         * (size + 2.0)
         * (1..=lags)
             .map(|lag| {
-                let rho = centred[lag..].iter().zip(&centred).map(|(a, b)| a * b).sum::<f64>() / energy;
+                let rho = dot(&centred[lag..], &centred[..n - lag]) / energy;
                 rho * rho / (size - lag as f64)
             })
             .sum::<f64>();

@@ -1,6 +1,7 @@
 //! What is told along the motion of one run against a simulation of each model.
 
 use super::*;
+use crate::trace::numerics::dot;
 
 #[test]
 fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation() {
@@ -34,9 +35,7 @@ fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation(
         };
         let moved = simulated(&other);
         let (a, b) = (smooth(&along), smooth(&|k| moved[0][k] - own[0][k]));
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (size, alike) =
-            (product(&a, &b) / product(&b, &b), product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt());
+        let (size, alike) = (dot(&a, &b) / dot(&b, &b), dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt());
         assert!((size - 1.0).abs() < 0.05 && alike > 0.99, "{effect:?} {i}: {size} {alike}");
     }
 }

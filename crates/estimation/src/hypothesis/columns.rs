@@ -1,0 +1,121 @@
+//! How what a model lacks changes with each free value: the columns of a fit.
+
+use rayon::prelude::*;
+
+use super::descent::Along;
+use super::likelihood::C;
+use super::model::{BaseParameter, Coordinate, Free, Model};
+use super::problem::{PLANNER, Problem};
+use super::tracking::Resolution;
+use crate::axis::Structure;
+use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
+
+impl Problem<'_> {
+    /// What each coordinate changes of what a model lacks. The axis' own parameters act along the motion as measured, which is the model's
+    /// own nearly, effects along the model's own where that is kept ([`Self::has_columns_along_motion`]); all else is simulated.
+    pub fn columns(&self, at: &Along, coordinates: &[Coordinate]) -> Option<Vec<[Vec<C>; 2]>> {
+        let motion = self.motion.as_ref().filter(|_| !has_mode(&at.model));
+        (0..coordinates.len())
+            .into_par_iter()
+            .map(|i| {
+                let c = &coordinates[i];
+                let x = c.x(&at.model);
+                let along = self.column_along_motion(c, at);
+                if let (Free::Base(p), Some(motion)) = (c.free, motion)
+                    && (along.is_some() || coupling_effects(&at.model).next().is_none() || is_inertia(p))
+                {
+                    let own = self.band.base_column(p, motion, c.slope(x));
+                    return Some(match along {
+                        Some(along) => sum(&own, &along),
+                        None => own,
+                    });
+                }
+                if along.is_some() {
+                    return along;
+                }
+                let h = self.step_within(c, &at.model);
+                let moved = self.rows(&moved(&at.model, c, h), at.bandwidth, Some(at.rows.weighed_at))?;
+                Some([0, 1].map(|e| moved.rows[e].iter().zip(&at.rows.rows[e]).map(|(a, b)| (a - b) / h).collect()))
+            })
+            .collect()
+    }
+
+    /// What a coordinate changes of what the effects that it is one of resist the model's motion with, where that was kept.
+    fn column_along_motion(&self, c: &Coordinate, at: &Along) -> Option<[Vec<C>; 2]> {
+        let trajectory = at.trajectory.as_ref().filter(|_| !has_mode(&at.model))?;
+        let effects: Vec<Effect> = match c.free {
+            Free::Base(p) if is_inertia(p) => Vec::new(),
+            Free::Base(_) => coupling_effects(&at.model).collect(),
+            Free::Effect(e, _) | Free::Loop(e) => {
+                Some(e).filter(|e| e.info().place != Place::Sensor).into_iter().collect()
+            }
+        };
+        if effects.is_empty() {
+            return None;
+        }
+        let h = self.step_within(c, &at.model);
+        let mut change = trajectory.resisted(&moved(&at.model, c, h), effects.iter().copied());
+        for (change, own) in change.iter_mut().zip(trajectory.resisted(&at.model, effects)) {
+            change.iter_mut().zip(own).for_each(|(c, o)| *c -= o);
+        }
+        Some(PLANNER.with_borrow_mut(|planner| self.band.rows(&change, 1.0 / h, planner)))
+    }
+
+    /// Step of a coordinate for its column.
+    fn step(&self, c: &Coordinate, model: &Model) -> f64 {
+        match c.free {
+            Free::Base(_) => 1e-3,
+            Free::Loop(_) => 0.1,
+            Free::Effect(e, i) => {
+                let info = &e.info().parameters[i];
+                let value = model.effects.of(e)[i];
+                match info.start {
+                    Start::Grid(Scale::Order, _) => {
+                        0.02 / (value.abs() * self.range[usize::from(e.info().place == Place::Table)]).max(1e-3)
+                    }
+                    Start::Grid(Scale::Frequency, _) => {
+                        0.02 / (std::f64::consts::TAU * value.abs() * self.record.dt * self.record.len() as f64)
+                            .max(1e-3)
+                    }
+                    _ => 1e-2,
+                }
+            }
+        }
+    }
+
+    /// The step of a coordinate for its column, inside its bounds.
+    fn step_within(&self, c: &Coordinate, model: &Model) -> f64 {
+        let h = self.step(c, model);
+        if c.x(model) + h > c.bounds[1] { -h } else { h }
+    }
+
+    /// Whether what effects change is told along the motion of the model itself: in looks, which only rank, and on a rigid axis on the way to
+    /// a fit's end. There, and near the noise where the axis has two inertias, what an effect does to the motion is as large as what is left.
+    pub(super) fn has_columns_along_motion(&self, model: &Model) -> bool {
+        let is_far = self.nominal.structure == Structure::Rigid || self.resolution == Resolution::Coarse;
+        self.motion.is_some() && is_far && !self.exact && !has_mode(model)
+    }
+}
+
+/// Whether a third inertia is on: what it began with is taken out of what any change lacks, too.
+fn has_mode(model: &Model) -> bool {
+    EFFECTS.iter().any(|e| e.is_mode() && model.effects.is_on(*e))
+}
+
+/// What makes the coupling pull by more than its twist.
+fn coupling_effects(model: &Model) -> impl Iterator<Item = Effect> {
+    EFFECTS.iter().copied().filter(|e| e.info().place == Place::Coupling && model.effects.is_on(*e))
+}
+
+const fn is_inertia(p: BaseParameter) -> bool {
+    matches!(p, BaseParameter::I1 | BaseParameter::I2)
+}
+
+/// The model with a coordinate a step further.
+fn moved(model: &Model, c: &Coordinate, h: f64) -> Model {
+    model.at(std::slice::from_ref(c), &[c.x(model) + h])
+}
+
+fn sum(a: &[Vec<C>; 2], b: &[Vec<C>; 2]) -> [Vec<C>; 2] {
+    [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| a + b).collect())
+}

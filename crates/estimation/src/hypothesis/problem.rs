@@ -1,0 +1,283 @@
+//! A record in its band, and what a model lacks along it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rustfft::FftPlanner;
+
+use super::descent::{Along, differ, looser};
+use super::discrepancy::Discrepancy;
+use super::fit::{Fit, Term};
+use super::inverse_dynamics::InverseDynamics;
+use super::likelihood::{Band, MotionSpectra, TorqueResidual};
+use super::model::{BaseParameter, Free, Model};
+use super::scales::Scales;
+use super::tracking::{Bandwidth, LARGEST, Resolution, Torques, Tracked, parts, track, track_step_by_step};
+use super::trajectory::Trajectory;
+use crate::axis::Structure;
+use crate::conditioning::Record;
+use crate::effects::{EFFECTS, Effect, Place};
+
+/// Largest change of a nominal parameter, in its logarithm: a factor of ten.
+const FARTHEST: f64 = 2.3;
+/// The same near the data sheet: a tenth. What is further off may be what an effect does; what is held to it exactly makes an effect of its error.
+const NEAR: f64 = 0.1;
+/// Turn of a motion in a sample, rad, up to which a model can be held to it.
+pub const HELD: f64 = 0.5;
+
+thread_local! { pub(super) static PLANNER: std::cell::RefCell<FftPlanner<f64>> = std::cell::RefCell::new(FftPlanner::new()); }
+
+/// A record in its band, to which hypotheses are fitted.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    pub record: &'a Record,
+    pub band: &'a Band,
+    pub nominal: Model,
+    /// Range of theta1 and theta2 over the record, and its length: what a period is told by.
+    pub range: [f64; 2],
+    /// Largest torque of the log, N.m: in its band a torque that jumps overshoots.
+    pub peak: f64,
+    pub scales: Option<Scales>,
+    /// Spectra of the measured motion; `None` where it is not measured whole.
+    pub(super) motion: Option<Arc<MotionSpectra>>,
+    pub(super) resolution: Resolution,
+    /// The run along which models are compared without a simulation of each, where they are.
+    dynamics: Option<Arc<InverseDynamics>>,
+    /// Whether every column is simulated.
+    pub(super) exact: bool,
+    /// Largest change of a nominal parameter, in its logarithm.
+    pub farthest: f64,
+    /// Steps simulated so far.
+    steps: Arc<AtomicU64>,
+}
+
+impl<'a> Problem<'a> {
+    /// A record compared in a band, its largest torque that of the log.
+    #[must_use]
+    pub fn of(record: &'a Record, band: &'a Band, nominal: Model, peak: f64) -> Self {
+        Self { peak, ..Self::new(record, band, nominal) }
+    }
+
+    /// A record compared in a band.
+    #[must_use]
+    pub fn new(record: &'a Record, band: &'a Band, nominal: Model) -> Self {
+        let range = [0, 1].map(|i: usize| {
+            let y = record.channels[2 * i].as_ref().or(record.channels[2 - 2 * i].as_ref());
+            y.map_or(1.0, |y| {
+                let (low, high) = y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+                (high - low).max(1e-12)
+            })
+        });
+        Self {
+            record,
+            band,
+            nominal,
+            range,
+            peak: largest(&record.torque),
+            scales: None,
+            motion: band.motion(record).map(Arc::new),
+            resolution: Resolution::Full,
+            dynamics: None,
+            exact: false,
+            farthest: FARTHEST,
+            steps: Arc::default(),
+        }
+    }
+}
+
+impl Problem<'_> {
+    /// The same for looks that only rank.
+    #[must_use]
+    pub fn coarse(&self) -> Self {
+        Self { resolution: Resolution::Coarse, ..self.clone() }
+    }
+
+    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared. Of two inertias what an effect does to the
+    /// motion between them is as large as what is left.
+    #[must_use]
+    pub fn along_the_motion_of(&self, fit: &Fit) -> Self {
+        let dynamics = || {
+            if self.nominal.structure != Structure::Rigid {
+                return None;
+            }
+            let (tracked, trajectory) = self.track_step_by_step(&fit.model, fit.bandwidth)?;
+            InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.record)
+        };
+        Self { dynamics: dynamics().map(Arc::new), ..self.clone() }
+    }
+
+    /// The same for fits that are made to their end.
+    pub(super) fn exact(&self) -> Self {
+        Self { exact: true, ..self.clone() }
+    }
+
+    /// The same with the axis' own parameters near those of its data sheet.
+    #[must_use]
+    pub fn near_the_data_sheet(&self) -> Self {
+        Self { farthest: NEAR, ..self.clone() }
+    }
+
+    /// Steps simulated so far: of all that runs side by side only once it has ended the same on any number of threads.
+    pub fn steps(&self) -> u64 {
+        self.steps.load(Ordering::Relaxed)
+    }
+
+    /// Counts the steps of one run of a model.
+    fn count(&self, model: &Model) {
+        let steps = self.record.len() * parts(model, self.record, self.resolution);
+        self.steps.fetch_add(steps as u64, Ordering::Relaxed);
+    }
+
+    /// What a model lacks along the record, in time.
+    pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
+        self.count(model);
+        track(model, self.record, bandwidth, self.resolution)
+    }
+
+    fn track_step_by_step(&self, model: &Model, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
+        self.count(model);
+        track_step_by_step(model, self.record, bandwidth, self.resolution)
+    }
+
+    /// Motion of a fit along the record, `[theta1, omega1, theta2, omega2]` a sample.
+    pub fn motion_of(&self, fit: &Fit) -> Option<Vec<[f64; 4]>> {
+        match &self.dynamics {
+            Some(dynamics) => Some(dynamics.motion.clone()),
+            None => self.track(&fit.model, fit.bandwidth).map(|t| t.motion),
+        }
+    }
+
+    pub fn base(&self) -> Vec<Free> {
+        BaseParameter::of(self.nominal.structure).iter().map(|p| Free::Base(*p)).collect()
+    }
+
+    pub fn free(&self, terms: &[Term]) -> Vec<Free> {
+        let mut free = self.base();
+        for (e, v) in terms {
+            free.extend(e.info().variants[*v].free.iter().map(|i| Free::Effect(*e, *i)));
+            free.extend(e.loops().then_some(Free::Loop(*e)));
+        }
+        free
+    }
+
+    /// Bandwidth of the feedback at a discrepancy.
+    pub fn bandwidth(&self, s: Discrepancy) -> Bandwidth {
+        let r = self.record;
+        let p = &self.nominal.parameters;
+        let high = self.band.omega.last().copied().unwrap_or(1.0).min(HELD / r.dt);
+        let low = (4.0 / (r.len() as f64 * r.dt)).min(high);
+        let inertia =
+            if p.i2 > 0.0 && self.nominal.structure == Structure::TwoInertia { [p.i1, p.i2] } else { [p.i1 + p.i2; 2] };
+        [0, 1].map(|i| {
+            let noise = r.noise[2 * i].max(f64::MIN_POSITIVE);
+            (s[i].sqrt() / (inertia[i] * noise)).sqrt().clamp(low, high)
+        })
+    }
+
+    /// Whether physics lets the effects be what they are in a model.
+    pub fn admits(&self, model: &Model, terms: &[Term]) -> bool {
+        self.scales.as_ref().is_none_or(|s| s.admit(self.record, model, terms.iter().map(|t| t.0)))
+    }
+
+    /// What a model lacks, beside what hidden inertias began with as it is at a discrepancy.
+    pub fn rows(&self, model: &Model, bandwidth: Bandwidth, weighed_at: Option<Discrepancy>) -> Option<TorqueResidual> {
+        self.without_simulation(model, weighed_at).map(|(rows, _)| rows).or_else(|| {
+            let tracked = self.track(model, bandwidth)?;
+            Some(self.residual(model, &tracked, weighed_at))
+        })
+    }
+
+    /// The same with the motion that it lacks that along, where columns are told along that.
+    pub fn rows_along_motion(
+        &self,
+        model: &Model,
+        bandwidth: Bandwidth,
+        weighed_at: Option<Discrepancy>,
+    ) -> Option<(TorqueResidual, Option<Arc<Trajectory>>)> {
+        if let Some((rows, dynamics)) = self.without_simulation(model, weighed_at) {
+            return Some((rows, Some(dynamics.trajectory.clone())));
+        }
+        if !self.has_columns_along_motion(model) {
+            return Some((self.rows(model, bandwidth, weighed_at)?, None));
+        }
+        let (tracked, trajectory) = self.track_step_by_step(model, bandwidth)?;
+        Some((self.residual(model, &tracked, weighed_at), Some(Arc::new(trajectory))))
+    }
+
+    /// What a model lacks along the motion of another's run, and that, where models are compared so.
+    fn without_simulation(
+        &self,
+        model: &Model,
+        weighed_at: Option<Discrepancy>,
+    ) -> Option<(TorqueResidual, &InverseDynamics)> {
+        let dynamics = self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model))?;
+        let torque = dynamics.torque(model, self.record);
+        let is_bounded = torque.iter().flatten().all(|t| t.abs() < LARGEST);
+        is_bounded.then(|| (self.residual_along(model, &torque, &dynamics.motion, weighed_at), dynamics))
+    }
+
+    /// Whether a model is compared along the motion of another's run, whatever bandwidth it would follow the record at.
+    pub fn is_without_simulation(&self, model: &Model) -> bool {
+        self.dynamics.is_some() && InverseDynamics::has_a_place_for(model)
+    }
+
+    pub(super) fn residual(&self, model: &Model, tracked: &Tracked, weighed_at: Option<Discrepancy>) -> TorqueResidual {
+        self.residual_along(model, &tracked.torque, &tracked.motion, weighed_at)
+    }
+
+    fn residual_along(
+        &self,
+        model: &Model,
+        torque: &Torques,
+        motion: &[[f64; 4]],
+        weighed_at: Option<Discrepancy>,
+    ) -> TorqueResidual {
+        PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, torque, motion, weighed_at, planner))
+    }
+
+    /// A model along the record, and the discrepancy that it leaves. One that reads its position late swings up where it is held to the record
+    /// tightly: it follows at the likeliest bandwidth up to that.
+    pub fn along(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
+        let mut best = self.along_at(model, bandwidth);
+        if !reads_late(model) || self.is_without_simulation(model) {
+            return best;
+        }
+        let least = self.bandwidth([0.0; 2]);
+        let log_likelihood = |at: &Along| self.band.log_likelihood(&at.rows, at.s);
+        let mut tight = bandwidth;
+        while differ(looser(tight, least), tight) {
+            tight = looser(tight, least);
+            let other = self.along_at(model, tight);
+            if let Some(at) = &best
+                && other.as_ref().is_none_or(|other| log_likelihood(other) <= log_likelihood(at))
+            {
+                break;
+            }
+            best = other;
+        }
+        best
+    }
+
+    fn along_at(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
+        let (mut rows, trajectory) = self.rows_along_motion(model, bandwidth, None)?;
+        let s = self.band.discrepancy(&rows);
+        self.band.weigh(&mut rows, s);
+        let given = self.dynamics.as_ref().filter(|_| self.is_without_simulation(model));
+        Some(Along { model: *model, rows, trajectory, s, bandwidth: given.map_or(bandwidth, |d| d.bandwidth) })
+    }
+}
+
+/// Whether a position of a model is read late, or behind a filter.
+fn reads_late(model: &Model) -> bool {
+    let delay = |e: &Effect| -> Option<f64> {
+        let parameter = e.delay_parameter().filter(|_| e.info().place == Place::Sensor)?;
+        Some(model.effects.of(*e)[parameter])
+    };
+    let active = model.effects.active();
+    model.effects.filter(&active) > 0.0 || EFFECTS.iter().filter_map(delay).any(|delay| delay > 0.0)
+}
+
+/// Largest absolute value of a series; zero of an empty one.
+pub fn largest(series: &[f64]) -> f64 {
+    series.iter().fold(0.0, |most, v| v.abs().max(most))
+}
