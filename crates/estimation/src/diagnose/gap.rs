@@ -18,7 +18,7 @@ use crate::hypothesis::fit::Fit;
 use crate::hypothesis::hidden::any_vibrations;
 use crate::hypothesis::likelihood::Sight;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::tracking::{Resolution, Run, start_states, track};
+use crate::hypothesis::tracking::{FreeRun, Resolution, start_states, track};
 use crate::numerics::level::deviation;
 
 /// Samples in a window.
@@ -254,7 +254,7 @@ fn with_fitted_start(
     record: &Record,
     model: &Model,
     range: &std::ops::Range<usize>,
-    start: &Run,
+    start: &FreeRun,
 ) -> (Vec<[f64; 4]>, [f64; 4]) {
     let weight = record.noise.map(|s| 1.0 / s.max(f64::MIN_POSITIVE));
     let present: Vec<usize> = (0..4).filter(|c| record.channels[*c].is_some()).collect();

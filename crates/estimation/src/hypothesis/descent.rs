@@ -302,7 +302,7 @@ impl<'a> Descent<'a> {
         let white = |rows: &[Vec<C>; 2]| band.whiten(rows, &at.rows.weights, at.s);
         let columns: Vec<Vec<f64>> = self.columns.iter().map(white).collect();
         let residual = white(&at.rows.rows);
-        let series: Vec<scatter::Series> = columns.iter().map(|c| band.whitened_in_time(c)).collect();
+        let series: Vec<scatter::TimeSeries> = columns.iter().map(|c| band.whitened_in_time(c)).collect();
         let per_bin = 2 * band.equations();
         let by_bin = |a: &[f64], b: &[f64]| -> Vec<f64> {
             a.chunks_exact(per_bin).zip(b.chunks_exact(per_bin)).map(|(a, b)| dot(a, b)).collect()

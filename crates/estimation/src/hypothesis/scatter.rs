@@ -14,7 +14,7 @@ const STRETCHES: usize = 8;
 const FEW: f64 = 1.207;
 
 /// A series of each equation.
-pub type Series = Vec<Vec<f64>>;
+pub type TimeSeries = Vec<Vec<f64>>;
 
 /// What each parameter's score gains in each stretch.
 pub type Scores = Vec<[f64; STRETCHES]>;
@@ -34,8 +34,8 @@ pub fn standard_errors(scores: Scores, information: &DMatrix<f64>) -> Option<Vec
 }
 
 /// The scores' parts from stretches of the record, of whitened columns, one for each parameter, and the whitened residual, as series in time.
-pub fn in_time(columns: &[Series], residual: &Series) -> Scores {
-    let of_column = |column: &Series| {
+pub fn in_time(columns: &[TimeSeries], residual: &TimeSeries) -> Scores {
+    let of_column = |column: &TimeSeries| {
         std::array::from_fn(|stretch| {
             let of_equation = |(c, r): (&Vec<f64>, &Vec<f64>)| -> f64 {
                 let at = |b: usize| b * r.len() / STRETCHES;

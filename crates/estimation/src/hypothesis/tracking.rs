@@ -271,7 +271,7 @@ fn initial(record: &Record) -> [f64; 4] {
 
 /// A state along a tracked motion, to run on from freely.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct FreeRun {
     /// `[theta1, omega1, theta2, omega2]`.
     pub motion: [f64; 4],
     memory: Memory<f64>,
@@ -282,20 +282,20 @@ const STARTING: f64 = 0.1;
 
 /// States of a model held to the record, at some samples.
 #[must_use]
-pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<Run> {
+pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<FreeRun> {
     let held = Held { model, record, bandwidth: [STARTING / record.dt; 2], resolution: Resolution::Full };
     match held.track(samples, None) {
         Some((t, memories)) => {
-            samples.iter().zip(memories).map(|(&k, memory)| Run { motion: t.motion[k], memory }).collect()
+            samples.iter().zip(memories).map(|(&k, memory)| FreeRun { motion: t.motion[k], memory }).collect()
         }
         None => {
             let first = initial(record);
-            samples.iter().map(|_| Run { motion: first, memory: [0.0; crate::effects::MEMORY] }).collect()
+            samples.iter().map(|_| FreeRun { motion: first, memory: [0.0; crate::effects::MEMORY] }).collect()
         }
     }
 }
 
-impl Run {
+impl FreeRun {
     /// What the encoders read over a range of the record, from these positions and speeds at its first sample.
     #[must_use]
     pub fn from(

@@ -14,7 +14,7 @@ use super::parameters::{Estimated, Rows};
 use super::record::RegressionRecord;
 use super::recursive::Els;
 use super::regression::{
-    Recorder, RegressionError, Scales, Variance, long_enough, motor_row, rows, table_row, variance,
+    Recorder, RegressionError, RegressorScales, Variance, long_enough, motor_row, rows, table_row, variance,
 };
 use super::result::History;
 use crate::trace::numerics::dot;
@@ -36,7 +36,7 @@ pub fn extended_recursive(
     lambda: f64,
     p0: f64,
 ) -> Result<(Estimated, History), RegressionError> {
-    let scales = Scales::new(record)?;
+    let scales = RegressorScales::new(record)?;
     let n = record.rows();
     // The past residuals are brought to the size of the other regressors by the level of the plain residuals.
     let plain = rows(record)?;

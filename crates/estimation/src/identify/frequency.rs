@@ -55,7 +55,7 @@ pub struct Measured {
 
 /// The axis fitted to a measured frequency response.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub struct ResponseFit {
     /// I1, I2, B, K.
     pub estimated: Estimated,
     /// Relative error of the model, root mean square, beyond the noise.
@@ -247,7 +247,7 @@ impl Measured {
 
     /// Fits I1, I2, B and K from `start`.
     #[must_use]
-    pub fn fit(&self, start: &Parameters, scheme: Scheme) -> Fit {
+    pub fn fit(&self, start: &Parameters, scheme: Scheme) -> ResponseFit {
         let mobility = 1.0 / start.i1 + 1.0 / start.i2;
         let unit = if start.b > 0.0 { start.b } else { 0.04 * (start.k / mobility).sqrt() };
         let mut q = DVector::from_vec(vec![start.i1.ln(), start.i2.ln(), start.b.max(0.0) / unit, start.k.ln()]);
@@ -276,7 +276,7 @@ impl Measured {
             (Some(Matrix4::from_fn(|i, j| relative[(i, j)] * units[i] * units[j])), r.termination, r.iterations)
         });
         let estimated = Estimated { values: Vector4::new(p.i1, p.i2, p.b, p.k), covariance };
-        Fit { estimated, model_error, termination, iterations }
+        ResponseFit { estimated, model_error, termination, iterations }
     }
 
     /// Measured against modelled, for tables and plots.

@@ -4,7 +4,7 @@ use super::extended::{NOISE_ORDER, extended_batch, extended_recursive};
 use super::frequency::Measured;
 use super::instrumental::instrumental;
 use super::joined::Joined;
-use super::output_error::{Fit, Free, OutputError};
+use super::output_error::{Free, OutputError, OutputErrorFit};
 use super::paper;
 use super::parameters::{Estimated, wider};
 use super::record::RegressionRecord;
@@ -32,7 +32,7 @@ pub(super) struct Run<'a> {
     /// The estimates so far, each with its method.
     pub estimates: Vec<(&'static str, Estimated)>,
     /// The fit of output error, once it has run.
-    pub oe: Option<Fit>,
+    pub oe: Option<OutputErrorFit>,
 }
 
 type Found = (Estimated, Option<History>);
@@ -157,7 +157,7 @@ impl Run<'_> {
         let plain = Free { parameters: true, offset, bias: false };
         let schemes = self.request.scheme.map_or_else(|| vec![Scheme::Exact, Scheme::NEWMARK], |s| vec![s]);
         let n = self.compared.len();
-        let better = |a: Fit, b: Fit| if likelihood(&b, n) > likelihood(&a, n) { b } else { a };
+        let better = |a: OutputErrorFit, b: OutputErrorFit| if likelihood(&b, n) > likelihood(&a, n) { b } else { a };
         let mut best = schemes
             .iter()
             .map(|s| self.outputs.fit(&start, *s, plain))
@@ -239,6 +239,6 @@ impl Run<'_> {
 }
 
 /// Twice the logarithm of the likelihood, but for a constant, at the levels of the residuals.
-fn likelihood(fit: &Fit, samples: usize) -> f64 {
+fn likelihood(fit: &OutputErrorFit, samples: usize) -> f64 {
     -2.0 * samples as f64 * fit.sigma.iter().map(|s| s.ln()).sum::<f64>()
 }

@@ -82,7 +82,7 @@ pub struct Free {
 
 /// What the fit came to.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub struct OutputErrorFit {
     /// I1, I2, B, K with their covariance.
     pub estimated: Estimated,
     /// theta1, omega1, theta2, omega2 at the first sample of each piece.
@@ -251,7 +251,7 @@ impl<'a> OutputError<'a> {
 
     /// Fits from `start` under one integration scheme; the weights are found from the residuals, by repeating the fit.
     #[must_use]
-    pub fn fit(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
+    pub fn fit(&self, start: &Parameters, scheme: Scheme, free: Free) -> OutputErrorFit {
         let mut problem = self.clone();
         problem.options.scheme = scheme;
         problem.options.substeps = substeps(start, self.structure, &self.effects, self.options.dt);
@@ -317,7 +317,7 @@ impl<'a> OutputError<'a> {
 
     /// Fits with the weights as given and no re-weighting: the covariance is for those weights.
     #[cfg(test)]
-    pub(super) fn fit_weighted(&self, start: &Parameters, scheme: Scheme, free: Free) -> Fit {
+    pub(super) fn fit_weighted(&self, start: &Parameters, scheme: Scheme, free: Free) -> OutputErrorFit {
         let mut problem = self.clone();
         problem.options.scheme = scheme;
         problem.damping_unit = if start.b > 0.0 { start.b } else { 1.0 };
@@ -407,7 +407,7 @@ impl<'a> OutputError<'a> {
     }
 
     /// The unknowns of a fit, at this problem's unit of damping.
-    fn of_fit(&self, fit: &Fit) -> Vec<f64> {
+    fn of_fit(&self, fit: &OutputErrorFit) -> Vec<f64> {
         let v = &fit.estimated.values;
         let log = |v: f64| if v > 0.0 { v.ln() } else { -700.0 };
         let mut q = vec![log(v[0]), log(v[1]), v[2] / self.damping_unit, log(v[3]), fit.bias];
@@ -420,7 +420,7 @@ impl<'a> OutputError<'a> {
 
     /// Measured minus simulated at a fit, one vector for each output, in its unit.
     #[must_use]
-    pub fn residuals(&self, fit: &Fit) -> Vec<(Signal, Vec<f64>)> {
+    pub fn residuals(&self, fit: &OutputErrorFit) -> Vec<(Signal, Vec<f64>)> {
         let mut problem = self.clone();
         problem.options.scheme = fit.scheme;
         let p = fit.estimated.parameters(self.rho);
@@ -431,7 +431,7 @@ impl<'a> OutputError<'a> {
 
     /// The readings of all pieces, one after the other, with parameters `p` from the initial states of a fit, without effects.
     #[must_use]
-    pub fn simulated(&self, fit: &Fit, p: &Parameters) -> Vec<Reading<f64>> {
+    pub fn simulated(&self, fit: &OutputErrorFit, p: &Parameters) -> Vec<Reading<f64>> {
         let mut readings = Vec::with_capacity(self.torque.len());
         for (index, piece) in self.pieces.iter().enumerate() {
             let options = SimulateOptions { start: self.starts[index], scheme: fit.scheme, ..self.options };
@@ -449,7 +449,7 @@ impl<'a> OutputError<'a> {
     }
 
     /// The fit at unknowns `q`, with the covariance of its parameters in SI units.
-    fn finish(&self, q: &[f64], report: &levenberg::Report, chi2: f64, scheme: Scheme) -> Fit {
+    fn finish(&self, q: &[f64], report: &levenberg::Report, chi2: f64, scheme: Scheme) -> OutputErrorFit {
         let p: Parameters = self.axis(&q[..PARAMETERS]);
         let relative = report.covariance();
         let free: Vec<usize> = (0..q.len()).filter(|i| self.free[*i]).collect();
@@ -461,7 +461,7 @@ impl<'a> OutputError<'a> {
             }
         }
         let pieces = 0..self.pieces.len();
-        Fit {
+        OutputErrorFit {
             estimated: Estimated {
                 values: Vector4::new(p.i1, p.i2, p.b, p.k),
                 covariance: self.free[0].then_some(covariance),

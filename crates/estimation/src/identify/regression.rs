@@ -261,7 +261,7 @@ impl LeastSquares {
 }
 
 /// Scales that bring regressors and left sides to unit rms.
-pub(super) struct Scales {
+pub(super) struct RegressorScales {
     pub motor: [f64; 4],
     pub table: [f64; 3],
 }
@@ -283,7 +283,7 @@ impl Sums {
     }
 }
 
-impl Scales {
+impl RegressorScales {
     /// From all rows of a record.
     ///
     /// # Errors
@@ -383,7 +383,7 @@ impl Recorder {
 /// When the record is too short or a signal is zero throughout.
 pub fn recursive(record: &RegressionRecord, lambda: f64, p0: f64) -> Result<(Estimated, History), RegressionError> {
     let n = record.rows();
-    let mut recursion = Recursion::new(Scales::new(record)?, n, lambda, p0);
+    let mut recursion = Recursion::new(RegressorScales::new(record)?, n, lambda, p0);
     let mut moments = Moments::new(n);
     for k in 0..n {
         let row = record.row(k);
@@ -395,7 +395,7 @@ pub fn recursive(record: &RegressionRecord, lambda: f64, p0: f64) -> Result<(Est
 
 /// Recursive least squares that takes the rows one by one.
 pub(super) struct Recursion {
-    scales: Scales,
+    scales: RegressorScales,
     rows: usize,
     lambda: f64,
     motor: Rls<3, 1>,
@@ -407,7 +407,7 @@ pub(super) struct Recursion {
 
 impl Recursion {
     /// For so many rows.
-    pub fn new(scales: Scales, rows: usize, lambda: f64, p0: f64) -> Self {
+    pub fn new(scales: RegressorScales, rows: usize, lambda: f64, p0: f64) -> Self {
         Self {
             scales,
             rows,

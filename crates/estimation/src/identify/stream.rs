@@ -14,7 +14,7 @@ use super::identifiability::{Evidence, Identifiability};
 use super::lsq::BLOCK;
 use super::parameters::Estimated;
 use super::record::{DIFFERENT_ZEROS, RegressionRecord};
-use super::regression::{LeastSquares, Moments, Recursion, RegressionError, Scales, Sums};
+use super::regression::{LeastSquares, Moments, Recursion, RegressionError, RegressorScales, Sums};
 use super::result::{History, Identification, MethodResult, Recommendation, SCHEMA, Series, Thinned, TraceSummary};
 use super::run::{DIFFERENT_SPEED, Method, Request, Steps, different_speed, hold_name};
 use crate::trace::stream::Stream;
@@ -293,7 +293,7 @@ fn first_pass<'a>(stream: &'a Stream, machine: &Machine) -> Result<(Frame<'a>, V
 type Found = Result<(Estimated, History), RegressionError>;
 
 fn recursive(frame: &Frame, sums: &Sums, moments: &Moments, request: &Request) -> Result<Found, TraceError> {
-    let scales = match Scales::of(sums) {
+    let scales = match RegressorScales::of(sums) {
         Ok(scales) => scales,
         Err(error) => return Ok(Err(error)),
     };

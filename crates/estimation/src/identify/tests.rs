@@ -103,7 +103,7 @@ fn output_error_has_scipys_estimates_and_standard_errors() {
     let std =
         [1.287_180_608_666_697_5e-7, 1.274_034_366_675_57e-7, 1.105_235_204_088_994e-5, 0.000_359_927_512_281_763_46];
     // Where two iterations stop is a matter of their tolerances: a thousandth of a standard error.
-    let near = |fit: &super::output_error::Fit, expected: &[f64; 4], std: &[f64; 4]| {
+    let near = |fit: &super::output_error::OutputErrorFit, expected: &[f64; 4], std: &[f64; 4]| {
         for i in 0..4 {
             let off = (fit.estimated.values[i] - expected[i]) / std[i];
             assert!(off.abs() < 1e-3, "parameter {i}: {off:e} standard errors off");

@@ -10,7 +10,7 @@ impl OutputError<'_> {
     /// Covariance of I1, I2, B, K at a fit, whatever the colour of its residual; None where the fit's parameters were not
     /// free or the record does not determine them.
     #[must_use]
-    pub fn coloured(&self, fit: &Fit) -> Option<Matrix4<f64>> {
+    pub fn coloured(&self, fit: &OutputErrorFit) -> Option<Matrix4<f64>> {
         fit.estimated.covariance?;
         let mut problem = self.clone();
         problem.options.scheme = fit.scheme;
