@@ -8,9 +8,10 @@
 //! ```
 //!
 //! with central differences for `s` and `s^2`: exact for the linear axis whatever the feedback's bandwidth, because an impulse at a
-//! sample is one in the second difference there. A side that is not measured goes along with the other ([`super::hidden`]). The bandwidth only says along which motion the effects act: the model's own (low:
-//! output error) or the measured one (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a
-//! Kalman filter does.
+//! sample is one in the second difference there. Where encoders are read late by `S` it is `r = d + D S^-1 e`, and where both are behind
+//! one filter `r = S d + D e`: what the feedback pushed shows late, too. A side that is not measured goes along with the other
+//! ([`super::hidden`]). The bandwidth only says along which motion the effects act: the model's own (low: output error) or the measured one
+//! (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a Kalman filter does.
 
 use super::hidden::Hidden;
 use super::model::Model;
@@ -195,12 +196,52 @@ impl Held<'_> {
                 return None;
             }
         }
-        let mut torque = given;
+        // An encoder that is read late, or behind a filter, shows the feedback's torque so, too.
+        let mut torque = given.map(|given| filtered(given, model.effects.filter(axis.on()), dt));
+        let late = model.effects.late(axis.on());
+        let error = [(0, late), (1, late + model.effects.late_of_table(axis.on()))]
+            .map(|(i, late): (usize, f64)| advanced(&error[i], late / dt));
         add_linear(model, record, &error, &mut torque);
         // Squares of what is larger than this are no numbers.
         let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
         bounded.then_some((Tracked { torque, motion }, memories))
     }
+}
+
+/// Torques that push a mass at each sample, as an encoder behind a filter of first order shows them in its second difference: a push at a
+/// sample moves the reading by `t - time (1 - exp(-t/time))`.
+fn filtered(mut torque: Vec<f64>, time: f64, dt: f64) -> Vec<f64> {
+    if time <= 0.0 {
+        return torque;
+    }
+    let (decay, samples) = ((-dt / time).exp(), time / dt);
+    let (at_once, next) = (1.0 - samples * (1.0 - decay), samples * (1.0 - decay).powi(2));
+    let mut after = 0.0;
+    for torque in &mut torque {
+        let push = *torque;
+        *torque = at_once * push + after;
+        after = decay * after + next * push;
+    }
+    torque
+}
+
+/// A series so many samples ahead, by Lagrange's interpolation of four.
+fn advanced(series: &[f64], by: f64) -> Vec<f64> {
+    if by <= 0.0 {
+        return series.to_vec();
+    }
+    let (whole, x) = (by.floor() as usize, by.fract());
+    let weights = [
+        -x * (x - 1.0) * (x - 2.0) / 6.0,
+        (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0,
+        -(x + 1.0) * x * (x - 2.0) / 2.0,
+        (x + 1.0) * x * (x - 1.0) / 6.0,
+    ];
+    let last = series.len().saturating_sub(1);
+    let at = |k: usize| {
+        weights.iter().enumerate().map(|(i, w)| w * series[(k + whole + i).saturating_sub(1).min(last)]).sum()
+    };
+    (0..series.len()).map(at).collect()
 }
 
 /// Sides of an axis whose motion a record has.
@@ -345,3 +386,40 @@ impl FreeRun {
 
 /// Samples before a run that the torque's way in is filled with.
 const WARM: usize = 64;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pushes_of_a_mass_show_in_the_second_difference_of_a_filtered_reading_as_they_are_filtered() {
+        let (time, dt) = (0.7, 0.3);
+        let pushes: Vec<f64> = (0..40).map(|k| (1.7 * f64::from(k)).sin()).collect();
+        // Of a mass that the pushes move from sample to sample on straight lines, behind the filter, exactly.
+        let decay = f64::exp(-dt / time);
+        let (mut position, mut speed, mut reading) = (0.0, 0.0, 0.0);
+        let mut readings = vec![0.0; 2];
+        for push in &pushes {
+            speed += push * dt;
+            reading = decay * reading + (1.0 - decay) * position + speed * (dt - time * (1.0 - decay));
+            position += speed * dt;
+            readings.push(reading);
+        }
+        for (k, shown) in filtered(pushes, time, dt).into_iter().enumerate() {
+            let second = (readings[k + 2] - 2.0 * readings[k + 1] + readings[k]) / (dt * dt);
+            assert!((shown - second).abs() < 1e-12, "{k}: {shown} {second}");
+        }
+    }
+
+    #[test]
+    fn a_cubic_is_advanced_exactly_and_the_last_value_stays() {
+        let cubic = |t: f64| 0.3 * t * t * t - t * t + 2.0;
+        let series: Vec<f64> = (0..20).map(|k| cubic(f64::from(k))).collect();
+        let ahead = advanced(&series, 2.3);
+        for k in 0..15 {
+            assert!((ahead[k] - cubic(k as f64 + 2.3)).abs() < 1e-9, "{k}");
+        }
+        assert!((ahead[19] - series[19]).abs() < 1e-9);
+        assert_eq!(advanced(&series, 0.0), series);
+    }
+}

@@ -1,5 +1,6 @@
 //! What the encoders read of a motion, under all effects on its way out.
 
+use super::Effect;
 use super::active::ActiveEffects;
 use super::sensor::{Reading, Seen, SensorHistory};
 use super::settings::Settings;
@@ -32,6 +33,13 @@ impl<S: Scalar> Settings<S> {
     #[must_use]
     pub fn late(&self, on: &ActiveEffects) -> S {
         on.sensors().iter().fold(S::default(), |sum, &e| sum + e.late(self.of(e)))
+    }
+
+    /// How long after the motor's the table's encoder is read, s.
+    #[must_use]
+    pub fn late_of_table(&self, on: &ActiveEffects) -> S {
+        let of = |e: &Effect| (!e.reads_motor()).then(|| e.delay_parameter().map(|i| self.of(*e)[i])).flatten();
+        on.sensors().iter().filter_map(of).fold(S::default(), |sum, late| sum + late)
     }
 
     /// The same encoders read no earlier than their stamps, and how long after its stamp each sample was read, s: a simulation that knows the

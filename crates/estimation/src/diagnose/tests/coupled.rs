@@ -168,6 +168,26 @@ fn moved(parameters: Parameters, effects: Settings, acts: &dyn Fn(f64) -> f64, l
 }
 
 #[test]
+fn a_model_that_reads_the_table_late_lacks_the_noise_alone_however_tightly_it_is_held_to_the_record() {
+    let late = 7;
+    let record = of_two_inertias(BELT, Settings::default(), 0.01, late);
+    let delay = 0.5 * late as f64 * record.dt;
+    let model = Model::new(BELT, Structure::TwoInertia, with(&[(Effect::SensorDelay, 0, delay)]));
+    let (p, _) = prepared(&record, &model, Reach::Shown);
+    let problem = Problem::of(&p.record, &p.band, model, p.peak);
+    let lacks = |held: f64| {
+        let rows = problem.rows(&model, [held / record.dt; 2], None).expect("a run");
+        p.band.noise_multiple(&rows).powi(2)
+    };
+    let loosely = lacks(0.002);
+    assert!((0.7..1.4).contains(&loosely), "{loosely}");
+    for held in [0.02, 0.1, 0.15] {
+        let tightly = lacks(held);
+        assert!((tightly / loosely - 1.0).abs() < 0.02, "{held}: {tightly} for {loosely}");
+    }
+}
+
+#[test]
 fn of_an_axis_that_swings_too_fast_to_be_held_to_the_stiffness_is_found_from_afar() {
     let (n, dt) = SAMPLED;
     // A fifth of a turn a sample, hardly damped; from half of its stiffness the nearest hollow is an eighth off.
