@@ -1,7 +1,5 @@
 //! How what a model lacks changes with each free value: the columns of a fit.
 
-use rayon::prelude::*;
-
 use super::descent::Along;
 use super::likelihood::C;
 use super::model::{BaseParameter, Coordinate, Free, Model};
@@ -11,33 +9,34 @@ use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 
 impl Problem<'_> {
-    /// What each coordinate changes of what a model lacks. The axis' own parameters act along the motion as measured, which is the model's
-    /// own nearly, effects along the model's own where that is kept ([`Self::has_columns_along_motion`]); all else is simulated.
-    pub fn columns(&self, at: &Along, coordinates: &[Coordinate]) -> Option<Vec<[Vec<C>; 2]>> {
+    /// What a coordinate changes of what a model lacks, where no other run tells it. The axis' own parameters act along the motion as
+    /// measured, which is the model's own nearly, effects along the model's own where that is kept ([`Self::has_columns_along_motion`]).
+    pub fn column_without_simulation(&self, c: &Coordinate, at: &Along) -> Option<[Vec<C>; 2]> {
         let motion = self.motion.as_ref().filter(|_| !has_mode(&at.model));
-        (0..coordinates.len())
-            .into_par_iter()
-            .map(|i| {
-                let c = &coordinates[i];
-                let x = c.x(&at.model);
-                let along = self.column_along_motion(c, at);
-                if let (Free::Base(p), Some(motion)) = (c.free, motion)
-                    && (along.is_some() || coupling_effects(&at.model).next().is_none() || is_inertia(p))
-                {
-                    let own = self.band.base_column(p, motion, c.slope(x));
-                    return Some(match along {
-                        Some(along) => sum(&own, &along),
-                        None => own,
-                    });
-                }
-                if along.is_some() {
-                    return along;
-                }
-                let h = self.step_within(c, &at.model);
-                let moved = self.rows(&moved(&at.model, c, h), at.bandwidth, Some(at.rows.weighed_at))?;
-                Some([0, 1].map(|e| moved.rows[e].iter().zip(&at.rows.rows[e]).map(|(a, b)| (a - b) / h).collect()))
-            })
-            .collect()
+        let along = self.column_along_motion(c, at);
+        if let (Free::Base(p), Some(motion)) = (c.free, motion)
+            && (along.is_some() || coupling_effects(&at.model).next().is_none() || is_inertia(p))
+        {
+            let own = self.band.base_column(p, motion, c.slope(c.x(&at.model)));
+            return Some(match along {
+                Some(along) => sum(&own, &along),
+                None => own,
+            });
+        }
+        along
+    }
+
+    /// Whether simulated columns may be brought along from step to step. Of a rigid axis few are simulated, and what a third inertia swung
+    /// with at first is taken out anew with each step.
+    pub fn may_follow(&self, model: &Model) -> bool {
+        self.nominal.structure == Structure::TwoInertia && !has_mode(model)
+    }
+
+    /// What a coordinate changes of what a model lacks, by a run of the model a step further.
+    pub fn simulated_column(&self, c: &Coordinate, at: &Along) -> Option<[Vec<C>; 2]> {
+        let h = self.step_within(c, &at.model);
+        let moved = self.rows(&moved(&at.model, c, h), at.bandwidth, Some(at.rows.weighed_at))?;
+        Some([0, 1].map(|e| moved.rows[e].iter().zip(&at.rows.rows[e]).map(|(a, b)| (a - b) / h).collect()))
     }
 
     /// What a coordinate changes of what the effects that it is one of resist the model's motion with, where that was kept.

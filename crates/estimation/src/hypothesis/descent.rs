@@ -17,6 +17,7 @@ use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::problem::Problem;
 use super::scatter;
+use super::secant::Secant;
 use super::tracking::Bandwidth;
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
@@ -69,6 +70,10 @@ pub struct Descent<'a> {
     first: First,
     /// The bandwidth from which a looser one was no likelier.
     tight: Option<Bandwidth>,
+    /// Columns brought along from the step before; none where they are to be simulated.
+    secant: Option<Secant>,
+    /// Whether the last step was made by such.
+    is_by_secant: bool,
 }
 
 /// What a descent holds in its first steps: what its start was not found with.
@@ -109,6 +114,8 @@ impl<'a> Descent<'a> {
             leaves: false,
             first: First::Sizes,
             tight: None,
+            secant: None,
+            is_by_secant: false,
         })
     }
 
@@ -131,6 +138,8 @@ impl<'a> Descent<'a> {
             leaves: fit.at_bound,
             first: First::Sizes,
             tight: None,
+            secant: None,
+            is_by_secant: false,
         }
     }
 
@@ -153,7 +162,8 @@ impl<'a> Descent<'a> {
             if !differ(bandwidth, self.at.bandwidth) {
                 break;
             }
-            let mut other = Self { at: self.problem.along(&self.at.model, bandwidth)?, ..self.clone() };
+            let at = self.problem.along(&self.at.model, bandwidth)?;
+            let mut other = Self { at, ..self.clone() };
             other.steps(SHARPENING, false)?;
             if other.log_likelihood() <= self.log_likelihood() + WORTH {
                 break;
@@ -182,9 +192,13 @@ impl<'a> Descent<'a> {
             band.weigh(&mut self.at.rows, self.at.s);
             let adapted = adapts && self.adapt_bandwidth();
             if converged && !adapted && gained.is_none_or(|g| g < WORTH) {
-                break;
+                if !(self.is_by_secant && self.problem.exact) {
+                    break;
+                }
+                self.secant = None;
             }
             if gained.is_none() {
+                self.secant = None;
                 damping = 0.0;
             }
         }
@@ -239,14 +253,21 @@ impl<'a> Descent<'a> {
                 let after = cost(&rows, s, &y);
                 if after < before {
                     *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
-                    next = Some((model, rows, trajectory, s, before - after));
+                    next = Some((model, rows, trajectory, s, before - after, y));
                     break;
                 }
             }
             *damping = (10.0 * *damping).max(1e-3);
         }
         self.leaves = leaves;
-        Some(next.map(|(model, rows, trajectory, s, gain)| {
+        let mut secant = self.secant.take();
+        Some(next.map(|(model, rows, trajectory, s, gain, y)| {
+            if let Some(secant) = &mut secant {
+                let step: Vec<f64> =
+                    self.coordinates.iter().zip(&x).zip(&y).map(|((c, x), y)| c.change(*x, *y)).collect();
+                secant.follow([&self.at.rows.rows, &rows.rows], &step, normal.a.diagonal().as_slice());
+            }
+            self.secant = secant;
             self.at = Along { model, rows, trajectory, s, bandwidth: self.at.bandwidth };
             gain
         }))
@@ -270,7 +291,18 @@ impl<'a> Descent<'a> {
     /// The same, and how the density of readings grows with each coordinate at each bin; nothing with those that no stiffness has in it.
     fn normal_with_growth(&mut self, x: &[f64], share: f64) -> Option<(Normal, Vec<Vec<f64>>)> {
         let (problem, band, coordinates, at) = (self.problem, self.problem.band, &self.coordinates, &self.at);
-        self.columns = problem.columns(at, coordinates)?;
+        let secant = match self.secant.take().filter(|_| problem.may_follow(&at.model)) {
+            Some(secant) => {
+                self.is_by_secant = true;
+                secant.renewed(problem, at, coordinates)?
+            }
+            None => {
+                self.is_by_secant = false;
+                Secant::simulated(problem, at, coordinates)?
+            }
+        };
+        self.columns.clone_from(&secant.columns);
+        self.secant = Some(secant);
         scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
         let stiffens = of_the_stiffness(coordinates, x);
         let grows = band.score(&at.model, &at.rows, at.s, &stiffens, &mut self.columns);
@@ -288,6 +320,7 @@ impl<'a> Descent<'a> {
     pub fn standard_errors(&mut self, independent: f64) -> Option<Vec<f64>> {
         let x: Vec<f64> = self.coordinates.iter().map(|c| c.x(&self.at.model)).collect();
         let share = self.share();
+        self.secant = None;
         let (normal, growth) = self.normal_with_growth(&x, share)?;
         let (_, errors) = normal.solve(&self.coordinates, &x, 0.0, &vec![false; x.len()])?;
         let scatter = self.scatter(&normal, &growth);
@@ -342,7 +375,7 @@ impl<'a> Descent<'a> {
 
     /// What each coordinate changes of what the model lacks here.
     pub fn columns(&self) -> Option<Vec<[Vec<C>; 2]>> {
-        self.problem.columns(&self.at, &self.coordinates)
+        Some(Secant::simulated(self.problem, &self.at, &self.coordinates)?.columns)
     }
 
     pub fn done(self) -> Fit {

@@ -6,6 +6,7 @@ use super::discrepancy::Discrepancy;
 use super::likelihood::{C, TorqueResidual};
 use super::model::{Coordinate, Model};
 use super::problem::Problem;
+use super::secant::Secant;
 use super::tracking::{Bandwidth, Resolution, Tracked};
 use crate::effects::Effect;
 
@@ -94,7 +95,7 @@ impl Problem<'_> {
         let bandwidth = self.bandwidth(fit.discrepancy);
         let followed = || {
             let at = self.along(&fit.model, bandwidth)?;
-            let columns = self.columns(&at, &fit.coordinates)?;
+            let columns = Secant::simulated(self, &at, &fit.coordinates)?.columns;
             Some(Fit { discrepancy: at.s, rows: at.rows, columns, bandwidth: at.bandwidth, ..fit.clone() })
         };
         if self.resolution == Resolution::Coarse || differ(bandwidth, fit.bandwidth) {

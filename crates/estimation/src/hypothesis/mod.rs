@@ -2,7 +2,8 @@
 //!
 //! One likelihood ([`likelihood`]) with the sensors' noise and the model's own discrepancy in it: of the torque that a model lacks to
 //! follow the record ([`tracking`]), in the band of its motion ([`band`]). [`problem`] is a record so compared, [`columns`] how what a model
-//! lacks changes with each free value, [`descent`] the way to the likeliest of them and [`fit`] where it ends; [`evidence`] how well the
+//! lacks changes with each free value and [`secant`] how those are kept from step to step, [`descent`] the way to the likeliest of them and
+//! [`fit`] where it ends; [`evidence`] how well the
 //! record speaks for that, [`scatter`] how well it knows the parameters and [`determined`] which of them it does not, [`scales`] what of an
 //! effect it could show, [`starts`] where a fit with one effect more begins; on a rigid axis such fits are compared along the motion of one
 //! run ([`inverse_dynamics`]). Which hypotheses are compared, and what is concluded from them, is [`crate::diagnose`]'s.
@@ -22,6 +23,7 @@ mod parameters;
 pub(crate) mod problem;
 pub(crate) mod scales;
 pub(crate) mod scatter;
+mod secant;
 mod series;
 pub(crate) mod starts;
 pub(crate) mod tracking;

@@ -191,6 +191,12 @@ impl Coordinate {
         if self.log { x.exp() * self.unit } else { x * self.unit }
     }
 
+    /// The change from one x to another in which what a model lacks is next to linear: of the axis' own parameters that of the value.
+    #[must_use]
+    pub fn change(&self, from: f64, to: f64) -> f64 {
+        if self.is_base() && self.log { (to - from).exp_m1() } else { to - from }
+    }
+
     /// d value / d x, for standard errors.
     #[must_use]
     pub fn slope(&self, x: f64) -> f64 {
