@@ -154,6 +154,10 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     }
     (search.progress)("the forms of what was found");
     let chosen = search.in_best_form(chosen, &mut pool);
+    // What was fitted without an effect before the others were there may have ended elsewhere.
+    let anew: Vec<Fit> = (0..chosen.terms.len()).into_par_iter().filter_map(|i| search.refitted(&chosen, i)).collect();
+    pool.extend(anew);
+    let chosen = search.pruned(chosen, &mut pool);
     search.conclude(given, parameters, chosen, pool.into_fits())
 }
 
