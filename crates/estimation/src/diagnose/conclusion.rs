@@ -3,31 +3,24 @@
 use std::sync::atomic::Ordering;
 
 use super::diagnosis::Undecided;
-use super::material::MINOR;
+use super::material::{MATERIAL, MINOR};
 use super::pool::likeliest_of;
 use super::search::{ALIKE, MOVED_WITH_EFFECTS, Search, is_extension};
 use super::verdict::Verdict;
+use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
 use crate::effects::{Effect, Family};
 use crate::examine::NOMINAL_OFF;
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
 use crate::hypothesis::fit::Fit;
 use crate::hypothesis::model::Model;
-use crate::numerics::distribution::of_log_odds;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
 /// Smallest relative change of the parameters that is called one.
 const GAIN_SEEN: f64 = 0.02;
-/// Share of the gap's power that the causes must explain together to be called its causes, and of the torque beside what is left: where a
-/// quarter of it is not understood, what the rest shows is a suspect.
-const EXPLAINED: f64 = 0.75;
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in twenty is none, beside a tenth one in six (tuning half of the second blind set).
 const DOUBT: f64 = 0.5;
-/// Probability from which an effect may be named: more likely than not, and by more than one of two that are alike is by rounding.
-pub const LIKELY: f64 = 0.55;
-/// Probability from which a hypothesis is told beside likelier ones.
-const POSSIBLE: f64 = 0.05;
 /// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
 /// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
@@ -37,101 +30,6 @@ const COLOUR: f64 = 10.0;
 const RANKED: usize = 40;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
-
-/// A hypothesis with its evidence.
-#[derive(Debug, Clone)]
-pub struct Weighed {
-    /// What was fitted.
-    pub fit: Fit,
-    /// Log evidence.
-    pub evidence: f64,
-    /// Posterior probability among the hypotheses tried.
-    pub probability: f64,
-}
-
-/// An effect named, and another that explains the record as well in its place.
-#[derive(Debug, Clone, Copy)]
-pub struct Confusable {
-    /// The one named.
-    pub named: Effect,
-    /// The other.
-    pub other: Effect,
-    /// Log evidence with the named one less that with the other.
-    pub difference: f64,
-}
-
-/// A hypothesis without one of its effects.
-struct Nested {
-    fit: Fit,
-    /// Whether it was fitted for the verdict, from where the hypothesis stands.
-    refitted: bool,
-}
-
-/// What the record says for each effect of a hypothesis.
-struct Weighing {
-    /// The hypothesis without it, where it is determined.
-    nested: Vec<Option<Nested>>,
-    /// Probability that it is there, and nothing that no cause explains does as it would.
-    standing: Vec<f64>,
-    /// The constant torque that it may be as well.
-    twins: Vec<Option<Confusable>>,
-    /// The hypotheses that it was weighed in.
-    ranking: Vec<Weighed>,
-    /// Its probability.
-    probabilities: Vec<f64>,
-}
-
-impl Weighing {
-    /// The fits that were weighed.
-    fn into_fits(self) -> Vec<Fit> {
-        self.ranking.into_iter().map(|w| w.fit).collect()
-    }
-
-    /// Effects that are likely.
-    fn likely(&self) -> usize {
-        self.probabilities.iter().filter(|p| is_likely(p)).count()
-    }
-
-    /// The least likely effect, where it is not likely.
-    fn least_likely(&self) -> Option<usize> {
-        let p = &self.probabilities;
-        (0..p.len()).min_by(|a, b| p[*a].total_cmp(&p[*b])).filter(|i| !is_likely(&p[*i]))
-    }
-
-    /// Of two that the record cannot tell apart one explains it.
-    fn share_with_twins(&mut self) {
-        for (p, twin) in self.probabilities.iter_mut().zip(&self.twins) {
-            *p = twin.map_or(*p, |t| p.min(of_log_odds(t.difference)));
-        }
-    }
-
-    /// The one of several effects that stays open, and the others are told: others do the same beside them.
-    fn open(&self, chosen: &Fit) -> Option<usize> {
-        self.least_likely().filter(|&i| {
-            is_likely(&self.standing[i])
-                && chosen.terms.len() > 1
-                && self.likely() + 1 == chosen.terms.len()
-                && is_likely(&one_instead(&self.ranking, chosen, i))
-                && instead(&self.ranking, chosen, i, self.twins[i]).len() > 1
-        })
-    }
-
-    /// Another hypothesis with one effect in the place of the open one, which is told, too: likelier than not.
-    fn instead_of_open(&self, chosen: &Fit, open: usize) -> Option<Fit> {
-        let best = with_one_instead(&self.ranking, chosen, open).next()?;
-        let is_told = is_likely(&(best.probability * self.standing[open]));
-        (is_told && best.fit.terms != chosen.terms && best.fit.converged).then(|| best.fit.clone())
-    }
-
-    /// The hypothesis without an effect, where it was fitted from where that stands.
-    fn refitted(&self, without: usize) -> Option<Fit> {
-        self.nested[without].as_ref().filter(|n| n.refitted).map(|n| n.fit.clone())
-    }
-}
-
-fn is_likely(probability: &f64) -> bool {
-    *probability >= LIKELY
-}
 
 /// The decision.
 #[derive(Debug, Clone)]
@@ -158,15 +56,6 @@ pub struct Decision {
     pub confusable: Vec<Confusable>,
     /// What of the chosen hypothesis is not told, where it is one of several effects.
     pub undecided: Option<Undecided>,
-}
-
-impl Confusable {
-    /// Whether the two are the same but for where they act.
-    #[must_use]
-    pub fn is_of_place(&self) -> bool {
-        let (named, other) = (self.named.info(), self.other.info());
-        named.family == other.family && named.place != other.place
-    }
 }
 
 impl Decision {
@@ -307,11 +196,12 @@ impl Search<'_> {
         Weighing { nested, standing, twins, ranking, probabilities }
     }
 
-    /// Whether little enough is left of the torque beside a chosen hypothesis, and enough of the gap explained.
+    /// Whether no material part of the torque is left beside a chosen hypothesis, nor of the gap's power: where that much is not understood,
+    /// what the rest shows is a suspect.
     fn is_understood(&self, parameters: &Fit, chosen: &Fit) -> bool {
         let white = || self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let is_complete = || self.at_floor(chosen) || white();
-        self.left(chosen) <= 1.0 - EXPLAINED && (self.explained(parameters, chosen) >= EXPLAINED || is_complete())
+        self.left(chosen) <= MATERIAL && (self.explained(parameters, chosen) >= 1.0 - MATERIAL || is_complete())
     }
 
     /// The verdict without one of several effects, from the fit without it.
@@ -467,42 +357,6 @@ fn discounted(effect: Effect, decisive: f64) -> f64 {
     odds * decisive / (odds * decisive + (1.0 - decisive))
 }
 
-/// Whether a fit has an effect of the family of this one.
-fn has_one_like(fit: &Fit, effect: Effect) -> bool {
-    fit.terms.iter().any(|(o, _)| o.info().family == effect.info().family)
-}
-
-/// The hypotheses with all effects of a fit but one, and some effect beside them in its place.
-fn with_one_instead<'r>(ranking: &'r [Weighed], chosen: &'r Fit, i: usize) -> impl Iterator<Item = &'r Weighed> {
-    ranking
-        .iter()
-        .filter(move |w| w.fit.terms.len() >= chosen.terms.len())
-        .filter(move |w| others(chosen, i).all(|e| has_one_like(&w.fit, e)))
-}
-
-/// The effects of a fit but one.
-fn others(fit: &Fit, i: usize) -> impl Iterator<Item = Effect> {
-    fit.terms.iter().enumerate().filter(move |(k, _)| *k != i).map(|(_, t)| t.0)
-}
-
-/// Probability of these hypotheses.
-fn one_instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> f64 {
-    with_one_instead(ranking, chosen, i).map(|w| w.probability).sum()
-}
-
-/// The effects that stand in the place of that one in the likely ones of these hypotheses or are its twin, and itself first.
-fn instead(ranking: &[Weighed], chosen: &Fit, i: usize, twin: Option<Confusable>) -> Vec<Effect> {
-    let mut effects = vec![chosen.terms[i].0];
-    for w in with_one_instead(ranking, chosen, i).filter(|w| w.probability >= POSSIBLE) {
-        let like = |e: Effect, of: Effect| e.info().family == of.info().family;
-        let other = |e: &Effect| others(chosen, i).all(|o| !like(*e, o)) && effects.iter().all(|k| !like(*e, *k));
-        let found: Vec<Effect> = w.fit.terms.iter().map(|t| t.0).filter(other).collect();
-        effects.extend(found);
-    }
-    effects.extend(twin.map(|t| t.other).filter(|e| !effects.contains(e)));
-    effects
-}
-
 /// How far the inertia that moves is from the nominal one, in its logarithm.
 fn inertia_off(fit: &Fit, nominal: &Model) -> f64 {
     let inertia = |m: &Model| m.parameters.i1 + m.parameters.i2;
@@ -546,6 +400,7 @@ fn confusable(
 
 #[cfg(test)]
 mod tests {
+    use super::super::weighing::LIKELY;
     use super::*;
     use crate::axis::{Parameters, Structure};
     use crate::effects::Settings;
@@ -630,26 +485,6 @@ mod tests {
         ];
         let told = |i: usize| nested_fit(&all, i, &pool).map(|f| f.log_likelihood);
         assert_eq!((told(0), told(1), told(2)), (None, Some(5.0), Some(7.0)));
-    }
-
-    #[test]
-    fn one_of_two_that_do_the_same_beside_a_third_leaves_that_third_as_likely_as_both_together() {
-        use Effect::{CoulombMotor, Delay, Latch, PreslidingMotor, ViscousMotor};
-        let chosen = fit(&[CoulombMotor, Delay], 0.0);
-        let weighed =
-            |effects: &[Effect], probability: f64| Weighed { fit: fit(effects, 0.0), evidence: 0.0, probability };
-        let ranking = [
-            weighed(&[CoulombMotor, Latch], 0.5),
-            weighed(&[Delay, CoulombMotor], 0.2),
-            weighed(&[PreslidingMotor, ViscousMotor], 0.1),
-            weighed(&[ViscousMotor, Delay], 0.1),
-            weighed(&[CoulombMotor], 0.1),
-        ];
-        assert!((one_instead(&ranking, &chosen, 1) - 0.8).abs() < 1e-12);
-        assert!((one_instead(&ranking, &chosen, 0) - 0.3).abs() < 1e-12);
-        assert_eq!(instead(&ranking, &chosen, 1, None), [Delay, Latch, ViscousMotor]);
-        let twin = Confusable { named: Delay, other: Effect::LoadMotor, difference: 0.0 };
-        assert_eq!(instead(&ranking, &chosen, 1, Some(twin)), [Delay, Latch, ViscousMotor, Effect::LoadMotor]);
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The diagnosis as typed data. Its sentences, pages and files are made of it in the program's `report`.
 
 use super::closed_loop::ClosedLoop;
-use super::conclusion::Confusable;
 use super::location::{Appearance, Location};
 use super::verdict::Verdict;
+use super::weighing::Confusable;
 use crate::axis::{AxisKind, Structure};
 use crate::effects::{Effect, Place};
 use crate::hypothesis::{BaseParameter, Hypothesis};

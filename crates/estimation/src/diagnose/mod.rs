@@ -3,7 +3,6 @@
 mod assess;
 mod closed_loop;
 mod conclusion;
-
 mod diagnosis;
 mod gap;
 pub mod location;
@@ -17,18 +16,18 @@ mod quantisation;
 mod race;
 mod residual;
 mod search;
-
 mod summary;
 #[cfg(test)]
 mod tests;
 mod verdict;
+mod weighing;
 
 // What a diagnosis takes and gives stands with it.
 pub use crate::conditioning::{CHANNELS, NoiseEstimate, NoiseMethod, Record, TORQUE, estimate_noise, find_period};
 pub use crate::hypothesis::{BaseParameter, Fit, Hypothesis, Model};
 pub use assess::{Case, Outcome, Replay};
 pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
-pub use conclusion::{Confusable, Decision, UNCAUSED, Weighed};
+pub use conclusion::{Decision, UNCAUSED};
 pub use diagnosis::{
     AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Levels, Ranked, Remainder,
     Rounding, RoundingRole, Site, Undecided, Way, Where,
@@ -37,3 +36,4 @@ pub use location::Location;
 pub use overlay::Overlay;
 pub use procedure::diagnose;
 pub use verdict::Verdict;
+pub use weighing::{Confusable, Weighed};

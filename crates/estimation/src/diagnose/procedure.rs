@@ -33,7 +33,7 @@ const UNDERSTOOD: f64 = 0.1;
 /// Hypotheses that are told, each with its own run over the held-out data.
 pub const REPORTED: usize = 12;
 
-/// Diagnoses a record of a rigid axis.
+/// Diagnoses a record.
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
@@ -46,8 +46,9 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         progress("at the record's own rate");
         let other = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
         let [left, own_left] = [searched.left(&decision.chosen), own.left(&other.chosen)];
+        let is_freer = is_materially_less(left * left, own_left * own_left);
         // A closer look has no more to explain.
-        if own_left > NEGLIGIBLE && is_materially_less(left, own_left) { (searched, decision) } else { (own, other) }
+        if own_left > NEGLIGIBLE && is_freer { (searched, decision) } else { (own, other) }
     };
     // A rigid axis is taken to be under control.
     let rigid = case.nominal.structure == Structure::Rigid;

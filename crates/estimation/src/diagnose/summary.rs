@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::assess::Case;
-use super::conclusion::{Decision, LIKELY};
+use super::conclusion::Decision;
 use super::diagnosis::{AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Site, Where};
 use super::gap::{Gap, Gaps};
 use super::location::Location;
@@ -12,6 +12,7 @@ use super::prepared::Prepared;
 use super::procedure::REPORTED;
 use super::residual::remains;
 use super::verdict::Verdict;
+use super::weighing::LIKELY;
 use crate::axis::{AxisKind, Structure};
 use crate::conditioning::{CHANNELS, Record};
 use crate::effects::Effect;

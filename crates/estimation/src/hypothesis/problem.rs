@@ -16,7 +16,6 @@ use super::tracking::{Bandwidth, LARGEST, Resolution, Torques, Tracked, parts, t
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
-use crate::effects::{EFFECTS, Effect, Place};
 
 /// Largest change of a nominal parameter, in its logarithm: a factor of ten.
 const FARTHEST: f64 = 2.3;
@@ -269,12 +268,8 @@ impl Problem<'_> {
 
 /// Whether a position of a model is read late, or behind a filter.
 fn reads_late(model: &Model) -> bool {
-    let delay = |e: &Effect| -> Option<f64> {
-        let parameter = e.delay_parameter().filter(|_| e.info().place == Place::Sensor)?;
-        Some(model.effects.of(*e)[parameter])
-    };
-    let active = model.effects.active();
-    model.effects.filter(&active) > 0.0 || EFFECTS.iter().filter_map(delay).any(|delay| delay > 0.0)
+    let (effects, on) = (&model.effects, model.effects.active());
+    [effects.filter(&on), effects.late(&on), effects.late_of_table(&on)].iter().any(|time| *time > 0.0)
 }
 
 /// Largest absolute value of a series; zero of an empty one.

@@ -120,7 +120,7 @@ fn named(o: &Outcome) -> Vec<&'static str> {
 
 /// What was tried, for a test that fails.
 fn ranking(o: &Outcome) -> Vec<(String, f64, Vec<Vec<f64>>)> {
-    let line = |w: &super::conclusion::Weighed| {
+    let line = |w: &super::weighing::Weighed| {
         let values = w.fit.terms.iter().map(|(e, _)| w.fit.model.effects.of(*e).to_vec()).collect();
         (w.fit.hypothesis().to_string(), w.evidence, values)
     };

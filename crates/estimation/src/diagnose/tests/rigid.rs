@@ -53,9 +53,8 @@ fn what_follows_a_wandering_torque_is_no_cause() {
             "{causes:?} {:?}",
             ranking(&o)
         );
-        let pair = |c: &crate::diagnose::conclusion::Confusable| {
-            [c.named, c.other] == [Effect::CoulombMotor, Effect::LoadMotor]
-        };
+        let pair =
+            |c: &crate::diagnose::weighing::Confusable| [c.named, c.other] == [Effect::CoulombMotor, Effect::LoadMotor];
         assert!(o.decision.confusable.iter().any(pair), "{:?}", ranking(&o));
     }
 }
