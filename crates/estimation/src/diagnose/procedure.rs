@@ -46,9 +46,9 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
         progress("at the record's own rate");
         let other = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
         let [left, own_left] = [searched.left(&decision.chosen), own.left(&other.chosen)];
-        let is_freer = is_materially_less(left * left, own_left * own_left);
+        let leaves_more = is_materially_less(left * left, own_left * own_left);
         // A closer look has no more to explain.
-        if own_left > NEGLIGIBLE && is_freer { (searched, decision) } else { (own, other) }
+        if own_left > NEGLIGIBLE && leaves_more { (searched, decision) } else { (own, other) }
     };
     // A rigid axis is taken to be under control.
     let rigid = case.nominal.structure == Structure::Rigid;

@@ -42,6 +42,7 @@ impl Confusable {
 
 /// A hypothesis without one of its effects.
 pub struct Nested {
+    /// What was fitted without it.
     pub fit: Fit,
     /// Whether it was fitted for the verdict, from where the hypothesis stands.
     pub refitted: bool,
@@ -109,6 +110,7 @@ impl Weighing {
     }
 }
 
+/// Whether a probability is that from which an effect may be named.
 pub fn is_likely(probability: &f64) -> bool {
     *probability >= LIKELY
 }

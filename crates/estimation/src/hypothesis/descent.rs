@@ -162,8 +162,7 @@ impl<'a> Descent<'a> {
             if !differ(bandwidth, self.at.bandwidth) {
                 break;
             }
-            let at = self.problem.along(&self.at.model, bandwidth)?;
-            let mut other = Self { at, ..self.clone() };
+            let mut other = Self { at: self.problem.along(&self.at.model, bandwidth)?, ..self.clone() };
             other.steps(SHARPENING, false)?;
             if other.log_likelihood() <= self.log_likelihood() + WORTH {
                 break;
@@ -198,7 +197,6 @@ impl<'a> Descent<'a> {
                 self.secant = None;
             }
             if gained.is_none() {
-                self.secant = None;
                 damping = 0.0;
             }
         }
@@ -260,6 +258,7 @@ impl<'a> Descent<'a> {
             *damping = (10.0 * *damping).max(1e-3);
         }
         self.leaves = leaves;
+        // Columns with which no step is better are not brought anywhere.
         let mut secant = self.secant.take();
         Some(next.map(|(model, rows, trajectory, s, gain, y)| {
             if let Some(secant) = &mut secant {
@@ -291,7 +290,7 @@ impl<'a> Descent<'a> {
     /// The same, and how the density of readings grows with each coordinate at each bin; nothing with those that no stiffness has in it.
     fn normal_with_growth(&mut self, x: &[f64], share: f64) -> Option<(Normal, Vec<Vec<f64>>)> {
         let (problem, band, coordinates, at) = (self.problem, self.problem.band, &self.coordinates, &self.at);
-        let secant = match self.secant.take().filter(|_| problem.may_follow(&at.model)) {
+        let secant = match self.secant.take() {
             Some(secant) => {
                 self.is_by_secant = true;
                 secant.renewed(problem, at, coordinates)?
@@ -301,8 +300,8 @@ impl<'a> Descent<'a> {
                 Secant::simulated(problem, at, coordinates)?
             }
         };
-        self.columns.clone_from(&secant.columns);
-        self.secant = Some(secant);
+        self.secant = problem.may_follow(&at.model).then(|| secant.clone());
+        self.columns = secant.columns;
         scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
         let stiffens = of_the_stiffness(coordinates, x);
         let grows = band.score(&at.model, &at.rows, at.s, &stiffens, &mut self.columns);

@@ -199,8 +199,9 @@ impl Held<'_> {
         // An encoder that is read late, or behind a filter, shows the feedback's torque so, too.
         let mut torque = given.map(|given| filtered(given, model.effects.filter(axis.on()), dt));
         let late = model.effects.late(axis.on());
-        let error = [(0, late), (1, late + model.effects.late_of_table(axis.on()))]
-            .map(|(i, late): (usize, f64)| advanced(&error[i], late / dt));
+        let [motor, table] = error;
+        let late_table = late + model.effects.late_of_table(axis.on());
+        let error = [advanced(motor, late / dt), advanced(table, late_table / dt)];
         add_linear(model, record, &error, &mut torque);
         // Squares of what is larger than this are no numbers.
         let bounded = torque.iter().chain(&error).flatten().all(|v| v.abs() < LARGEST);
@@ -226,9 +227,9 @@ fn filtered(mut torque: Vec<f64>, time: f64, dt: f64) -> Vec<f64> {
 }
 
 /// A series so many samples ahead, by Lagrange's interpolation of four.
-fn advanced(series: &[f64], by: f64) -> Vec<f64> {
+fn advanced(series: Vec<f64>, by: f64) -> Vec<f64> {
     if by <= 0.0 {
-        return series.to_vec();
+        return series;
     }
     let (whole, x) = (by.floor() as usize, by.fract());
     let weights = [
@@ -415,11 +416,11 @@ mod tests {
     fn a_cubic_is_advanced_exactly_and_the_last_value_stays() {
         let cubic = |t: f64| 0.3 * t * t * t - t * t + 2.0;
         let series: Vec<f64> = (0..20).map(|k| cubic(f64::from(k))).collect();
-        let ahead = advanced(&series, 2.3);
+        let ahead = advanced(series.clone(), 2.3);
         for (k, told) in ahead.iter().enumerate().take(15) {
             assert!((told - cubic(k as f64 + 2.3)).abs() < 1e-9, "{k}");
         }
         assert!((ahead[19] - series[19]).abs() < 1e-9);
-        assert_eq!(advanced(&series, 0.0), series);
+        assert_eq!(advanced(series.clone(), 0.0), series);
     }
 }
