@@ -4,8 +4,9 @@ use std::sync::atomic::Ordering;
 
 use super::diagnosis::Undecided;
 use super::material::{MATERIAL, MINOR};
+use super::moves::MOVED_WITH_EFFECTS;
 use super::pool::likeliest_of;
-use super::search::{ALIKE, MOVED_WITH_EFFECTS, Search, is_extension};
+use super::search::{ALIKE, Search, is_extension};
 use super::verdict::Verdict;
 use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
 use crate::effects::{Effect, Family};

@@ -7,6 +7,7 @@ mod diagnosis;
 mod gap;
 pub mod location;
 mod material;
+mod moves;
 mod octaves;
 mod overlay;
 mod pool;

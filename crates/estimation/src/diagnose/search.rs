@@ -8,27 +8,23 @@
 //!
 //! Held-out data have no part in it.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
 use super::conclusion::Decision;
+use super::moves::{MOVED, PROMISING};
 use super::pool::Pool;
 use crate::axis::Structure;
 use crate::effects::Effect;
-use crate::hypothesis::determined::{is_lost, is_simpler};
+use crate::hypothesis::determined::is_lost;
 use crate::hypothesis::discrepancy::Discrepancy;
-use crate::hypothesis::fit::{Fit, PROBE, STEPS, Term};
+use crate::hypothesis::fit::{Fit, STEPS, Term};
 use crate::hypothesis::likelihood::Band;
-use crate::hypothesis::model::{Coordinate, Model};
+use crate::hypothesis::model::Model;
 use crate::hypothesis::problem::Problem;
 use crate::hypothesis::scales::Scales;
-use crate::hypothesis::starts::{Screening, StartPoint};
 
-/// Starts that are fitted of those that the regression ranks first.
-const FITTED: usize = 12;
-/// Effects whose richer forms are looked at, too, and hypotheses of each size that are gone on from beside the chosen way.
-const PROMISING: usize = 4;
 /// Most causes looked for.
 const MOST: usize = 5;
 /// Simulated steps after which what was found is only added to: half a minute to a minute on two cores, on one record in fifty.
@@ -37,10 +33,6 @@ const BUDGET: u64 = 150_000_000;
 const AGAIN: usize = 3;
 /// Simulated steps from which no further one is: a dozen seconds on two cores.
 const BUDGET_OF_RIVALS: u64 = 40_000_000;
-/// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
-const MOVED: f64 = 0.2;
-/// The same beside effects, which let most parameters be what they are: a factor of two.
-pub const MOVED_WITH_EFFECTS: f64 = 0.7;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
 
@@ -215,41 +207,6 @@ impl Search<'_> {
         admitted.max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
     }
 
-    /// Every combination of the textbook's effects at the motor, each from its own regression.
-    fn textbook(&self, parameters: &Fit, chosen: &Fit) -> Vec<Fit> {
-        let own: Vec<Term> = self
-            .suspects
-            .iter()
-            .filter(|e| e.info().textbook)
-            .flat_map(|e| (0..e.info().variants.len().min(2)).map(|v| (*e, v)))
-            .collect();
-        // A set begins with a shorter one, which is fitted before it.
-        let mut all: Vec<Fit> = Vec::new();
-        let mut shorter = vec![(parameters.clone(), 0)];
-        while !shorter.is_empty() {
-            let longer: Vec<(Fit, usize)> = shorter
-                .par_iter()
-                .filter_map(|(fit, next)| Some((fit, next, Screening::of(&self.problem, fit)?)))
-                .flat_map(|(fit, next, screening)| {
-                    let fitted = |(i, term): (usize, &Term)| -> Option<(Fit, usize)> {
-                        let start = screening.starts(*term).into_iter().next()?;
-                        Some((screening.fitted(&start, fit.terms.len(), fit.discrepancy)?, i + 1))
-                    };
-                    let joining = own.par_iter().enumerate().skip(*next);
-                    joining.filter(|(_, t)| self.may_join(&fit.terms, t.0)).filter_map(fitted).collect::<Vec<_>>()
-                })
-                .collect();
-            all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
-            shorter = longer;
-        }
-        self.raced(all, Some(chosen))
-    }
-
-    /// Whether an effect may stand beside these.
-    fn may_join(&self, terms: &[Term], effect: Effect) -> bool {
-        terms.iter().all(|(e, _)| *e != effect && !e.excludes(effect))
-    }
-
     /// Adds, drops and exchanges effects as long as the evidence grows.
     fn stepwise(&self, from: Fit, pool: &mut Pool) -> Fit {
         let mut best = from;
@@ -368,26 +325,6 @@ impl Search<'_> {
         likeliest
     }
 
-    /// The fits with one effect more, each looked for once; anew beside a fit that leaves materially less than the one beside which they
-    /// were looked for, which is not what they would have to explain.
-    fn extended(&self, fit: &Fit, keep: usize, pool: &mut Pool) -> Vec<Fit> {
-        if let Some(known) = pool.extensions(&fit.terms, |left| !self.leaves_materially_less(left, fit)) {
-            return known;
-        }
-        let mut added = self.added(fit, keep);
-        added.extend(self.put_back(fit).iter().flat_map(|f| self.added(f, keep)));
-        let added = self.raced(added, None);
-        pool.extend_all(fit, &added);
-        added
-    }
-
-    /// Whether an axis' own parameter is that far from its nominal value in a fit, in its logarithm.
-    fn have_moved(&self, fit: &Fit, far: f64) -> bool {
-        let nominal = &self.problem.nominal;
-        let moved = |c: &Coordinate| c.is_base() && (c.value(&fit.model) / c.value(nominal)).ln().abs() >= far;
-        fit.coordinates.iter().any(moved)
-    }
-
     /// Effects added beside parameters near those of the data sheet, and only then these freed: of several causes each shows itself beside the
     /// true parameters, while free ones run off with what all of them do.
     fn near_the_data_sheet(&self, given: &Fit) -> Option<Fit> {
@@ -413,80 +350,6 @@ impl Search<'_> {
         self.near_the_data_sheet(&baseline.given)
     }
 
-    /// The fit with its parameters back at their nominal values, held there and free, where they have gone far: they may have taken what
-    /// an effect does, and free beside it take it again.
-    fn put_back(&self, fit: &Fit) -> Vec<Fit> {
-        let nominal = &self.problem.nominal;
-        if !self.have_moved(fit, if fit.terms.is_empty() { MOVED } else { MOVED_WITH_EFFECTS }) {
-            return Vec::new();
-        }
-        let back = self.problem.given(&Model { parameters: nominal.parameters, ..fit.model });
-        let held = back.map(|given| Fit { terms: fit.terms.clone(), ..given });
-        let freed = held.as_ref().filter(|f| f.terms.is_empty()).and_then(|f| self.problem.freed(f));
-        held.into_iter().chain(freed).collect()
-    }
-
-    /// The fit with each effect that may join it, a few steps from the best starts of all.
-    fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
-        let Some(screening) = Screening::of(&self.problem, fit) else { return Vec::new() };
-        let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
-        let of = |terms: Vec<Term>| -> Vec<StartPoint> {
-            terms.par_iter().flat_map_iter(|t| screening.starts(*t).into_iter().take(2)).collect()
-        };
-        // Forms that free more than another are looked at where that other is among the best.
-        let mut points = of(suspects.iter().flat_map(|e| forms(*e, false)).collect());
-        points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let mut promising: Vec<Effect> = Vec::new();
-        for p in &points {
-            if promising.len() < PROMISING && !promising.contains(&p.term.0) {
-                promising.push(p.term.0);
-            }
-        }
-        points.truncate(FITTED);
-        let richer = of(promising.iter().flat_map(|e| forms(*e, true)).collect());
-        points.extend(richer);
-        points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        points.truncate(FITTED);
-        let from = screening.fit.discrepancy;
-        let done = AtomicUsize::new(0);
-        let probe = |start: &StartPoint| {
-            let fitted = screening.fitted(start, keep, from);
-            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-            (self.progress)(&format!("{n} of {} fits of a cause beside {}", points.len(), fit.terms.len()));
-            fitted
-        };
-        points.par_iter().filter_map(probe).collect()
-    }
-
-    /// The fit without one of its effects: the known one, unless the richer fit as it stands is likelier without that effect already,
-    /// which has then shown it a better place only.
-    fn without(&self, fit: &Fit, i: usize, pool: &Pool) -> Option<Fit> {
-        let mut terms = fit.terms.clone();
-        terms.remove(i);
-        let bare = || {
-            let at = self.problem.along(&self.bare(fit, i), fit.bandwidth)?;
-            Some(self.band().log_likelihood(&at.rows, at.s))
-        };
-        let known = pool.converged(&terms).filter(|k| bare().is_none_or(|l| k.log_likelihood >= l));
-        known.cloned().or_else(|| self.refitted(fit, i))
-    }
-
-    /// The fit's model without one of its effects, all else as it is.
-    fn bare(&self, fit: &Fit, i: usize) -> Model {
-        let (gone, _) = fit.terms[i];
-        let mut model = fit.model;
-        model.effects.of_mut(gone).copy_from_slice(self.problem.nominal.effects.of(gone));
-        model
-    }
-
-    /// The fit without one of its effects, from where it stands.
-    pub fn refitted(&self, fit: &Fit, i: usize) -> Option<Fit> {
-        let mut terms = fit.terms.clone();
-        terms.remove(i);
-        let plain = self.problem.coarse().fit(&self.bare(fit, i), &terms, fit.discrepancy, PROBE)?;
-        self.problem.deepen(&plain)
-    }
-
     /// Each effect in turn exchanged for another that explains the record better.
     fn exchanged(&self, fit: Fit, pool: &mut Pool) -> Fit {
         let mut best = fit;
@@ -504,56 +367,6 @@ impl Search<'_> {
             }
         }
         best
-    }
-
-    /// What an effect is looked for in: the fit without one of its effects, everything else from where it stands.
-    fn screening_without(&self, fit: &Fit, i: usize) -> Option<Screening<'_>> {
-        let mut terms = fit.terms.clone();
-        terms.remove(i);
-        let held = Fit { terms, ..self.problem.given(&self.bare(fit, i))? };
-        Screening::of(&self.problem, &self.problem.freed(&held)?)
-    }
-
-    /// The fit with another effect in the place of one of its own.
-    pub fn with_another(&self, fit: &Fit, i: usize, other: Term) -> Option<Fit> {
-        let screening = self.screening_without(fit, i)?;
-        let start = screening.starts(other).into_iter().next()?;
-        self.problem.deepen(&screening.fitted(&start, i, fit.discrepancy)?)
-    }
-
-    /// The fit with one of its effects in each form that frees more, everything else from where it stands: what the plain form lacks the
-    /// others may have taken, and without it they would stand elsewhere.
-    fn reformed(&self, fit: &Fit, i: usize) -> Vec<Fit> {
-        let (effect, form) = fit.terms[i];
-        let info = effect.info();
-        let richer: Vec<usize> = (0..info.variants.len()).filter(|v| info.frees_more(*v, form)).collect();
-        let Some(screening) = (!richer.is_empty()).then(|| self.screening_without(fit, i)).flatten() else {
-            return Vec::new();
-        };
-        let points: Vec<StartPoint> =
-            richer.par_iter().flat_map_iter(|v| screening.starts((effect, *v)).into_iter().take(2)).collect();
-        let probed = points.par_iter().filter_map(|start| screening.fitted(start, i, fit.discrepancy)).collect();
-        self.raced(probed, Some(fit))
-    }
-
-    /// The likelier fit with the simpler law of the same thing in place of an effect that stands where it is that law.
-    pub fn simplified<'f>(&self, fit: &Fit, independent: f64, pool: &'f [Fit]) -> Option<&'f Fit> {
-        let gone = fit.terms.iter().map(|t| t.0).find(|e| is_simpler(fit, *e, independent))?;
-        let is_simple = |e: Effect| {
-            let (own, info) = (gone.info(), e.info());
-            e.simpler_at_zero().is_none() && (info.family, info.place) == (own.family, own.place)
-        };
-        let same = |f: &&Fit| {
-            let others = || fit.terms.iter().filter(|t| t.0 != gone);
-            f.terms.len() == fit.terms.len()
-                && others().all(|t| f.terms.contains(t))
-                && f.terms.iter().any(|t| is_simple(t.0))
-        };
-        let likelier = |f: &&Fit| !f.at_bound && self.evidence(f, independent) > self.evidence(fit, independent);
-        pool.iter()
-            .filter(same)
-            .filter(likelier)
-            .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
     }
 
     /// The fit with its effects in the forms of largest evidence: a form that frees more is no further cause, however little it explains.
@@ -606,18 +419,11 @@ pub fn is_extension(fit: &Fit, than: &Fit) -> bool {
     fit.terms.len() > than.terms.len() && than.terms.iter().all(|t| fit.terms.iter().any(|o| o.0 == t.0))
 }
 
-/// Forms of an effect: those that free all that an earlier one does and more, or the others.
-fn forms(effect: Effect, richer: bool) -> Vec<Term> {
-    let info = effect.info();
-    let frees_more = |v: usize| (0..v).any(|plain| info.frees_more(v, plain));
-    (0..info.variants.len()).filter(|v| frees_more(*v) == richer).map(|v| (effect, v)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::axis::Parameters;
-    use crate::effects::{EFFECTS, Settings};
+    use crate::effects::Settings;
 
     fn fit(terms: &[Term]) -> Fit {
         Fit::of_likelihood(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
@@ -629,16 +435,5 @@ mod tests {
         assert!(is_extension(&fit(&[(coulomb, 1), (viscous, 0)]), &fit(&[(coulomb, 0)])));
         assert!(!is_extension(&fit(&[(coulomb, 1)]), &fit(&[(coulomb, 0)])));
         assert!(!is_extension(&fit(&[(coulomb, 0), (viscous, 0)]), &fit(&[(Effect::Delay, 0)])));
-    }
-
-    #[test]
-    fn every_form_of_an_effect_is_looked_at_once_the_plain_ones_first() {
-        for &e in EFFECTS {
-            let mut all = forms(e, false);
-            assert!(all.contains(&(e, 0)), "{e:?}");
-            all.extend(forms(e, true));
-            all.sort_unstable();
-            assert_eq!(all, (0..e.info().variants.len()).map(|v| (e, v)).collect::<Vec<Term>>());
-        }
     }
 }
