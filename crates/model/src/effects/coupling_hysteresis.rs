@@ -60,7 +60,7 @@ impl Force for CouplingHysteresis {
         textbook: false,
         odds: 1.0,
         // A loop that the twist does not close is a spring.
-        bounds: |p, x| p[0] <= x.torque && p[1] <= 2.0 * x.twist,
+        bounds: |p, x| p[0] <= x.torque && p[1] <= 4.0 * x.twist,
         example: &[1e-3, 0.02, 1.5],
         variants: &[Variant { name: "", free: &[0, 1] }, Variant { name: "sharp", free: &[0, 1, 2] }],
     };
