@@ -24,12 +24,7 @@ pub const MOVED_WITH_EFFECTS: f64 = 0.7;
 impl Search<'_> {
     /// Every combination of the textbook's effects at the motor, each from its own regression.
     pub fn textbook(&self, parameters: &Fit, chosen: &Fit) -> Vec<Fit> {
-        let own: Vec<Term> = self
-            .suspects
-            .iter()
-            .filter(|e| e.info().textbook)
-            .flat_map(|e| (0..e.info().variants.len().min(2)).map(|v| (*e, v)))
-            .collect();
+        let own: Vec<Effect> = self.suspects.iter().copied().filter(|e| e.info().textbook).collect();
         // A set begins with a shorter one, which is fitted before it.
         let mut all: Vec<Fit> = Vec::new();
         let mut shorter = vec![(parameters.clone(), 0)];
@@ -38,12 +33,19 @@ impl Search<'_> {
                 .par_iter()
                 .filter_map(|(fit, next)| Some((fit, next, Screening::of(&self.problem, fit)?)))
                 .flat_map(|(fit, next, screening)| {
-                    let fitted = |(i, term): (usize, &Term)| -> Option<(Fit, usize)> {
-                        let start = screening.starts(*term).into_iter().next()?;
-                        Some((screening.fitted(&start, fit.terms.len(), fit.discrepancy)?, i + 1))
+                    let fitted = |(next, start): (usize, StartPoint)| -> Option<(Fit, usize)> {
+                        Some((screening.fitted(&start, fit.terms.len(), fit.discrepancy)?, next))
                     };
-                    let joining = own.par_iter().enumerate().skip(*next);
-                    joining.filter(|(_, t)| self.may_join(&fit.terms, t.0)).filter_map(fitted).collect::<Vec<_>>()
+                    let joining =
+                        own.par_iter().enumerate().skip(*next).filter(|(_, e)| self.may_join(&fit.terms, **e));
+                    let starts: Vec<(usize, StartPoint)> = joining
+                        .flat_map_iter(|(i, e)| {
+                            let simple: Vec<usize> = (0..e.info().variants.len().min(2)).collect();
+                            let of_forms = screening.starts(*e, &simple).into_iter();
+                            of_forms.filter_map(move |starts| Some((i + 1, starts.into_iter().next()?)))
+                        })
+                        .collect();
+                    starts.into_par_iter().filter_map(fitted).collect::<Vec<_>>()
                 })
                 .collect();
             all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
@@ -94,11 +96,13 @@ impl Search<'_> {
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
         let Some(screening) = Screening::of(&self.problem, fit) else { return Vec::new() };
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
-        let of = |terms: Vec<Term>| -> Vec<StartPoint> {
-            terms.par_iter().flat_map_iter(|t| screening.starts(*t).into_iter().take(2)).collect()
+        let of = |effects: &[Effect], richer: bool| -> Vec<StartPoint> {
+            let best = |starts: Vec<StartPoint>| starts.into_iter().take(2);
+            let of_effect = |e: &Effect| screening.starts(*e, &forms(*e, richer)).into_iter().flat_map(best);
+            effects.par_iter().flat_map_iter(of_effect).collect()
         };
         // Forms that free more than another are looked at where that other is among the best.
-        let mut points = of(suspects.iter().flat_map(|e| forms(*e, false)).collect());
+        let mut points = of(&suspects, false);
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut promising: Vec<Effect> = Vec::new();
         for p in &points {
@@ -107,8 +111,7 @@ impl Search<'_> {
             }
         }
         points.truncate(FITTED);
-        let richer = of(promising.iter().flat_map(|e| forms(*e, true)).collect());
-        points.extend(richer);
+        points.extend(of(&promising, true));
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         points.truncate(FITTED);
         let from = screening.fit.discrepancy;
@@ -162,7 +165,7 @@ impl Search<'_> {
     /// The fit with another effect in the place of one of its own.
     pub fn with_another(&self, fit: &Fit, i: usize, other: Term) -> Option<Fit> {
         let screening = self.screening_without(fit, i)?;
-        let start = screening.starts(other).into_iter().next()?;
+        let start = screening.best_start(other)?;
         self.problem.deepen(&screening.fitted(&start, i, fit.discrepancy)?)
     }
 
@@ -175,8 +178,8 @@ impl Search<'_> {
         let Some(screening) = (!richer.is_empty()).then(|| self.screening_without(fit, i)).flatten() else {
             return Vec::new();
         };
-        let points: Vec<StartPoint> =
-            richer.par_iter().flat_map_iter(|v| screening.starts((effect, *v)).into_iter().take(2)).collect();
+        let best = |starts: Vec<StartPoint>| starts.into_iter().take(2);
+        let points: Vec<StartPoint> = screening.starts(effect, &richer).into_iter().flat_map(best).collect();
         let probed = points.par_iter().filter_map(|start| screening.fitted(start, i, fit.discrepancy)).collect();
         self.raced(probed, Some(fit))
     }
@@ -203,10 +206,10 @@ impl Search<'_> {
 }
 
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
-fn forms(effect: Effect, richer: bool) -> Vec<Term> {
+fn forms(effect: Effect, richer: bool) -> Vec<usize> {
     let info = effect.info();
     let frees_more = |v: usize| (0..v).any(|plain| info.frees_more(v, plain));
-    (0..info.variants.len()).filter(|v| frees_more(*v) == richer).map(|v| (effect, v)).collect()
+    (0..info.variants.len()).filter(|v| frees_more(*v) == richer).collect()
 }
 
 #[cfg(test)]
@@ -218,10 +221,10 @@ mod tests {
     fn every_form_of_an_effect_is_looked_at_once_the_plain_ones_first() {
         for &e in EFFECTS {
             let mut all = forms(e, false);
-            assert!(all.contains(&(e, 0)), "{e:?}");
+            assert!(all.contains(&0), "{e:?}");
             all.extend(forms(e, true));
             all.sort_unstable();
-            assert_eq!(all, (0..e.info().variants.len()).map(|v| (e, v)).collect::<Vec<Term>>());
+            assert_eq!(all, (0..e.info().variants.len()).collect::<Vec<usize>>());
         }
     }
 }

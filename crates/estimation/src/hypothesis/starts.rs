@@ -1,5 +1,7 @@
 //! Where a fit of an effect starts: the shapes on the record's scales, the sizes by linear regression on what the model lacks.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, PROBE, Term};
@@ -9,7 +11,7 @@ use super::problem::Problem;
 use super::scales::{Scales, slow};
 
 use crate::axis::Structure;
-use crate::effects::{Place, Role, Scale, Settings, Start};
+use crate::effects::{EFFECTS, Effect, Place, Role, Scale, Settings, Start};
 use crate::trace::numerics::dot;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -29,7 +31,12 @@ pub struct Screening<'a> {
     /// The fit, along the motion as measured.
     pub fit: Fit,
     regression: Regression,
+    /// What each effect changed, where it was looked at: its forms begin alike.
+    looked_at: Vec<Mutex<Looks>>,
 }
+
+/// Spectra of what a model lacks, by the effects that are on in it; `None` of one that could not be run.
+type Looks = Vec<(Settings, Option<Arc<[Vec<C>; 2]>>)>;
 
 impl<'a> Screening<'a> {
     /// `None` before the scales of the record are known.
@@ -39,13 +46,33 @@ impl<'a> Screening<'a> {
         let fit = problem.along_the_record(fit);
         let problem = problem.along_the_motion_of(&fit);
         let regression = Regression::new(&problem, &fit);
-        Some(Self { problem, fit, regression })
+        Some(Self { problem, fit, regression, looked_at: EFFECTS.iter().map(|_| Mutex::default()).collect() })
     }
 
-    /// Starts of one form of an effect beside the fit's, the best first.
-    pub fn starts(&self, term: Term) -> Vec<StartPoint> {
+    /// Starts of some forms of an effect beside the fit's, of each the best first.
+    pub fn starts(&self, effect: Effect, forms: &[usize]) -> Vec<Vec<StartPoint>> {
         let scales = self.problem.scales.as_ref();
-        scales.map_or_else(Vec::new, |scales| starts(&self.problem, &self.fit, &self.regression, scales, term))
+        let of = |scales: &Scales| forms.iter().map(|form| self.starts_of(scales, (effect, *form))).collect();
+        scales.map_or_else(Vec::new, of)
+    }
+
+    /// The best start of one form of an effect.
+    pub fn best_start(&self, (effect, form): Term) -> Option<StartPoint> {
+        self.starts(effect, &[form]).into_iter().flatten().next()
+    }
+
+    /// What the fit's model lacks with other effects of one kind. Shapes that are looked at side by side are unlike, forms are looked at one
+    /// after the other: no run is made twice, on any number of threads.
+    fn rows(&self, effect: Effect, effects: &Settings) -> Option<Arc<[Vec<C>; 2]>> {
+        let looks = || self.looked_at[effect as usize].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = looks().iter().find(|(known, _)| known == effects) {
+            return known.clone();
+        }
+        let (p, fit) = (&self.problem, &self.fit);
+        let model = Model { effects: *effects, ..fit.model };
+        let rows = p.rows(&model, fit.bandwidth, Some(fit.rows.weighed_at)).map(|residual| Arc::new(residual.rows));
+        looks().push((*effects, rows.clone()));
+        rows
     }
 
     /// A few steps of a fit from a start and a discrepancy, the effect told at place `keep`.
@@ -256,180 +283,177 @@ fn modes(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Ve
     Some(refined.map(|(.., mode)| mode).collect())
 }
 
-/// Starts of one form of an effect beside the fit's, the best first.
-fn starts(p: &Problem<'_>, fit: &Fit, reg: &Regression, scales: &Scales, term: Term) -> Vec<StartPoint> {
-    let (effect, form) = term;
-    let info = effect.info();
-    let side = usize::from(info.place == Place::Table);
-    let free = info.variants[form].free;
-    let mut off = fit.model.effects;
-    off.of_mut(effect).copy_from_slice(Settings::default().of(effect));
-    let mut grid: Vec<Settings> = if effect.is_mode() {
-        let with = |mode: [f64; 3]| {
-            let mut s = off;
-            s.of_mut(effect)[..3].copy_from_slice(&mode);
-            s
-        };
-        modes(p, fit, reg, side).unwrap_or_default().into_iter().map(with).collect()
-    } else {
-        vec![off]
-    };
-    let mut order: Vec<usize> = free.to_vec();
-    order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
-    for &i in &order {
-        let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
-        let found;
-        let fractions = match scale {
-            Scale::Order => {
-                found = orders(p, fit, reg, side).unwrap_or_default();
-                &found[..]
-            }
-            Scale::Frequency => {
-                found = frequencies(p, reg, side);
-                &found[..]
-            }
-            _ => fractions,
-        };
-        let mut next = Vec::new();
-        for s in &grid {
-            for &f in fractions {
-                let mut t = *s;
-                let v = scales.value(effect, scale, f);
-                if !(v >= info.parameters[i].min && v <= info.parameters[i].max) {
-                    continue;
-                }
-                t.of_mut(effect)[i] = v;
-                next.push(t);
-            }
-        }
-        grid = next;
-    }
-    let mut all: Vec<StartPoint> = grid.par_iter().filter_map(|s| one(p, fit, reg, scales, term, s)).collect();
-    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    all
-}
-
-fn one(
-    p: &Problem<'_>,
-    fit: &Fit,
-    reg: &Regression,
-    scales: &Scales,
-    (effect, form): Term,
-    shapes: &Settings,
-) -> Option<StartPoint> {
-    let info = effect.info();
-    let free = info.variants[form].free;
-    if info.parameters.iter().all(|q| !matches!(q.start, Start::Linear))
-        && !scales.admit(p.record, &Model { effects: *shapes, ..fit.model }, std::iter::once(effect))
-    {
-        return None;
-    }
-    let rows_of = |s: &Settings| {
-        p.rows(&Model { effects: *s, ..fit.model }, fit.bandwidth, Some(fit.rows.weighed_at)).map(|l| l.rows)
-    };
-    let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
-        [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
-    };
-    let size = |c: &[Vec<C>; 2]| (c.iter().flatten().map(|c| c.norm_sqr()).sum::<f64>() * 2.0 / p.band.n as f64).sqrt();
-    let target = 0.05 * scales.torque;
-    let sizes: Vec<usize> = free
-        .iter()
-        .copied()
-        .filter(|&i| info.parameters[i].role == Role::Size && matches!(info.parameters[i].start, Start::Linear))
-        .collect();
-    let mut columns: Vec<[Vec<C>; 2]> = Vec::new();
-    let mut signed = Vec::new();
-    let mut trial = Vec::new();
-    let mut at = *shapes;
-    for &i in &sizes {
-        let q = &info.parameters[i];
-        let mut v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
-        let mut column = None;
-        for _ in 0..2 {
-            let v1 = v.clamp(q.min, q.max);
-            let mut s = *shapes;
-            s.of_mut(effect)[i] = v1;
-            let r = rows_of(&s)?;
-            let c = difference(&r, &fit.rows.rows, 1.0);
-            let got = size(&c);
-            if got.is_nan() || got <= 0.0 {
-                return None;
-            }
-            v = v1;
-            column = Some(c);
-            let ratio = target / got;
-            if ratio > 0.1 && ratio < 10.0 {
-                break;
-            }
-            v *= ratio;
-        }
-        columns.push(column?);
-        signed.push(q.min < 0.0);
-        trial.push(v.clamp(q.min, q.max));
-        at.of_mut(effect)[i] = v.clamp(q.min, q.max);
-    }
-    if sizes.is_empty() {
-        // The size is among the shapes tried.
-        let r = rows_of(shapes)?;
-        columns.push(difference(&r, &fit.rows.rows, 1.0));
-        signed.push(false);
-    }
-    // Shapes that enter linearly beside the first size.
-    let mut extra = Vec::new();
-    let base = if sizes.len() == 1 { Some(columns[0].clone()) } else { None };
-    for &i in free {
-        let q = &info.parameters[i];
-        let step = match q.start {
-            Start::Share => 0.3,
-            Start::Phase => std::f64::consts::FRAC_PI_2,
-            Start::Linear if q.role == Role::Shape => {
-                // A damping.
-                let v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
-                v.clamp(q.min, q.max)
-            }
-            _ => continue,
-        };
-        let mut s = at;
-        s.of_mut(effect)[i] = q.off + step;
-        let r = rows_of(&s)?;
-        let total = difference(&r, &fit.rows.rows, 1.0);
-        let c = if matches!(q.start, Start::Phase) { total } else { difference(&total, base.as_ref()?, 1.0) };
-        columns.push(c);
-        signed.push(true);
-        extra.push((i, step));
-    }
-    let (c, gain) = reg.solve(p, &columns, &signed)?;
-    let mut model = fit.model;
-    let own = model.effects.of_mut(effect);
-    own.copy_from_slice(at.of(effect));
-    if sizes.is_empty() {
-        // Only the first size follows the factor.
-        if let Some(&i) = free.iter().find(|&&i| info.parameters[i].role == Role::Size) {
-            own[i] = (own[i] * c[0].clamp(0.2, 5.0)).clamp(info.parameters[i].min, info.parameters[i].max);
-        }
-    }
-    for (j, &i) in sizes.iter().enumerate() {
-        own[i] = (trial[j] * c[j]).clamp(info.parameters[i].min, info.parameters[i].max);
-    }
-    for (e, &(i, step)) in extra.iter().enumerate() {
-        let b = c[columns.len() - extra.len() + e];
-        let q = &info.parameters[i];
-        if matches!(q.start, Start::Phase) {
-            // a*sin(x) + b*cos(x).
-            let (a0, t) = (c[0], trial[0]);
-            own[sizes[0]] = t * a0.hypot(b);
-            own[i] = b.atan2(a0);
+impl Screening<'_> {
+    /// Starts of one form of an effect beside the fit's, the best first.
+    fn starts_of(&self, scales: &Scales, term: Term) -> Vec<StartPoint> {
+        let (p, fit, reg) = (&self.problem, &self.fit, &self.regression);
+        let (effect, form) = term;
+        let info = effect.info();
+        let side = usize::from(info.place == Place::Table);
+        let free = info.variants[form].free;
+        let mut off = fit.model.effects;
+        off.of_mut(effect).copy_from_slice(Settings::default().of(effect));
+        let mut grid: Vec<Settings> = if effect.is_mode() {
+            let with = |mode: [f64; 3]| {
+                let mut s = off;
+                s.of_mut(effect)[..3].copy_from_slice(&mode);
+                s
+            };
+            modes(p, fit, reg, side).unwrap_or_default().into_iter().map(with).collect()
         } else {
-            own[i] = (q.off + step * b / c[0]).clamp(q.min, q.max);
-            if matches!(q.start, Start::Share) {
-                own[i] = own[i].clamp(-0.9, 0.9);
+            vec![off]
+        };
+        let mut order: Vec<usize> = free.to_vec();
+        order.sort_by_key(|&i| (info.parameters[i].role == Role::Shape, i));
+        for &i in &order {
+            let Start::Grid(scale, fractions) = info.parameters[i].start else { continue };
+            let found;
+            let fractions = match scale {
+                Scale::Order => {
+                    found = orders(p, fit, reg, side).unwrap_or_default();
+                    &found[..]
+                }
+                Scale::Frequency => {
+                    found = frequencies(p, reg, side);
+                    &found[..]
+                }
+                _ => fractions,
+            };
+            let mut next = Vec::new();
+            for s in &grid {
+                for &f in fractions {
+                    let mut t = *s;
+                    let v = scales.value(effect, scale, f);
+                    if !(v >= info.parameters[i].min && v <= info.parameters[i].max) {
+                        continue;
+                    }
+                    t.of_mut(effect)[i] = v;
+                    next.push(t);
+                }
+            }
+            grid = next;
+        }
+        let mut all: Vec<StartPoint> = grid.par_iter().filter_map(|s| self.start_at(scales, term, s)).collect();
+        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        all
+    }
+
+    /// The start of a form of an effect at some shapes, its sizes by regression.
+    fn start_at(&self, scales: &Scales, (effect, form): Term, shapes: &Settings) -> Option<StartPoint> {
+        let (p, fit) = (&self.problem, &self.fit);
+        let info = effect.info();
+        let free = info.variants[form].free;
+        if info.parameters.iter().all(|q| !matches!(q.start, Start::Linear))
+            && !scales.admit(p.record, &Model { effects: *shapes, ..fit.model }, std::iter::once(effect))
+        {
+            return None;
+        }
+        let rows_of = |s: &Settings| self.rows(effect, s);
+        let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
+            [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
+        };
+        let size =
+            |c: &[Vec<C>; 2]| (c.iter().flatten().map(|c| c.norm_sqr()).sum::<f64>() * 2.0 / p.band.n as f64).sqrt();
+        let target = 0.05 * scales.torque;
+        let sizes: Vec<usize> = free
+            .iter()
+            .copied()
+            .filter(|&i| info.parameters[i].role == Role::Size && matches!(info.parameters[i].start, Start::Linear))
+            .collect();
+        let mut columns: Vec<[Vec<C>; 2]> = Vec::new();
+        let mut signed = Vec::new();
+        let mut trial = Vec::new();
+        let mut at = *shapes;
+        for &i in &sizes {
+            let q = &info.parameters[i];
+            let mut v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
+            let mut column = None;
+            for _ in 0..2 {
+                let v1 = v.clamp(q.min, q.max);
+                let mut s = *shapes;
+                s.of_mut(effect)[i] = v1;
+                let r = rows_of(&s)?;
+                let c = difference(&r, &fit.rows.rows, 1.0);
+                let got = size(&c);
+                if got.is_nan() || got <= 0.0 {
+                    return None;
+                }
+                v = v1;
+                column = Some(c);
+                let ratio = target / got;
+                if ratio > 0.1 && ratio < 10.0 {
+                    break;
+                }
+                v *= ratio;
+            }
+            columns.push(column?);
+            signed.push(q.min < 0.0);
+            trial.push(v.clamp(q.min, q.max));
+            at.of_mut(effect)[i] = v.clamp(q.min, q.max);
+        }
+        if sizes.is_empty() {
+            // The size is among the shapes tried.
+            let r = rows_of(shapes)?;
+            columns.push(difference(&r, &fit.rows.rows, 1.0));
+            signed.push(false);
+        }
+        // Shapes that enter linearly beside the first size.
+        let mut extra = Vec::new();
+        let base = if sizes.len() == 1 { Some(columns[0].clone()) } else { None };
+        for &i in free {
+            let q = &info.parameters[i];
+            let step = match q.start {
+                Start::Share => 0.3,
+                Start::Phase => std::f64::consts::FRAC_PI_2,
+                Start::Linear if q.role == Role::Shape => {
+                    // A damping.
+                    let v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
+                    v.clamp(q.min, q.max)
+                }
+                _ => continue,
+            };
+            let mut s = at;
+            s.of_mut(effect)[i] = q.off + step;
+            let r = rows_of(&s)?;
+            let total = difference(&r, &fit.rows.rows, 1.0);
+            let c = if matches!(q.start, Start::Phase) { total } else { difference(&total, base.as_ref()?, 1.0) };
+            columns.push(c);
+            signed.push(true);
+            extra.push((i, step));
+        }
+        let (c, gain) = self.regression.solve(p, &columns, &signed)?;
+        let mut model = fit.model;
+        let own = model.effects.of_mut(effect);
+        own.copy_from_slice(at.of(effect));
+        if sizes.is_empty() {
+            // Only the first size follows the factor.
+            if let Some(&i) = free.iter().find(|&&i| info.parameters[i].role == Role::Size) {
+                own[i] = (own[i] * c[0].clamp(0.2, 5.0)).clamp(info.parameters[i].min, info.parameters[i].max);
             }
         }
+        for (j, &i) in sizes.iter().enumerate() {
+            own[i] = (trial[j] * c[j]).clamp(info.parameters[i].min, info.parameters[i].max);
+        }
+        for (e, &(i, step)) in extra.iter().enumerate() {
+            let b = c[columns.len() - extra.len() + e];
+            let q = &info.parameters[i];
+            if matches!(q.start, Start::Phase) {
+                // a*sin(x) + b*cos(x).
+                let (a0, t) = (c[0], trial[0]);
+                own[sizes[0]] = t * a0.hypot(b);
+                own[i] = b.atan2(a0);
+            } else {
+                own[i] = (q.off + step * b / c[0]).clamp(q.min, q.max);
+                if matches!(q.start, Start::Share) {
+                    own[i] = own[i].clamp(-0.9, 0.9);
+                }
+            }
+        }
+        if !scales.admit(p.record, &model, std::iter::once(effect)) {
+            return None;
+        }
+        Some(StartPoint { term: (effect, form), model, gain })
     }
-    if !scales.admit(p.record, &model, std::iter::once(effect)) {
-        return None;
-    }
-    Some(StartPoint { term: (effect, form), model, gain })
 }
 
 /// A size that makes about the record's torque, by its unit.
