@@ -26,10 +26,9 @@ impl Problem<'_> {
         along
     }
 
-    /// Whether simulated columns may be brought along from step to step. Of a rigid axis few are simulated, and what a third inertia swung
-    /// with at first is taken out anew with each step.
-    pub fn may_follow(&self, model: &Model) -> bool {
-        self.nominal.structure == Structure::TwoInertia && !has_mode(model)
+    /// Whether simulated columns may be brought along from step to step. Of a rigid axis few are simulated.
+    pub fn may_follow(&self) -> bool {
+        self.nominal.structure == Structure::TwoInertia
     }
 
     /// What a coordinate changes of what a model lacks, by a run of the model a step further.

@@ -300,7 +300,7 @@ impl<'a> Descent<'a> {
                 Secant::simulated(problem, at, coordinates)?
             }
         };
-        self.secant = problem.may_follow(&at.model).then(|| secant.clone());
+        self.secant = problem.may_follow().then(|| secant.clone());
         self.columns = secant.columns;
         scaled_with_the_table(band, coordinates, x, &at.rows, &mut self.columns);
         let stiffens = of_the_stiffness(coordinates, x);
