@@ -96,37 +96,41 @@ impl Record {
         [motor.or(table), table.or(motor)].map(Option::unwrap_or_default)
     }
 
-    /// The torque over part `j` of the `parts` equal ones of the interval that begins `ahead` seconds after sample `k`, N.m: of a held
-    /// torque that jumps within it the ramp of the same mean and first moment; before and after the record its first and last.
+    /// The torque over part `j` of the `parts` equal ones of the interval that begins `ahead` seconds after sample `k`, N.m: of one that
+    /// jumps or bends within it the ramp of the same mean and first moment; before and after the record its first and last.
     #[must_use]
     pub fn ramp(&self, k: usize, j: usize, parts: usize, ahead: f64) -> Ramp<f64> {
         let (instants, torque) = self.between.as_ref().map_or((1, &self.torque), |(m, t)| (*m, t));
         let last = torque.len() - 1;
+        let is_held = self.between.is_none() && self.hold == Hold::Zoh;
+        if is_held && ahead == 0.0 {
+            return Ramp::held(torque[k.min(last)]);
+        }
         let ahead = ahead / self.dt;
         let at = |i: usize| ((k as f64 + i as f64 / parts as f64) + ahead) * instants as f64;
         let (from, to) = (at(j), at(j + 1));
-        if self.between.is_none() && self.hold == Hold::Zoh {
-            let held = |i: usize| torque[i.min(last)];
-            // A part that ends at a sample ends there, whatever rounding says.
-            let (first, next) = ((from + ROUNDING) as usize, (to - ROUNDING) as usize);
-            if first >= next {
-                return Ramp::held(held(first));
-            }
-            let length = to - from;
-            let (mut mean, mut moment) = (0.0, 0.0);
-            for i in first..=next {
-                let (a, b) = ((i as f64).max(from), ((i + 1) as f64).min(to));
-                let (a, b) = ((a - from) / length, (b - from) / length);
-                mean += held(i) * (b - a);
-                moment += held(i) * (b - a) * 0.5 * (a + b);
-            }
-            return Ramp::from_moments(mean, moment);
-        }
-        let straight = |x: f64| {
-            let first = ((x + ROUNDING) as usize).min(last);
-            torque[first] + (torque[(first + 1).min(last)] - torque[first]) * (x - first as f64).min(1.0)
+        // A part that ends at an instant ends there, whatever rounding says.
+        let (first, next) = ((from + ROUNDING) as usize, (to - ROUNDING) as usize);
+        let logged = |i: usize| torque[i.min(last)];
+        let between = |i: usize, x: f64| {
+            if is_held { logged(i) } else { logged(i) + (logged(i + 1) - logged(i)) * (x - i as f64).min(1.0) }
         };
-        Ramp { start: straight(from), end: straight(to) }
+        // A straight torque is read at both ends of a part that is no longer than what it runs straight over.
+        let is_read_at_ends = first >= next || first >= last || (!is_held && to - from <= 1.0 + ROUNDING);
+        if is_read_at_ends {
+            let end = if is_held { first } else { (to + ROUNDING) as usize };
+            return Ramp { start: between(first, from), end: between(end, to) };
+        }
+        let length = to - from;
+        let (mut mean, mut moment) = (0.0, 0.0);
+        for i in first..=next {
+            let (a, b) = ((i as f64).max(from), ((i + 1) as f64).min(to));
+            let [start, end] = [a, b].map(|x| between(i, x));
+            let (begin, part) = ((a - from) / length, (b - a) / length);
+            mean += part * 0.5 * (start + end);
+            moment += part * (begin * 0.5 * (start + end) + part * (start / 6.0 + end / 3.0));
+        }
+        Ramp::from_moments(mean, moment)
     }
 
     /// Whether there is no sample.
@@ -183,5 +187,17 @@ mod tests {
         assert_eq!(record.ramp(0, 0, 2, 0.0), Ramp { start: 1.0, end: 2.0 });
         assert_eq!(record.ramp(0, 0, 1, 0.25), Ramp { start: 2.0, end: 5.0 });
         assert_eq!(record.ramp(1, 0, 1, 0.5), Ramp { start: 7.0, end: 7.0 });
+    }
+
+    #[test]
+    fn a_torque_that_bends_within_the_step_keeps_its_mean_and_first_moment() {
+        let between = Some((2, vec![0.0, 4.0, 2.0, 2.0]));
+        let record = Record { between, ..record(Hold::Linear, &[0.0, 2.0]) };
+        assert_eq!(record.ramp(0, 1, 2, 0.0), Ramp { start: 4.0, end: 2.0 });
+        // 8t up to the middle, 6 - 4t from there: the integrals of it and of it times t.
+        let Ramp { start, end } = record.ramp(0, 0, 1, 0.0);
+        assert!((0.5 * (start + end) - 2.5).abs() < 1e-12, "{start} {end}");
+        let moment = 8.0 / 24.0 + (6.0 * 3.0 / 8.0 - 4.0 * 7.0 / 24.0);
+        assert!((start / 6.0 + end / 3.0 - moment).abs() < 1e-12, "{start} {end} {moment}");
     }
 }

@@ -12,7 +12,9 @@ use super::inverse_dynamics::InverseDynamics;
 use super::likelihood::{Band, MotionSpectra, TorqueResidual};
 use super::model::{BaseParameter, Free, Model};
 use super::scales::Scales;
-use super::tracking::{Bandwidth, LARGEST, Resolution, Torques, Tracked, parts, track, track_step_by_step};
+use super::tracking::{
+    Bandwidth, LARGEST, Resolution, Torques, Tracked, steps_per_sample_at, track, track_step_by_step,
+};
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
@@ -34,6 +36,8 @@ pub struct Problem<'a> {
     pub nominal: Model,
     /// Range of theta1 and theta2 over the record, and its length: what a period is told by.
     pub range: [f64; 2],
+    /// Speeds of motor and table, rad/s, by which effects are stepped.
+    speeds: [f64; 2],
     /// Largest torque of the log, N.m: in its band a torque that jumps overshoots.
     pub peak: f64,
     pub scales: Option<Scales>,
@@ -72,6 +76,7 @@ impl<'a> Problem<'a> {
             band,
             nominal,
             range,
+            speeds: record.speeds(),
             peak: largest(&record.torque),
             scales: None,
             motion: band.motion(record).map(Arc::new),
@@ -121,21 +126,21 @@ impl Problem<'_> {
         self.steps.load(Ordering::Relaxed)
     }
 
-    /// Counts the steps of one run of a model.
-    fn count(&self, model: &Model) {
-        let steps = self.record.len() * parts(model, self.record, self.resolution);
+    /// Steps a sample of one run of a model, which are counted.
+    fn counted(&self, model: &Model) -> usize {
+        let per = steps_per_sample_at(model, self.record, self.speeds, self.resolution);
+        let steps = self.record.len() * per;
         self.steps.fetch_add(steps as u64, Ordering::Relaxed);
+        per
     }
 
     /// What a model lacks along the record, in time.
     pub fn track(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
-        self.count(model);
-        track(model, self.record, bandwidth, self.resolution)
+        track(model, self.record, bandwidth, self.counted(model))
     }
 
     fn track_step_by_step(&self, model: &Model, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
-        self.count(model);
-        track_step_by_step(model, self.record, bandwidth, self.resolution)
+        track_step_by_step(model, self.record, bandwidth, self.counted(model))
     }
 
     /// Motion of a fit along the record, `[theta1, omega1, theta2, omega2]` a sample.

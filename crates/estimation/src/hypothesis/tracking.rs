@@ -55,7 +55,7 @@ const DAMPING: f64 = 0.7;
 pub enum Resolution {
     /// As the axis itself asks.
     Full,
-    /// A quarter of that many steps: what a look needs that only ranks.
+    /// A quarter of that many steps, whatever the torque does within one: what a look needs that only ranks.
     Coarse,
 }
 
@@ -63,16 +63,24 @@ pub enum Resolution {
 const COARSER: usize = 4;
 
 /// Steps a sample: as many as effects and torque need.
-pub fn parts(model: &Model, record: &Record, resolution: Resolution) -> usize {
-    let full = substeps_at_speed(&model.parameters, model.structure, &model.effects, record.dt, record.speeds());
-    let steps = if resolution == Resolution::Full { full } else { full.div_ceil(COARSER) };
-    steps.next_multiple_of(record.instants())
+#[must_use]
+pub fn steps_per_sample(model: &Model, record: &Record, resolution: Resolution) -> usize {
+    steps_per_sample_at(model, record, record.speeds(), resolution)
 }
 
-/// Simulates the model held to the record; `None` when it leaves the finite numbers.
+/// The same where the record's speeds, rad/s, are known.
+pub fn steps_per_sample_at(model: &Model, record: &Record, speeds: [f64; 2], resolution: Resolution) -> usize {
+    let full = substeps_at_speed(&model.parameters, model.structure, &model.effects, record.dt, speeds);
+    match resolution {
+        Resolution::Full => full.next_multiple_of(record.instants()),
+        Resolution::Coarse => full.div_ceil(COARSER),
+    }
+}
+
+/// Simulates the model held to the record, in so many steps a sample ([`steps_per_sample`]); `None` when it leaves the finite numbers.
 #[must_use]
-pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth, resolution: Resolution) -> Option<Tracked> {
-    let held = Held { model, record, bandwidth, resolution };
+pub fn track(model: &Model, record: &Record, bandwidth: Bandwidth, per: usize) -> Option<Tracked> {
+    let held = Held { model, record, bandwidth, per };
     Some(held.track(&[], None)?.0)
 }
 
@@ -82,10 +90,10 @@ pub fn track_step_by_step(
     model: &Model,
     record: &Record,
     bandwidth: Bandwidth,
-    resolution: Resolution,
+    per: usize,
 ) -> Option<(Tracked, Trajectory)> {
-    let held = Held { model, record, bandwidth, resolution };
-    let mut trajectory = Trajectory::new(record, parts(model, record, resolution));
+    let held = Held { model, record, bandwidth, per };
+    let mut trajectory = Trajectory::new(record, per);
     let (tracked, _) = held.track(&[], Some(&mut trajectory))?;
     Some((tracked, trajectory))
 }
@@ -95,20 +103,20 @@ struct Held<'a> {
     model: &'a Model,
     record: &'a Record,
     bandwidth: Bandwidth,
-    resolution: Resolution,
+    /// Steps a sample.
+    per: usize,
 }
 
 impl Held<'_> {
     /// The torque that it lacks, with the effects' internal states at some samples, in order; its steps are added to a trajectory.
     fn track(&self, kept: &[usize], mut trajectory: Option<&mut Trajectory>) -> Option<(Tracked, Vec<Memory<f64>>)> {
-        let &Self { model, record, bandwidth, resolution } = self;
+        let &Self { model, record, bandwidth, per } = self;
         // What a log holds early is followed with the torque to come.
         let (model, ahead) = &model.on_time();
         let mut memories = Vec::with_capacity(kept.len());
         let n = record.len();
         let dt = record.dt;
         let rigid = model.structure == Structure::Rigid;
-        let per = parts(model, record, resolution);
         let h = dt / per as f64;
         let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
         let p = &model.parameters;
@@ -317,6 +325,8 @@ pub struct FreeRun {
     /// `[theta1, omega1, theta2, omega2]`.
     pub motion: [f64; 4],
     memory: Memory<f64>,
+    /// Steps a sample.
+    per: usize,
 }
 
 /// Bandwidth of the feedback that finds the states at which runs start, as a share of the sampling rate.
@@ -325,14 +335,15 @@ const STARTING: f64 = 0.1;
 /// States of a model held to the record, at some samples.
 #[must_use]
 pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<FreeRun> {
-    let held = Held { model, record, bandwidth: [STARTING / record.dt; 2], resolution: Resolution::Full };
+    let per = steps_per_sample(model, record, Resolution::Full);
+    let held = Held { model, record, bandwidth: [STARTING / record.dt; 2], per };
     match held.track(samples, None) {
         Some((t, memories)) => {
-            samples.iter().zip(memories).map(|(&k, memory)| FreeRun { motion: t.motion[k], memory }).collect()
+            samples.iter().zip(memories).map(|(&k, memory)| FreeRun { motion: t.motion[k], memory, per }).collect()
         }
         None => {
-            let first = initial(record);
-            samples.iter().map(|_| FreeRun { motion: first, memory: [0.0; crate::effects::MEMORY] }).collect()
+            let motion = initial(record);
+            samples.iter().map(|_| FreeRun { motion, memory: [0.0; crate::effects::MEMORY], per }).collect()
         }
     }
 }
@@ -348,7 +359,7 @@ impl FreeRun {
         motion: [f64; 4],
     ) -> Vec<[f64; 4]> {
         let (model, ahead) = &model.on_time();
-        let per = parts(model, record, Resolution::Full);
+        let per = self.per;
         let h = record.dt / per as f64;
         let axis = Axis::new(model.parameters, model.structure, model.effects, Scheme::Exact, h);
         let mut state = axis.resume(motion, &self.memory, record.time(range.start) + ahead);
