@@ -5,6 +5,8 @@
 //! measured motion, and what it lacks is counted ([`crate::hypothesis::tracking`]). All three models have the same freedom in each. The headline is
 //! the first of the three by which the best model follows the record.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Vector4};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -53,14 +55,16 @@ pub struct Gap {
     /// The models' readings, as given and at its best; in torque what the equations of motor and table lack, windowed.
     pub runs: [Vec<[f64; 4]>; 2],
     /// Samples that the runs cover.
-    pub covered: Vec<std::ops::Range<usize>>,
+    pub covered: Vec<Range<usize>>,
     /// State of the best model at the record's first sample.
     pub initial: [f64; 4],
+    /// Mean square of what the model as given leaves, over that of the signals.
+    given: f64,
 }
 
 /// Runs of a model over pieces of the record, each from a state fitted to it.
 struct Pieces {
-    ranges: Vec<std::ops::Range<usize>>,
+    ranges: Vec<Range<usize>>,
     readings: Vec<Vec<[f64; 4]>>,
     errors: Vec<Errors>,
     initial: [f64; 4],
@@ -80,8 +84,8 @@ impl Gaps {
     pub fn measure(record: &Record, seen: &Prepared, fits: [&Fit; 3]) -> Self {
         let models = fits.map(|f| f.model);
         Self {
-            free_run: free_run(record, &models),
-            windows: in_windows(record, &models),
+            free_run: along_runs(record, &models, ClosureOf::FreeRun),
+            windows: along_runs(record, &models, ClosureOf::Windows),
             torque: in_torque(seen, fits),
         }
     }
@@ -129,27 +133,57 @@ impl Gap {
     }
 }
 
-/// Closure of the gap from the model as given by one way alone.
+/// Closure of the gap from the model as given by one way alone, of the last of three fits, where that of another is `known`.
 #[must_use]
-pub fn closure_by(of: ClosureOf, record: &Record, seen: &Prepared, fits: [&Fit; 3]) -> f64 {
-    let models = || fits.map(|f| f.model);
-    match of {
-        ClosureOf::FreeRun => free_run(record, &models()).closure,
-        ClosureOf::Windows => in_windows(record, &models()).closure,
-        ClosureOf::Torque => in_torque(seen, fits).closure,
+pub fn closure_by(known: &Gap, record: &Record, seen: &Prepared, fits: [&Fit; 3]) -> f64 {
+    if known.of == ClosureOf::Torque {
+        return in_torque(seen, fits).closure;
     }
+    let signals = Signals::of(record);
+    let left = signals.mean(&pieces(record, &fits[2].model, &stretches(record, known.of)));
+    closure(known.given, signals.weighed(&left), signals.floor)
 }
 
-fn free_run(record: &Record, models: &[Model; 3]) -> Gap {
-    let whole = std::iter::once(0..record.len()).collect::<Vec<_>>();
-    let runs: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &whole)).collect();
-    gap(record, &runs, ClosureOf::FreeRun)
+/// The gap along runs of the models.
+fn along_runs(record: &Record, models: &[Model; 3], of: ClosureOf) -> Gap {
+    let ranges = stretches(record, of);
+    let runs: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &ranges)).collect();
+    gap(record, &runs, of)
 }
 
-fn in_windows(record: &Record, models: &[Model; 3]) -> Gap {
-    let cut = windows(record.len());
-    let runs: Vec<Pieces> = models.par_iter().map(|m| pieces(record, m, &cut)).collect();
-    gap(record, &runs, ClosureOf::Windows)
+/// Stretches of a record that models run over, each from a state of its own.
+fn stretches(record: &Record, of: ClosureOf) -> Vec<Range<usize>> {
+    if of == ClosureOf::Windows { windows(record.len()) } else { std::iter::once(0..record.len()).collect() }
+}
+
+/// The measured signals as errors are told of them.
+struct Signals {
+    /// Channels that there are.
+    present: Vec<usize>,
+    /// Rms of each, rad and rad/s.
+    rms: [f64; 4],
+    /// Mean square of the noise, over that of the signals.
+    floor: f64,
+}
+
+impl Signals {
+    fn of(record: &Record) -> Self {
+        let present: Vec<usize> = (0..4).filter(|c| record.channels[*c].is_some()).collect();
+        let rms = [0, 1, 2, 3].map(|c| signal_rms(record, c).max(f64::MIN_POSITIVE));
+        let floor = present.iter().map(|&c| (record.noise[c] / rms[c]).powi(2)).sum();
+        Self { present, rms, floor }
+    }
+
+    /// Mean squared error of runs, by channel.
+    fn mean(&self, runs: &Pieces) -> Errors {
+        let samples: usize = runs.ranges.iter().map(Range::len).sum();
+        runs.errors.iter().fold(Errors::zeros(), |a, b| a + b) / samples as f64
+    }
+
+    /// The same of all channels, over the signals' squares.
+    fn weighed(&self, e: &Errors) -> f64 {
+        self.present.iter().map(|&c| e[c] / self.rms[c].powi(2)).sum()
+    }
 }
 
 /// What each fit lacks of the torque, in the band of the motion, in parts of the record.
@@ -157,7 +191,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
     let (record, band) = (&seen.record, &seen.band);
     let n = record.len();
     let parts = (n / WINDOW).max(LEAST_PARTS).min(n);
-    let ranges: Vec<std::ops::Range<usize>> = (0..parts).map(|p| p * n / parts..(p + 1) * n / parts).collect();
+    let ranges: Vec<Range<usize>> = (0..parts).map(|p| p * n / parts..(p + 1) * n / parts).collect();
     let weights = band.weights(&fits[2].model);
     let (errors, residuals): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
         .par_iter()
@@ -174,7 +208,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
                 vibration.take_out(band, &weights, fits[2].discrepancy, &mut rows);
             }
             let series = [0, 1].map(|i| band.in_time(&rows[i]));
-            let power = |i: usize, r: &std::ops::Range<usize>| -> f64 {
+            let power = |i: usize, r: &Range<usize>| -> f64 {
                 series[i].get(r.clone()).map_or(0.0, |s| s.iter().map(|v| v * v).sum())
             };
             let errors = ranges.iter().map(|r| Errors::new(power(0, r), power(1, r), 0.0, 0.0)).collect();
@@ -209,17 +243,18 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
         runs: [residuals[0].clone(), residuals[2].clone()],
         covered: ranges,
         initial: [0.0; 4],
+        given: total[0],
     }
 }
 
 /// Windows of the record, at most [`MOST`].
-fn windows(n: usize) -> Vec<std::ops::Range<usize>> {
+fn windows(n: usize) -> Vec<Range<usize>> {
     let count = (n / WINDOW).max(1);
     let all = |w: usize| w * n / count..(w + 1) * n / count;
     if count <= MOST { (0..count).map(all).collect() } else { (0..MOST).map(|i| all(i * count / MOST)).collect() }
 }
 
-fn pieces(record: &Record, model: &Model, ranges: &[std::ops::Range<usize>]) -> Pieces {
+fn pieces(record: &Record, model: &Model, ranges: &[Range<usize>]) -> Pieces {
     let begins: Vec<usize> = ranges.iter().map(|r| r.start).collect();
     let starts = start_states(model, record, &begins);
     let done: Vec<(Vec<[f64; 4]>, [f64; 4])> =
@@ -254,7 +289,7 @@ const SETTLING: usize = 3;
 fn with_fitted_start(
     record: &Record,
     model: &Model,
-    range: &std::ops::Range<usize>,
+    range: &Range<usize>,
     start: &FreeRun,
 ) -> (Vec<[f64; 4]>, [f64; 4]) {
     let weight = record.noise.map(|s| 1.0 / s.max(f64::MIN_POSITIVE));
@@ -338,13 +373,11 @@ fn with_fitted_start(
 
 fn gap(record: &Record, pieces: &[Pieces], of: ClosureOf) -> Gap {
     let ranges = &pieces[0].ranges;
-    let counts: f64 = ranges.iter().map(|r| r.len() as f64).sum();
-    let present: Vec<usize> = (0..4).filter(|c| record.channels[*c].is_some()).collect();
-    let scale: Vec<f64> = (0..4).map(|c| signal_rms(record, c)).collect();
-    let total: Vec<Errors> =
-        pieces.iter().map(|p| p.errors.iter().fold(Errors::zeros(), |a, b| a + b) / counts).collect();
-    let relative = |v: f64, c: usize| finite(v.max(0.0).sqrt() / scale[c].max(f64::MIN_POSITIVE));
-    let signals = present
+    let scale = Signals::of(record);
+    let total: Vec<Errors> = pieces.iter().map(|p| scale.mean(p)).collect();
+    let relative = |v: f64, c: usize| finite(v.max(0.0).sqrt() / scale.rms[c]);
+    let signals = scale
+        .present
         .iter()
         .map(|&c| {
             let noise_floor = relative(record.noise[c].powi(2), c);
@@ -357,11 +390,11 @@ fn gap(record: &Record, pieces: &[Pieces], of: ClosureOf) -> Gap {
             (CHANNELS[c], levels)
         })
         .collect();
-    let weigh = |e: &Errors| present.iter().map(|&c| e[c] / scale[c].max(f64::MIN_POSITIVE).powi(2)).sum::<f64>();
-    let combine = |e: f64| finite((e / present.len() as f64).sqrt());
-    let floor: f64 = present.iter().map(|&c| record.noise[c].powi(2) / scale[c].max(f64::MIN_POSITIVE).powi(2)).sum();
-    let closure_of = |from: &Errors, to: &Errors| closure(weigh(from), weigh(to), floor);
-    let [before, reidentified, after] = [0, 1, 2].map(|m| combine(weigh(&total[m])));
+    let combine = |e: f64| finite((e / scale.present.len() as f64).sqrt());
+    let floor = scale.floor;
+    let closure_of = |from: &Errors, to: &Errors| closure(scale.weighed(from), scale.weighed(to), floor);
+    let weighed = [0, 1, 2].map(|m: usize| scale.weighed(&total[m]));
+    let [before, reidentified, after] = weighed.map(combine);
     let interval = bootstrap(ranges, [&pieces[0].errors, &pieces[2].errors], &closure_of);
     let flat = |p: &Pieces| p.readings.iter().flatten().copied().collect();
     Gap {
@@ -369,7 +402,7 @@ fn gap(record: &Record, pieces: &[Pieces], of: ClosureOf) -> Gap {
         figures: Figures {
             combined: Levels { before, reidentified, after, noise_floor: combine(floor) },
             signals,
-            multiples: [0, 1, 2].map(|m| finite((weigh(&total[m]) / floor).sqrt())),
+            multiples: weighed.map(|e| finite((e / floor).sqrt())),
         },
         closure: closure_of(&total[0], &total[2]),
         closure_of_effect: closure_of(&total[1], &total[2]),
@@ -377,6 +410,7 @@ fn gap(record: &Record, pieces: &[Pieces], of: ClosureOf) -> Gap {
         runs: [flat(&pieces[0]), flat(&pieces[2])],
         covered: ranges.clone(),
         initial: pieces[2].initial,
+        given: weighed[0],
     }
 }
 
@@ -400,7 +434,7 @@ fn closure(before: f64, after: f64, floor: f64) -> f64 {
 
 /// Block bootstrap (Kunsch, Ann. Statist. 17(3), 1989): 95 % interval of the closure.
 fn bootstrap(
-    ranges: &[std::ops::Range<usize>],
+    ranges: &[Range<usize>],
     errors: [&[Errors]; 2],
     closure_of: &dyn Fn(&Errors, &Errors) -> f64,
 ) -> [f64; 2] {
@@ -442,6 +476,7 @@ mod tests {
             runs: [Vec::new(), Vec::new()],
             covered: Vec::new(),
             initial: [0.0; 4],
+            given: 1.0,
         }
     }
 

@@ -78,7 +78,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let on_held = Gaps::measure(&held, &seen, fits);
     progress("where");
     let located = located(&searched, &models[1], decision.parameters.bandwidth);
-    let closure = |of, fit: &Fit| gap::closure_by(of, &held, &seen, [fits[0], fits[1], fit]);
+    let closure = |of, fit: &Fit| gap::closure_by(on_held.by(of), &held, &seen, [fits[0], fits[1], fit]);
     let mut diagnosis = build(case, &decision, &searched, &closure, &on_train, &on_held, located);
     quantisation::attribute(case, &mut diagnosis);
     let mut overlays = overlays(&held, on_held.shown());

@@ -336,6 +336,9 @@ const STARTING: f64 = 0.1;
 #[must_use]
 pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<FreeRun> {
     let per = steps_per_sample(model, record, Resolution::Full);
+    // Nothing after the last of them is asked.
+    let needed = samples.iter().max().map_or(0, |last| last + WARM).min(record.len());
+    let record = &record.part(0..needed);
     let held = Held { model, record, bandwidth: [STARTING / record.dt; 2], per };
     match held.track(samples, None) {
         Some((t, memories)) => {
