@@ -4,6 +4,7 @@
 //! command that the drive needs for it says what the model leaves out. This looks at a record from the other side than
 //! the free-running windows do: nothing but the reference is given to the model, and no initial state is fitted.
 
+use super::material::DISTINCT;
 use super::{Decision, Fit};
 use crate::axis::{Axis, Scheme, substeps};
 use crate::conditioning::Record;
@@ -11,11 +12,6 @@ use crate::effects::{Ramp, Reading, TorqueHistory};
 use crate::hypothesis::Hypothesis;
 use crate::hypothesis::model::Model;
 use crate::trace::Controller;
-
-/// A hypothesis closes as much as another when their closures differ by less than this.
-const MATERIAL: f64 = 0.005;
-/// Samples of commands kept for a drive's delay.
-const DELAY: usize = Controller::MOST_DELAY + 1;
 
 /// A record under control.
 #[derive(Debug, Clone, Copy)]
@@ -123,7 +119,7 @@ impl UnderControl<'_> {
         let mut torques = TorqueHistory::default();
         let mut drive = crate::drive::Drive::default();
         let mut before = theta - omega * dt;
-        let mut sent = [self.command.first().copied().unwrap_or_default(); DELAY];
+        let mut sent = [self.command.first().copied().unwrap_or_default(); Controller::MOST_DELAY + 1];
         for (k, &reference) in self.reference.iter().enumerate() {
             let reading =
                 if on.sensors().is_empty() { state.reading() } else { effects.transform_sensor(on, &seen, dt) };
@@ -132,7 +128,7 @@ impl UnderControl<'_> {
             before = position;
             sent.rotate_right(1);
             sent[0] = drive.sample(&self.controller.gains, reference, position, speed, dt);
-            let torque = sent[self.controller.delay.min(DELAY - 1)];
+            let torque = sent[self.controller.delay.min(Controller::MOST_DELAY)];
             visit(k, &Sample { command: sent[0], torque, reading });
             for j in 0..per {
                 let held = Ramp { start: torque, end: torque };
@@ -189,7 +185,7 @@ impl UnderControl<'_> {
             reidentified: of(&decision.parameters.model),
             after,
             closure: closure(&after),
-            agrees: ranking.first().is_none_or(|best| best.closure <= closure(&after) + MATERIAL),
+            agrees: ranking.first().is_none_or(|best| best.closure <= closure(&after) + DISTINCT),
             ranking,
             commands,
         }

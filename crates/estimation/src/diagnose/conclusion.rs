@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::diagnosis::Undecided;
-use super::material::{MATERIAL, MINOR};
+use super::material::{MATERIAL, MINOR, NEAR_THE_NOISE};
 use super::moves::MOVED_WITH_EFFECTS;
 use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
@@ -24,11 +24,8 @@ const GAIN_SEEN: f64 = 0.02;
 const DOUBT: f64 = 0.5;
 /// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
-/// Noises up to which what is left may be the encoders' own, where it is no more torque than they make: of another colour than the one
-/// that is told at the sampling rate (1/f) a noise has several times as much at the motion's.
-const COLOUR: f64 = 10.0;
-/// Hypotheses that are reported.
-const RANKED: usize = 40;
+/// Hypotheses that are told, each with its own run over the held-out data.
+pub const REPORTED: usize = 12;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.6;
 
@@ -138,12 +135,12 @@ impl Search<'_> {
         };
         let chosen = finished;
         let Weighing { mut ranking, twins, probabilities, .. } = weighing;
-        ranking.truncate(RANKED);
         let shares = self.shares(&chosen);
         let effects = |i: usize| instead(&ranking, &chosen, i, twins[i]);
         let undecided = open.map(|i| Undecided { effects: effects(i), share_of_gap: shares[i] });
         let twins = twins.into_iter().flatten().filter(|t| t.difference < ALIKE);
         let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent), twins);
+        ranking.truncate(REPORTED);
         let cut_short = self.cut_short.load(Ordering::Relaxed);
         Decision {
             verdict,
@@ -249,7 +246,7 @@ impl Search<'_> {
     fn needs_no_cause(&self, fit: &Fit) -> bool {
         let left = self.left(fit);
         let of_noise = self.band().torque_share([0, 1].map(|i| self.band().noise_power(i)), self.problem.record);
-        left <= UNCAUSED || left <= of_noise && self.band().noise_multiple(&fit.rows) < COLOUR
+        left <= UNCAUSED || left <= of_noise && self.band().noise_multiple(&fit.rows) < NEAR_THE_NOISE
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted

@@ -25,14 +25,10 @@ use crate::numerics::level::deviation;
 
 /// Samples in a window.
 const WINDOW: usize = 512;
-/// Windows at most: a longer record is sampled by so many, spread evenly.
+/// Windows at most: a longer record is sampled by so many, spread evenly. As many parts has the residual torque, for its interval.
 const MOST: usize = 32;
-/// Parts of a record at least, for the interval of the residual torque.
-const LEAST_PARTS: usize = 16;
 /// Resamplings of the block bootstrap.
 const RESAMPLINGS: usize = 400;
-/// Its seed: the interval is the same from run to run.
-const SEED: u64 = 20_060_718;
 /// Error of a free run, as a share of the signal, up to which it says more than how fast a model drifts away.
 const TRACKING: f64 = 0.5;
 
@@ -190,7 +186,7 @@ impl Signals {
 fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
     let (record, band) = (&seen.record, &seen.band);
     let n = record.len();
-    let parts = (n / WINDOW).max(LEAST_PARTS).min(n);
+    let parts = MOST.min(n);
     let ranges: Vec<Range<usize>> = (0..parts).map(|p| p * n / parts..(p + 1) * n / parts).collect();
     let weights = band.weights(&fits[2].model);
     let (errors, residuals): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
@@ -439,7 +435,8 @@ fn bootstrap(
     closure_of: &dyn Fn(&Errors, &Errors) -> f64,
 ) -> [f64; 2] {
     let n = ranges.len();
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    // The interval is the same from run to run.
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut values: Vec<f64> = (0..RESAMPLINGS)
         .map(|_| {
             let (mut from, mut to, mut count) = (Errors::zeros(), Errors::zeros(), 0.0);

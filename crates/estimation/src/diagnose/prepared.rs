@@ -1,9 +1,12 @@
 //! A record made ready for the search: in the band of its motion, at the rate of that band, its noise seen through the axis as it is.
 
+use std::f64::consts::FRAC_PI_2;
+
 use rayon::prelude::*;
 
 use super::assess::Case;
 use super::gap::Gap;
+use super::material::NEAR_THE_NOISE;
 use super::overlay::Overlay;
 use super::search::Search;
 use crate::axis::Structure;
@@ -11,7 +14,7 @@ use crate::conditioning::{Record, TORQUE};
 use crate::effects::Effect;
 use crate::hypothesis::band::{self, Rate, Reach};
 use crate::hypothesis::discrepancy::Discrepancy;
-use crate::hypothesis::fit::Fit;
+use crate::hypothesis::fit::{Fit, STEPS};
 use crate::hypothesis::likelihood::Band;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::problem::{Problem, largest};
@@ -19,9 +22,6 @@ use crate::numerics::level::deviation;
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
 const SEARCHED: usize = 16_384;
-
-/// Steps of the fit through which a band sees its noise.
-const REFERRED: usize = 24;
 
 /// Share of a window's height from which what it shows is drawn.
 const OPEN: f64 = 0.5;
@@ -41,12 +41,6 @@ pub struct Prepared {
     pub peak: f64,
 }
 
-/// Noises up to which the parameters alone follow a record that is searched at its own rate: the one of the band is not that exact.
-const EXACT: f64 = 10.0;
-
-/// Turn of the axis' own vibration in a sample, rad, up to which both of its sides can be held to a record: a quarter.
-const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
-
 /// The record in the band of its motion, as fast as it can be searched; and as exact as it can be, where accounts near the noise are
 /// settled, if that is something else.
 pub fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option<Prepared>) {
@@ -54,8 +48,9 @@ pub fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Op
     let limit = band::limit(&whole, &band::mask(&whole, nominal.structure), reach);
     let [exact, fast] = match nominal.structure {
         Structure::Rigid => [false, true].map(|straight| Rate { longest: f64::INFINITY, straight }),
+        // Both sides can be held to a record in which the axis' own vibration turns by up to a quarter in a sample.
         Structure::TwoInertia => {
-            [0.0, QUARTER / nominal.parameters.modal().wn].map(|longest| Rate { longest, straight: false })
+            [0.0, FRAC_PI_2 / nominal.parameters.modal().wn].map(|longest| Rate { longest, straight: false })
         }
     };
     let peak = largest(&record.torque);
@@ -67,7 +62,8 @@ pub fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Op
     let alike = slow.len() == own.len() && slow.instants() == own.instants();
     let referred = |record, rate, known: Option<&Model>| referred(record, nominal, known, limit, rate, peak);
     let (own, left) = referred(own, exact, None);
-    if alike || left < EXACT {
+    // A record that the parameters alone follow is searched at its own rate: the one of the band is not that exact.
+    if alike || left < NEAR_THE_NOISE {
         return (own, None);
     }
     let (slow, left) = referred(slow, fast, Some(&own.reference));
@@ -88,8 +84,8 @@ fn referred(
     let plain = Band::new(&record, nominal, limit, &mask);
     let problem = Problem::new(&record, &plain, *nominal);
     let fit = match known {
-        Some(known) => problem.parameters(known, [f64::MAX; 2], REFERRED),
-        None => problem.parameters_of_any_stiffness([f64::MAX; 2], REFERRED),
+        Some(known) => problem.parameters(known, [f64::MAX; 2], STEPS),
+        None => problem.parameters_of_any_stiffness([f64::MAX; 2], STEPS),
     };
     let left = fit.as_ref().map_or(f64::INFINITY, |f| plain.noise_multiple(&f.rows));
     let reference = fit.map_or(*nominal, |f| f.model);

@@ -13,7 +13,7 @@ use super::conclusion::Decision;
 use super::diagnosis::ClosureOf;
 use super::gap::{self, Gaps};
 use super::location::without_offset;
-use super::material::{NEGLIGIBLE, is_materially_less};
+use super::material::{NEAR_THE_NOISE, NEGLIGIBLE, is_materially_less};
 use super::prepared::{Prepared, prepared};
 use super::quantisation;
 use super::residual::located;
@@ -25,13 +25,9 @@ use crate::effects::Effect;
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::Fit;
 
-/// Noises that an account at the rate of the band may leave for it to be settled at the record's own.
-const NEAR: f64 = 30.0;
 /// Share of the torque that an account of a rigid axis leaves at most where the band that its motion rules is understood so far that what
 /// it lacks may be the edge of a cause that lies beyond.
 const UNDERSTOOD: f64 = 0.1;
-/// Hypotheses that are told, each with its own run over the held-out data.
-pub const REPORTED: usize = 12;
 
 /// Diagnoses a record.
 #[must_use]
@@ -40,7 +36,9 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
-    let near = |d: &Decision, p: &Prepared| !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR;
+    let near = |d: &Decision, p: &Prepared| {
+        !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR_THE_NOISE
+    };
     let refined = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
         let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
@@ -124,8 +122,7 @@ fn split(case: &Case<'_>) -> (Record, Record) {
 
 /// The effects of the likeliest hypotheses.
 fn likely(decision: &Decision) -> Vec<Effect> {
-    let mut effects: Vec<Effect> =
-        decision.ranking.iter().take(REPORTED).flat_map(|w| w.fit.terms.iter().map(|t| t.0)).collect();
+    let mut effects: Vec<Effect> = decision.ranking.iter().flat_map(|w| w.fit.terms.iter().map(|t| t.0)).collect();
     effects.sort_unstable();
     effects.dedup();
     effects

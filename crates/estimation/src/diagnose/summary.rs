@@ -9,7 +9,6 @@ use super::gap::{Gap, Gaps};
 use super::location::Location;
 use super::overlay::Overlay;
 use super::prepared::Prepared;
-use super::procedure::REPORTED;
 use super::residual::remains;
 use super::verdict::Verdict;
 use super::weighing::LIKELY;
@@ -35,7 +34,6 @@ pub fn build(
     let ranking = decision
         .ranking
         .par_iter()
-        .take(REPORTED)
         .map(|w| Ranked {
             hypothesis: w.fit.hypothesis(),
             site: w.fit.terms.first().map(|t| Site::of(t.0.info().place, structure)),

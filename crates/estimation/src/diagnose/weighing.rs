@@ -1,13 +1,12 @@
 //! What the record says for each effect of a hypothesis, weighed among all that were tried; and which of several effects stays open.
 
+use super::search::ALIKE;
 use crate::effects::Effect;
 use crate::hypothesis::fit::Fit;
 use crate::numerics::distribution::of_log_odds;
 
 /// Probability from which an effect may be named: more likely than not, and by more than one of two that are alike is by rounding.
 pub const LIKELY: f64 = 0.55;
-/// Probability from which a hypothesis is told beside likelier ones.
-const POSSIBLE: f64 = 0.05;
 
 /// A hypothesis with its evidence.
 #[derive(Debug, Clone)]
@@ -141,7 +140,7 @@ fn one_instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> f64 {
 /// The effects that stand in the place of that one in the likely ones of these hypotheses or are its twin, and itself first.
 pub fn instead(ranking: &[Weighed], chosen: &Fit, i: usize, twin: Option<Confusable>) -> Vec<Effect> {
     let mut effects = vec![chosen.terms[i].0];
-    for w in with_one_instead(ranking, chosen, i).filter(|w| w.probability >= POSSIBLE) {
+    for w in with_one_instead(ranking, chosen, i).filter(|w| w.probability.ln() >= -ALIKE) {
         let like = |e: Effect, of: Effect| e.info().family == of.info().family;
         let other = |e: &Effect| others(chosen, i).all(|o| !like(*e, o)) && effects.iter().all(|k| !like(*e, *k));
         let found: Vec<Effect> = w.fit.terms.iter().map(|t| t.0).filter(other).collect();

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use rustfft::{FftPlanner, num_complex::Complex};
 
-use super::Side;
+use super::{CELLS, Side};
 
 /// Part of a residual in a class of lines, or in a band.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,10 +50,6 @@ pub enum PartOf {
     Band,
 }
 
-/// Bands of a spectrum without lines.
-const BANDS: usize = 20;
-/// Orders of the turn that are tracked.
-const ORDERS: usize = 12;
 /// A line is excited when it has this share of the amplitude of the largest.
 const EXCITED: f64 = 1e-2;
 
@@ -162,10 +158,10 @@ fn by_bands(side: Side, residual: &[f64], dt: f64) -> Vec<FrequencyPart> {
     );
     let total = energy.iter().sum::<f64>() + mean * mean;
     let resolution = 1.0 / (n as f64 * dt);
-    let edge = |i: usize| (energy.len() as f64).powf(i as f64 / BANDS as f64).floor() as usize;
-    let mut parts = Vec::with_capacity(BANDS + 1);
+    let edge = |i: usize| (energy.len() as f64).powf(i as f64 / CELLS as f64).floor() as usize;
+    let mut parts = Vec::with_capacity(CELLS + 1);
     parts.extend(part(side, PartOf::Mean, std::iter::once(0), &[mean * mean], resolution, total));
-    for i in 0..BANDS {
+    for i in 0..CELLS {
         parts.extend(part(
             side,
             PartOf::Band,
@@ -190,7 +186,7 @@ fn by_orders(side: Side, residual: &[f64], theta1: &[f64], dt: f64) -> Vec<Frequ
     }
     let mean = residual.iter().sum::<f64>() / n as f64;
     let rate = (high - low) / (n as f64 * dt * TAU);
-    (1..=ORDERS)
+    (1..=CELLS)
         .filter(|h| *h as f64 * turns >= 2.0)
         .filter_map(|h| {
             // Normal equations of [1, cos, sin].

@@ -3,10 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::Side;
-
-/// Bins of a curve.
-const BINS: usize = 24;
+use super::{CELLS, Side};
 
 /// One bin.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +64,7 @@ pub fn within_turn(angles: &[f64]) -> Vec<f64> {
 #[must_use]
 pub fn curve(residual: Side, r: &[f64], against: StateVariable, x: &[f64]) -> Option<StateCurve> {
     let n = r.len();
-    if n < 4 * BINS {
+    if n < 4 * CELLS {
         return None;
     }
     let mut order: Vec<usize> = (0..n).collect();
@@ -77,10 +74,10 @@ pub fn curve(residual: Side, r: &[f64], against: StateVariable, x: &[f64]) -> Op
     }
     let total_mean = r.iter().sum::<f64>() / n as f64;
     let total: f64 = r.iter().map(|v| (v - total_mean).powi(2)).sum();
-    let mut bins = Vec::with_capacity(BINS);
+    let mut bins = Vec::with_capacity(CELLS);
     let mut between = 0.0;
-    for i in 0..BINS {
-        let members = &order[i * n / BINS..(i + 1) * n / BINS];
+    for i in 0..CELLS {
+        let members = &order[i * n / CELLS..(i + 1) * n / CELLS];
         let count = members.len();
         let mean = members.iter().map(|k| r[*k]).sum::<f64>() / count as f64;
         let variance = members.iter().map(|k| (r[*k] - mean).powi(2)).sum::<f64>() / count as f64;

@@ -1,9 +1,7 @@
 //! The residual in time: a drift, an event, or throughout.
 
+use super::CELLS;
 use crate::numerics::level::rms;
-
-/// Slots of a record.
-const SLOTS: usize = 20;
 
 /// One slot.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +35,7 @@ pub enum Spread {
 #[must_use]
 pub fn by_time(start: f64, dt: f64, r1: &[f64], r2: Option<&[f64]>, at_place: &[f64]) -> Vec<TimeSlot> {
     let n = r1.len();
-    let slots = SLOTS.min(n);
+    let slots = CELLS.min(n);
     (0..slots)
         .map(|i| {
             let range = i * n / slots..(i + 1) * n / slots;

@@ -19,6 +19,9 @@ use crate::diagnose::diagnosis::Site;
 use crate::effects::Place;
 use crate::numerics::level::rms;
 
+/// Parts that a residual is told in: of the record in time, of its frequencies, of a state; and orders of the motor's turn looked at.
+const CELLS: usize = 20;
+
 /// Which of the residual torques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
