@@ -20,6 +20,14 @@ pub(super) fn quantile(values: impl ExactSizeIterator<Item = f64>, share: f64) -
     *sizes.select_nth_unstable_by(index, f64::total_cmp).1
 }
 
+/// Median of the magnitudes of a normal noise over its standard deviation.
+const MEDIAN: f64 = 0.6745;
+
+/// Standard deviation of the white noise on a smooth column: second differences hold six times its variance, and next to nothing of a motion.
+pub(super) fn noise(values: &[f64]) -> f64 {
+    quantile(values.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]), 0.5) / (MEDIAN * 6.0_f64.sqrt())
+}
+
 /// Quantisation step of a column: the smallest difference of neighbouring samples that is neither zero nor rounding.
 pub(super) fn step(values: &[f64]) -> f64 {
     let large = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));

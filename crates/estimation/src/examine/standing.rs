@@ -4,7 +4,7 @@
 
 use super::Input;
 use super::finding::{Finding, Severity};
-use super::robust::quantile;
+use super::robust::noise;
 use super::spectra::Spectra;
 
 /// Blocks that a record is cut into, and the least samples of one: their means have a quarter of the encoder's noise or less.
@@ -12,8 +12,6 @@ const BLOCKS: usize = 100;
 const LEAST: usize = 16;
 /// Standard errors of a difference of two means up to which it is noise: of a hundred pairs one in a hundred and sixty records has one beyond.
 const NOISE: f64 = 4.0;
-/// Median of the magnitudes of a normal noise over its standard deviation.
-const MEDIAN: f64 = 0.6745;
 /// Segments of the spectra of torque and table.
 const SEGMENTS: usize = 8;
 
@@ -26,9 +24,7 @@ pub(super) fn held_share(input: &Input<'_>) -> f64 {
     if n < 2 * size || table_follows(input) {
         return 0.0;
     }
-    // Second differences hold six times the variance of a white noise, and next to nothing of a motion.
-    let noise = quantile(x.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]), 0.5) / (MEDIAN * 6.0_f64.sqrt());
-    let apart = NOISE * noise * (2.0 / size as f64).sqrt();
+    let apart = NOISE * noise(x) * (2.0 / size as f64).sqrt();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let positions: Vec<f64> = x.chunks_exact(size).map(mean).collect();
     let alike = |b: usize| (positions[b + 1] - positions[b]).abs() <= apart;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Input;
 use super::finding::{Finding, Severity};
-use super::robust::{quantile, span, step};
+use super::robust::{noise, quantile, span, step};
 use crate::numerics::level::deviation;
 
 /// Blocks that a record is cut into to look for stretches without drive.
@@ -43,7 +43,11 @@ pub(super) fn examine(input: &Input<'_>, bad: &[Range<usize>], findings: &mut Ve
     }
     let ways: Vec<f64> = blocks.iter().map(|b| span(&position[b.clone()])).collect();
     let way = quantile(ways.iter().copied(), 0.75);
-    let still = |b: usize| ways[b] <= (QUIET * way).max(2.0 * quantum) && ways[b] < 0.5 * way;
+    let rests = |b: usize, within: f64| ways[b] <= (QUIET * way).max(within) && ways[b] < 0.5 * way;
+    let still = |b: usize| rests(b, 2.0 * quantum);
+    // Of so many values of a normal noise nearly all lie so many standard deviations about the mean (the largest of n: sqrt(2 ln n)).
+    let noise = noise(position);
+    let is_noise = |b: usize| rests(b, 2.0 * noise * (2.0 * (blocks[b].len() as f64).ln()).sqrt());
     let drives: Option<Vec<f64>> = input.torque.map(|t| blocks.iter().map(|b| deviation(&t[b.clone()])).collect());
     let drive = drives.as_ref().map_or(0.0, |d| quantile(d.iter().copied(), 0.75));
     // A constant torque that does not move the axis is of a drive that is on: friction balances it.
@@ -56,7 +60,8 @@ pub(super) fn examine(input: &Input<'_>, bad: &[Range<usize>], findings: &mut Ve
             .map(|r| blocks[r.start].start..blocks[r.end - 1].end)
             .collect()
     };
-    let dead = join(&|b| off(b) && still(b));
+    // Without a torque an axis that shows no more than its encoder's noise rests; under one it may be held, or reverse slowly.
+    let dead = join(&|b| off(b) && (still(b) || is_noise(b)));
     let mut standing = join(&|b| still(b) && !off(b));
     // Rest at the ends, or for a large part of the record.
     standing.retain(|r| r.start == 0 || r.end == n || r.len() as f64 > REST * n as f64);

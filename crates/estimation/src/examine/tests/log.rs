@@ -20,6 +20,11 @@ fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
     assert!(found.find("drive_off").is_some(), "{:#?}", found.findings);
     let longest = found.longest().unwrap();
     assert!(longest.start == 0 && (7900..8600).contains(&longest.end), "{longest:?}");
+    // The same beside an encoder's noise of more than the fiftieth of a block's way that is rest without any.
+    let mut e = noise(5, 4e-3);
+    let noisy: Vec<f64> = x1.iter().map(|x| x + e()).collect();
+    let found = examine(&Input { theta1: Some(&noisy), ..input });
+    assert!(found.find("drive_off").is_some_and(|f| f.samples > 3500), "{:#?}", found.findings);
     // A drive that holds a torque against the friction is on.
     let holding: Vec<f64> = torque.iter().enumerate().map(|(k, t)| if k < 8000 { *t } else { 0.01 }).collect();
     let found = examine(&Input { torque: Some(&holding), ..input });
