@@ -14,7 +14,7 @@ use crate::hypothesis::starts::{Screening, StartPoint};
 
 /// Starts that are fitted of those that the regression ranks first.
 const FITTED: usize = 12;
-/// The best that are gone on with: effects, in their richer forms; fits, to their end; hypotheses of each size, beside the chosen way.
+/// The best that are gone on with: effects, in their richer forms; hypotheses of each size, beside the chosen way.
 pub const PROMISING: usize = 4;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 pub const MOVED: f64 = 0.2;

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::moves::PROMISING;
 use super::search::{ALIKE, Search};
 use crate::hypothesis::fit::{Fit, STEPS};
 
+/// Fits that go on.
+const RACING: usize = 6;
 /// Variance of what a few steps leave, over that of the best, from which no further ones are made.
 const OUT_OF_RACE: f64 = 30.0;
 /// Steps between two looks at how a fit stands beside the others.
@@ -21,7 +22,7 @@ impl Search<'_> {
         fits.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
         let best = rival.or(fits.first()).map_or([0.0; 2], |f| f.discrepancy);
         let is_out = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > OUT_OF_RACE * best[i]);
-        let mut racing: Vec<usize> = (0..fits.len().min(PROMISING)).filter(|i| !is_out(&fits[*i])).collect();
+        let mut racing: Vec<usize> = (0..fits.len().min(RACING)).filter(|i| !is_out(&fits[*i])).collect();
         let mut first = rival.map_or(f64::NEG_INFINITY, evidence);
         for _ in 0..STEPS / ROUND {
             let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);
