@@ -26,7 +26,7 @@ impl Problem<'_> {
         along
     }
 
-    /// Whether simulated columns may be brought along from step to step. Of a rigid axis few are simulated.
+    /// Whether simulated columns may be brought along from step to step. On a rigid axis as many more steps are tried as columns are saved.
     pub fn may_follow(&self) -> bool {
         self.nominal.structure == Structure::TwoInertia
     }
