@@ -7,12 +7,12 @@ use crate::axis::Structure;
 use crate::effects::Place;
 use crate::hypothesis::fit::Fit;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::tracking::{Resolution, Tracked, steps_per_sample, track};
+use crate::hypothesis::tracking::{Tracked, steps_per_sample, track};
 use crate::trace::numerics::dot;
 
 /// What a model lacks along the record, in the band, and where that shows.
 fn residual_torque(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
-    let tracked = track(model, &p.record, bandwidth, steps_per_sample(model, &p.record, Resolution::Full))
+    let tracked = track(model, &p.record, bandwidth, steps_per_sample(model, &p.record))
         .unwrap_or_else(|| Tracked::nothing(p.record.len()));
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
     let site = where_by_torque(&series, model.structure == Structure::Rigid);

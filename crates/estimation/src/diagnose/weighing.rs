@@ -140,6 +140,7 @@ fn one_instead(ranking: &[Weighed], chosen: &Fit, i: usize) -> f64 {
 /// The effects that stand in the place of that one in the likely ones of these hypotheses or are its twin, and itself first.
 pub fn instead(ranking: &[Weighed], chosen: &Fit, i: usize, twin: Option<Confusable>) -> Vec<Effect> {
     let mut effects = vec![chosen.terms[i].0];
+    // One that falls short of certainty by no more than the difference of two that are alike.
     for w in with_one_instead(ranking, chosen, i).filter(|w| w.probability.ln() >= -ALIKE) {
         let like = |e: Effect, of: Effect| e.info().family == of.info().family;
         let other = |e: &Effect| others(chosen, i).all(|o| !like(*e, o)) && effects.iter().all(|k| !like(*e, *k));

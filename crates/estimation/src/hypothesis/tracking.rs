@@ -64,11 +64,11 @@ const COARSER: usize = 4;
 
 /// Steps a sample: as many as effects and torque need.
 #[must_use]
-pub fn steps_per_sample(model: &Model, record: &Record, resolution: Resolution) -> usize {
-    steps_per_sample_at(model, record, record.speeds(), resolution)
+pub fn steps_per_sample(model: &Model, record: &Record) -> usize {
+    steps_per_sample_at(model, record, record.speeds(), Resolution::Full)
 }
 
-/// The same where the record's speeds, rad/s, are known.
+/// The same at a resolution, where the record's speeds, rad/s, are known.
 pub fn steps_per_sample_at(model: &Model, record: &Record, speeds: [f64; 2], resolution: Resolution) -> usize {
     let full = substeps_at_speed(&model.parameters, model.structure, &model.effects, record.dt, speeds);
     match resolution {
@@ -335,7 +335,7 @@ const STARTING: f64 = 0.1;
 /// States of a model held to the record, at some samples.
 #[must_use]
 pub fn start_states(model: &Model, record: &Record, samples: &[usize]) -> Vec<FreeRun> {
-    let per = steps_per_sample(model, record, Resolution::Full);
+    let per = steps_per_sample(model, record);
     // Nothing after the last of them is asked.
     let needed = samples.iter().max().map_or(0, |last| last + WARM).min(record.len());
     let record = &record.part(0..needed);

@@ -59,7 +59,7 @@ impl Force for CouplingHysteresis {
         named: true,
         textbook: false,
         odds: 1.0,
-        // A loop that the twist does not close is a spring.
+        // A loop that the twist does not close is a spring; a multisine's swings to and fro by four times its rms and more.
         bounds: |p, x| p[0] <= x.torque && p[1] <= 4.0 * x.twist,
         example: &[1e-3, 0.02, 1.5],
         variants: &[Variant { name: "", free: &[0, 1] }, Variant { name: "sharp", free: &[0, 1, 2] }],

@@ -52,6 +52,7 @@ impl Input for DeadZone {
         named: true,
         textbook: false,
         odds: 0.3,
+        // A drive that swallows more than half of its largest command is broken, not imperfect.
         bounds: |p, x| p[0] <= 0.5 * x.torque,
         example: &[5e-3],
         variants: &[Variant { name: "", free: &[0] }],

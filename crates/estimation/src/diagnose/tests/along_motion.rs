@@ -20,12 +20,10 @@ fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation(
     let record = logged(effects, 1.0, 0.0, |_| 0.0, 5);
     let model = Model::new(parameters(INERTIA), Structure::Rigid, effects);
     let bandwidth = [0.2 / DT; 2];
-    let simulated =
-        |m: &Model| track(m, &record, bandwidth, steps_per_sample(m, &record, Resolution::Full)).expect("a run").torque;
+    let simulated = |m: &Model| track(m, &record, bandwidth, steps_per_sample(m, &record)).expect("a run").torque;
     let own = simulated(&model);
     let (_, trajectory) =
-        track_step_by_step(&model, &record, bandwidth, steps_per_sample(&model, &record, Resolution::Full))
-            .expect("a run");
+        track_step_by_step(&model, &record, bandwidth, steps_per_sample(&model, &record)).expect("a run");
     for (effect, i) in on.iter().flat_map(|(e, values)| (0..values.len()).map(|i| (*e, i))) {
         let mut other = model;
         let value = &mut other.effects.of_mut(effect)[i];

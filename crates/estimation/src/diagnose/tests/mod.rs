@@ -18,7 +18,7 @@ use crate::hypothesis::fit::Fit;
 use crate::hypothesis::likelihood::{C, TorqueResidual};
 use crate::hypothesis::model::Model;
 use crate::hypothesis::problem::Problem;
-use crate::hypothesis::tracking::{Resolution, steps_per_sample, track, track_step_by_step};
+use crate::hypothesis::tracking::{steps_per_sample, track, track_step_by_step};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

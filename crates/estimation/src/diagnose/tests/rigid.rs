@@ -214,8 +214,7 @@ fn a_log_read_early_is_followed_with_the_torque_to_come() {
     let lacks = |delay: f64| {
         let latch = with(&[(Effect::Latch, 0, delay)]);
         let model = Model::new(parameters(INERTIA), Structure::Rigid, latch);
-        let tracked =
-            track(&model, &record, [2.0; 2], steps_per_sample(&model, &record, Resolution::Full)).expect("finite");
+        let tracked = track(&model, &record, [2.0; 2], steps_per_sample(&model, &record)).expect("finite");
         tracked.torque[0][50..n - 50].iter().fold(0.0, |m: f64, t| m.max(t.abs()))
     };
     // What is left is the error of the speed at the record's begin, which the feedback takes out.
