@@ -1,7 +1,7 @@
 //! What effects make of their torques along a motion that is given.
 
 use super::axis_model::State;
-use super::mechanics::{base, motions};
+use super::mechanics::base;
 use super::parameters::{Parameters, Structure};
 use crate::effects::{Effect, Memory, Settings, StepMotion};
 
@@ -20,8 +20,7 @@ impl Course {
 
     /// Adds a step of `h` s of the axis between two states, which ends at `time` s.
     pub fn push(&mut self, [from, to]: [&State; 2], h: f64, time: f64) {
-        let (start, end) = (motions(&from.linear), motions(&to.linear));
-        self.steps.push(StepMotion { start, end, time, h, modes: to.modes });
+        self.steps.push(StepMotion { start: from.linear, end: to.linear, time, h, modes: to.modes });
     }
 
     /// What an effect of an axis resists with at the end of each step, N.m against its coordinate; it remembers `memory` when the motion

@@ -1,7 +1,7 @@
 //! Effects on both inertias together with sticking friction: two equations of two unknowns.
 
 use super::axis_model::State;
-use super::mechanics::{AxisKinematics, Mechanics, motions};
+use super::mechanics::Mechanics;
 use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::{Linear, Propagator};
 use super::segment::{Segment, before};
@@ -15,7 +15,6 @@ pub(super) struct Coupled<'a, S> {
     stick: StickTorques<S>,
     step: &'a Propagator<S>,
     from: &'a State<S>,
-    start: AxisKinematics<S>,
     tau0: [S; 2],
     tau1: [S; 2],
     /// The end without torques there.
@@ -37,7 +36,6 @@ impl<'a, S: Scalar> Coupled<'a, S> {
             stick: StickTorques::new(sticks, step, compliance, mechanics.structure),
             step,
             from,
-            start: motions(&from.linear),
             tau0,
             tau1,
             free: step.apply(&from.linear, tau0, tau1),
@@ -60,6 +58,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
     }
 
     /// The end under torques, and the torques of sticking friction, N.m.
+    #[inline]
     fn end(&self, force: [S; 2]) -> (Linear<S>, [S; 2]) {
         let free = self.step.less(&self.free, force);
         let tau1 = [self.tau1[0] - force[0], self.tau1[1] - force[1]];
@@ -69,7 +68,7 @@ impl<'a, S: Scalar> Coupled<'a, S> {
     /// Torques of the effects for that end, and their tangent.
     fn laws(&self, end: &Linear<S>, internals: &mut Internals<S>) -> Forces<S> {
         let (mechanics, modes) = (self.mechanics, self.from.modes);
-        let step = StepMotion { start: self.start, end: motions(end), time: self.time, h: self.step.h(), modes };
+        let step = StepMotion { start: self.from.linear, end: *end, time: self.time, h: self.step.h(), modes };
         mechanics.effects.forces(&mechanics.on, &mechanics.base, &step, internals)
     }
 }
@@ -102,11 +101,12 @@ impl<S: Scalar> TorqueEquations<S, 2> for Coupled<'_, S> {
         if remembering().next().is_none() {
             return;
         }
-        let there = motions(&self.end(torque).0);
-        let end = motions(&self.end([torque[0] - less[0], torque[1] - less[1]]).0);
+        let there = self.end(torque).0;
+        let end = self.end([torque[0] - less[0], torque[1] - less[1]]).0;
         for effect in remembering() {
-            let i = effect.info().place.coordinate() as usize;
-            let moved = Kinematics { x: end[i].x - there[i].x, v: end[i].v - there[i].v };
+            let along = effect.info().place.coordinate();
+            let [there, end] = [there, end].map(|motion| Kinematics::of(&motion, along));
+            let moved = Kinematics { x: end.x - there.x, v: end.v - there.v };
             memory_of(*effect).for_each(|i| memory[i] = internals[i].after(&moved));
         }
     }

@@ -4,13 +4,8 @@ use super::axis_model::State;
 use super::oscillator::Scheme;
 use super::parameters::{Parameters, Structure};
 use super::propagator::{Compliance, Linear, Propagator};
-use crate::effects::{
-    ActiveEffects, Base, Coordinate, Effect, Internal, Kinematics, Place, Settings, Slip, StepMotion,
-};
+use crate::effects::{ActiveEffects, Base, Effect, Internal, Kinematics, Place, Settings, Slip, StepMotion};
 use crate::scalar::Scalar;
-
-/// Motion of motor, table and twist.
-pub type AxisKinematics<S> = [Kinematics<S>; 3];
 
 const PLACES: [Place; 2] = [Place::Motor, Place::Table];
 
@@ -82,7 +77,7 @@ impl<S: Scalar> Mechanics<S> {
 
     /// Level up to which dry friction holds inertia `i` of a state against a push that way under a `load`, N.m.
     pub fn rest_level(&self, i: usize, direction: f64, s: &State<S>, load: S, time: f64) -> S {
-        let position = motion(&s.linear, PLACES[i].coordinate()).x;
+        let position = Kinematics::of(&s.linear, PLACES[i].coordinate()).x;
         let slip = Slip { direction, speed: S::default(), position, load, time };
         self.effects.dry_level(&self.on, PLACES[i], &slip)
     }
@@ -97,8 +92,7 @@ impl<S: Scalar> Mechanics<S> {
 
     /// A step of no length.
     fn instant(&self, s: &State<S>, time: f64) -> StepMotion<S> {
-        let motions = motions(&s.linear);
-        StepMotion { start: motions, end: motions, time, h: S::default(), modes: s.modes }
+        StepMotion { start: s.linear, end: s.linear, time, h: S::default(), modes: s.modes }
     }
 
     /// Which inertias dry friction holds at rest.
@@ -160,19 +154,4 @@ impl<S: Scalar> Length<S> {
         let response = step.less(&still, push.map(S::from)).map(|x| -x);
         Self { step, compliance: None, response }
     }
-}
-
-/// The motion of one coordinate.
-#[inline]
-pub(super) fn motion<S: Scalar>(l: &Linear<S>, of: Coordinate) -> Kinematics<S> {
-    match of {
-        Coordinate::Motor => Kinematics { x: l[0], v: l[1] },
-        Coordinate::Table => Kinematics { x: l[0] - l[2], v: l[1] - l[3] },
-        Coordinate::Twist => Kinematics { x: l[2], v: l[3] },
-    }
-}
-
-/// The motion of all three.
-pub(super) fn motions<S: Scalar>(l: &Linear<S>) -> AxisKinematics<S> {
-    [Coordinate::Motor, Coordinate::Table, Coordinate::Twist].map(|of| motion(l, of))
 }

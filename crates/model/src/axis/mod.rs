@@ -29,7 +29,6 @@ mod stick;
 pub use along::Course;
 pub use axis_model::{Axis, State};
 pub use criterion::{dt_criterion, period_elongation};
-pub use mechanics::AxisKinematics;
 pub use oscillator::Scheme;
 pub use parameters::{AxisKind, Modal, ParameterError, Parameters, PhysicalData, Structure};
 pub use propagator::{Linear, Propagator};

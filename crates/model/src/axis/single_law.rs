@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::axis_model::State;
-use super::mechanics::{Mechanics, motion};
+use super::mechanics::Mechanics;
 use super::newton::{Pass, TorqueEquations, derive, newton};
 use super::propagator::Linear;
 use super::segment::{Segment, before};
@@ -80,8 +80,8 @@ impl<'a, S: Scalar, L: Law> SingleLaw<'a, S, L> {
     fn new(effect: Effect, mechanics: &'a Mechanics<S>, from: &'a State<S>, segment: &'a Segment<'a, S>) -> Self {
         let [tau0, tau1] = before(from, &segment.ramp);
         let free = segment.length.step.apply(&from.linear, tau0, tau1);
-        let end = motion(&free, L::COORDINATE);
-        let per_torque = motion(&segment.length.response, L::COORDINATE);
+        let end = Kinematics::of(&free, L::COORDINATE);
+        let per_torque = Kinematics::of(&segment.length.response, L::COORDINATE);
         Self { mechanics, effect, from, segment, free, end, per_torque, law: PhantomData }
     }
 
@@ -119,7 +119,7 @@ impl<S: Scalar, L: Law> TorqueEquations<S, 1> for SingleLaw<'_, S, L> {
             S::default()
         };
         let moment = Moment {
-            start: motion(&from.linear, L::COORDINATE),
+            start: Kinematics::of(&from.linear, L::COORDINATE),
             end: Kinematics { x: end.x - per.x * torque, v: end.v - per.v * torque },
             time: segment.end,
             h: segment.length.step.h(),

@@ -8,11 +8,11 @@ use super::shapes::{Base, Coordinate, Internal, Kinematics, Modes, Moment, React
 use super::{Effect, Law, WithLaw};
 use crate::scalar::Scalar;
 
-/// Motion of both inertias at the start and at the trial end of a step.
+/// Motion `[theta1, omega1, twist, twist rate]` at the start and at the trial end of a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepMotion<S> {
-    pub start: [Kinematics<S>; 3],
-    pub end: [Kinematics<S>; 3],
+    pub start: [S; 4],
+    pub end: [S; 4],
     pub time: f64,
     pub h: S,
     pub modes: Modes,
@@ -21,10 +21,9 @@ pub(crate) struct StepMotion<S> {
 impl<S: Scalar> StepMotion<S> {
     #[inline]
     pub(super) fn moment(&self, coordinate: Coordinate, load: S) -> Moment<S> {
-        let i = coordinate as usize;
         Moment {
-            start: self.start[i],
-            end: self.end[i],
+            start: Kinematics::of(&self.start, coordinate),
+            end: Kinematics::of(&self.end, coordinate),
             time: self.time,
             h: self.h,
             contact: self.modes.contact,

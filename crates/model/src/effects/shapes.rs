@@ -49,6 +49,19 @@ pub struct Kinematics<S> {
     pub v: S,
 }
 
+impl<S: Scalar> Kinematics<S> {
+    /// One coordinate of a motion `[theta1, omega1, twist, twist rate]`.
+    #[inline]
+    pub fn of(motion: &[S; 4], along: Coordinate) -> Self {
+        let [x, v, twist, rate] = *motion;
+        match along {
+            Coordinate::Motor => Self { x, v },
+            Coordinate::Table => Self { x: x - twist, v: v - rate },
+            Coordinate::Twist => Self { x: twist, v: rate },
+        }
+    }
+}
+
 /// The nominal parameters an effect may need.
 #[derive(Debug, Clone, Copy)]
 pub struct Base<S> {

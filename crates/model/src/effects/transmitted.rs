@@ -4,7 +4,7 @@ use super::Effect;
 use super::active::ActiveEffects;
 use super::forces::{Forces, React, StepMotion};
 use super::settings::Settings;
-use super::shapes::{Base, Coordinate, Reaction};
+use super::shapes::{Base, Coordinate, Kinematics, Reaction};
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Settings<S> {
@@ -23,7 +23,7 @@ impl<S: Scalar> Settings<S> {
     pub(crate) fn transmitted(&self, on: &ActiveEffects, base: &Base<S>, step: &StepMotion<S>) -> Forces<S> {
         let mut sum = Forces::default();
         if !base.rigid {
-            let twist = &step.end[Coordinate::Twist as usize];
+            let twist = Kinematics::of(&step.end, Coordinate::Twist);
             let (stiffness, damping) = (base.k.re(), base.b.re());
             let torque = base.k * twist.x + base.b * twist.v;
             // The load is the motor's row; the table's is its negative.
