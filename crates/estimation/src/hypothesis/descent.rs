@@ -68,8 +68,9 @@ pub struct Descent<'a> {
     leaves: bool,
     /// What is held in the first steps.
     first: First,
-    /// The bandwidth from which a looser one was no likelier.
+    /// The bandwidth from which a looser one was no likelier, and the discrepancy's own that was not.
     tight: Option<Bandwidth>,
+    passed_by: Option<Bandwidth>,
     /// Columns brought along from the step before; none where they are to be simulated.
     secant: Option<Secant>,
     /// Whether the last step was made by such.
@@ -114,6 +115,7 @@ impl<'a> Descent<'a> {
             leaves: false,
             first: First::Sizes,
             tight: None,
+            passed_by: None,
             secant: None,
             is_by_secant: false,
         })
@@ -138,6 +140,7 @@ impl<'a> Descent<'a> {
             leaves: fit.at_bound,
             first: First::Sizes,
             tight: None,
+            passed_by: None,
             secant: None,
             is_by_secant: false,
         }
@@ -348,7 +351,8 @@ impl<'a> Descent<'a> {
             .map(|scores| scatter::standard_errors(scores, &normal.a))
     }
 
-    /// Follows the record at another bandwidth where that is likelier: at a looser one, tried once from each, or at that of the discrepancy.
+    /// Follows the record at another bandwidth where that is likelier: at a looser one, tried once from each, or at that of the discrepancy,
+    /// tried once, too.
     fn adapt_bandwidth(&mut self) -> bool {
         let (problem, at) = (self.problem, &mut self.at);
         if problem.is_without_simulation(&at.model) {
@@ -357,8 +361,10 @@ impl<'a> Descent<'a> {
         let least = problem.bandwidth([0.0; 2]);
         let own = problem.band.log_likelihood(&at.rows, at.s);
         let looser = looser(at.bandwidth, least);
-        let again = self.tight.is_none_or(|tight| differ(tight, at.bandwidth));
-        for bandwidth in again.then_some(looser).into_iter().chain([problem.bandwidth(at.s)]) {
+        let told = problem.bandwidth(at.s);
+        let is_new = |known: Option<Bandwidth>, of: Bandwidth| known.is_none_or(|known| differ(known, of));
+        let tries = [(is_new(self.tight, at.bandwidth), looser), (is_new(self.passed_by, told), told)];
+        for bandwidth in tries.into_iter().filter_map(|(is_new, bandwidth)| is_new.then_some(bandwidth)) {
             let weighed_at = Some(at.rows.weighed_at);
             if differ(bandwidth, at.bandwidth)
                 && let Some((rows, trajectory)) = problem.rows_along_motion(&at.model, bandwidth, weighed_at)
@@ -368,7 +374,7 @@ impl<'a> Descent<'a> {
                 return true;
             }
         }
-        self.tight = Some(at.bandwidth);
+        (self.tight, self.passed_by) = (Some(at.bandwidth), Some(told));
         false
     }
 
