@@ -5,6 +5,7 @@ use super::likelihood::C;
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::problem::{PLANNER, Problem};
 use super::tracking::Resolution;
+use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
 
@@ -52,11 +53,22 @@ impl Problem<'_> {
             return None;
         }
         let h = self.step_within(c, &at.model);
-        let mut change = trajectory.resisted(&moved(&at.model, c, h), effects.iter().copied());
-        for (change, own) in change.iter_mut().zip(trajectory.resisted(&at.model, effects)) {
+        Some(self.change_along(trajectory, [&at.model, &moved(&at.model, c, h)], &effects, 1.0 / h))
+    }
+
+    /// What some effects of one model resist a motion with beyond those of another, by a factor.
+    pub(super) fn change_along(
+        &self,
+        trajectory: &Trajectory,
+        [from, to]: [&Model; 2],
+        of: &[Effect],
+        factor: f64,
+    ) -> [Vec<C>; 2] {
+        let mut change = trajectory.resisted(to, of.iter().copied());
+        for (change, own) in change.iter_mut().zip(trajectory.resisted(from, of.iter().copied())) {
             change.iter_mut().zip(own).for_each(|(c, o)| *c -= o);
         }
-        Some(PLANNER.with_borrow_mut(|planner| self.band.rows(&change, 1.0 / h, planner)))
+        PLANNER.with_borrow_mut(|planner| self.band.rows(&change, factor, planner))
     }
 
     /// Step of a coordinate for its column.

@@ -67,6 +67,15 @@ impl Fit {
         effects.sort_unstable();
         effects
     }
+
+    /// Whether it is the same hypothesis as another, every free value within a standard error of that one's.
+    #[must_use]
+    pub fn has_come_to(&self, other: &Self) -> bool {
+        let is_near = |(c, std): (&Coordinate, &f64)| (c.value(&self.model) - c.value(&other.model)).abs() <= *std;
+        self.terms == other.terms
+            && other.std.len() == other.coordinates.len()
+            && other.coordinates.iter().zip(&other.std).all(is_near)
+    }
 }
 
 impl Problem<'_> {

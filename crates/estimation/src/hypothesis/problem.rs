@@ -139,7 +139,7 @@ impl Problem<'_> {
         track(model, self.record, bandwidth, self.counted(model))
     }
 
-    fn track_step_by_step(&self, model: &Model, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
+    pub(super) fn track_step_by_step(&self, model: &Model, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
         track_step_by_step(model, self.record, bandwidth, self.counted(model))
     }
 

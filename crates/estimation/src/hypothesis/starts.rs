@@ -9,6 +9,7 @@ use super::likelihood::{C, Weight};
 use super::model::Model;
 use super::problem::Problem;
 use super::scales::{Scales, slow};
+use super::trajectory::Trajectory;
 
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place, Role, Scale, Settings, Start};
@@ -21,6 +22,8 @@ use rustfft::FftPlanner;
 #[derive(Clone)]
 pub struct StartPoint {
     pub term: Term,
+    /// The shapes that it was looked at with.
+    shapes: Settings,
     pub model: Model,
     pub gain: f64,
 }
@@ -28,6 +31,8 @@ pub struct StartPoint {
 /// A fit beside which effects are looked for: along the motion as measured, stepped coarsely.
 pub struct Screening<'a> {
     problem: Problem<'a>,
+    /// The fit's motion, along which shapes are ranked, of two inertias.
+    trajectory: Option<Trajectory>,
     /// The fit, along the motion as measured.
     pub fit: Fit,
     regression: Regression,
@@ -36,7 +41,13 @@ pub struct Screening<'a> {
 }
 
 /// Spectra of what a model lacks, by the effects that are on in it; `None` of one that could not be run.
-type Looks = Vec<(Settings, Option<Arc<[Vec<C>; 2]>>)>;
+type Looks = Vec<(Settings, Option<Arc<Rows>>)>;
+
+/// Spectra of the equations.
+type Rows = [Vec<C>; 2];
+
+/// Shapes of one form of an effect that are run of those that rank first along the motion of the fit.
+const RUN: usize = 3;
 
 impl<'a> Screening<'a> {
     /// `None` before the scales of the record are known.
@@ -44,9 +55,13 @@ impl<'a> Screening<'a> {
         let problem = problem.coarse();
         problem.scales.as_ref()?;
         let fit = problem.along_the_record(fit);
+        let coupled = problem.nominal.structure == Structure::TwoInertia;
+        let followed = || Some(problem.track_step_by_step(&fit.model, fit.bandwidth)?.1);
+        let trajectory = coupled.then(followed).flatten();
         let problem = problem.along_the_motion_of(&fit);
         let regression = Regression::new(&problem, &fit);
-        Some(Self { problem, fit, regression, looked_at: EFFECTS.iter().map(|_| Mutex::default()).collect() })
+        let looked_at = EFFECTS.iter().map(|_| Mutex::default()).collect();
+        Some(Self { problem, trajectory, fit, regression, looked_at })
     }
 
     /// Starts of some forms of an effect beside the fit's, of each the best first.
@@ -63,7 +78,7 @@ impl<'a> Screening<'a> {
 
     /// What the fit's model lacks with other effects of one kind. Shapes that are looked at side by side are unlike, forms are looked at one
     /// after the other: no run is made twice, on any number of threads.
-    fn rows(&self, effect: Effect, effects: &Settings) -> Option<Arc<[Vec<C>; 2]>> {
+    fn rows(&self, effect: Effect, effects: &Settings) -> Option<Arc<Rows>> {
         let looks = || self.looked_at[effect as usize].lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, known)) = looks().iter().find(|(known, _)| known == effects) {
             return known.clone();
@@ -72,6 +87,17 @@ impl<'a> Screening<'a> {
         let model = Model { effects: *effects, ..fit.model };
         let rows = p.rows(&model, fit.bandwidth, Some(fit.rows.weighed_at)).map(|residual| Arc::new(residual.rows));
         looks().push((*effects, rows.clone()));
+        rows
+    }
+
+    /// The same along the fit's motion, without a run.
+    fn rows_along(&self, trajectory: &Trajectory, effect: Effect, effects: &Settings) -> Rows {
+        let fit = &self.fit;
+        let model = Model { effects: *effects, ..fit.model };
+        let mut rows = self.problem.change_along(trajectory, [&fit.model, &model], &[effect], 1.0);
+        for (rows, own) in rows.iter_mut().zip(&fit.rows.rows) {
+            rows.iter_mut().zip(own).for_each(|(r, o)| *r += o);
+        }
         rows
     }
 
@@ -333,13 +359,40 @@ impl Screening<'_> {
             }
             grid = next;
         }
-        let mut all: Vec<StartPoint> = grid.par_iter().filter_map(|s| self.start_at(scales, term, s)).collect();
+        let by_run = |s: &Settings| self.rows(effect, s);
+        self.starts_at(scales, term, &self.foremost(scales, term, grid), by_run)
+    }
+
+    /// The shapes that the fit's motion ranks first, which an effect bends little for the others to come before them; all where it cannot tell.
+    fn foremost(&self, scales: &Scales, term: Term, grid: Vec<Settings>) -> Vec<Settings> {
+        let is_seen_there = term.0.info().place != Place::Sensor;
+        let Some(along) = self.trajectory.as_ref().filter(|_| is_seen_there && grid.len() > RUN) else { return grid };
+        let first = self.starts_at(scales, term, &grid, |s| Some(Arc::new(self.rows_along(along, term.0, s))));
+        if first.len() < RUN { grid } else { first.into_iter().take(RUN).map(|s| s.shapes).collect() }
+    }
+
+    /// Starts of a form of an effect at some shapes, the best first.
+    fn starts_at(
+        &self,
+        scales: &Scales,
+        term: Term,
+        grid: &[Settings],
+        rows_of: impl Fn(&Settings) -> Option<Arc<Rows>> + Sync,
+    ) -> Vec<StartPoint> {
+        let mut all: Vec<StartPoint> =
+            grid.par_iter().filter_map(|s| self.start_at(scales, term, s, &rows_of)).collect();
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         all
     }
 
     /// The start of a form of an effect at some shapes, its sizes by regression.
-    fn start_at(&self, scales: &Scales, (effect, form): Term, shapes: &Settings) -> Option<StartPoint> {
+    fn start_at(
+        &self,
+        scales: &Scales,
+        (effect, form): Term,
+        shapes: &Settings,
+        rows_of: impl Fn(&Settings) -> Option<Arc<Rows>>,
+    ) -> Option<StartPoint> {
         let (p, fit) = (&self.problem, &self.fit);
         let info = effect.info();
         let free = info.variants[form].free;
@@ -348,7 +401,6 @@ impl Screening<'_> {
         {
             return None;
         }
-        let rows_of = |s: &Settings| self.rows(effect, s);
         let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
             [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
         };
@@ -452,7 +504,7 @@ impl Screening<'_> {
         if !scales.admit(p.record, &model, std::iter::once(effect)) {
             return None;
         }
-        Some(StartPoint { term: (effect, form), model, gain })
+        Some(StartPoint { term: (effect, form), shapes: *shapes, model, gain })
     }
 }
 
