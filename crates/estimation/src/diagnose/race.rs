@@ -37,7 +37,8 @@ impl Search<'_> {
                 }
                 fits[i] = further;
             }
-            racing = still;
+            still.sort_by(|a, b| evidence(&fits[*b]).total_cmp(&evidence(&fits[*a])));
+            racing = apart(&still, &fits);
             if racing.iter().all(|&i| fits[i].iterations < ROUND) {
                 break;
             }
@@ -49,5 +50,43 @@ impl Search<'_> {
             }
         }
         fits
+    }
+}
+
+/// Those that go on, best first, without those that have come to where a better one is: they would end where that does.
+fn apart(racing: &[usize], fits: &[Fit]) -> Vec<usize> {
+    let mut apart: Vec<usize> = Vec::new();
+    for &i in racing {
+        if !apart.iter().any(|&better| fits[i].has_come_to(&fits[better])) {
+            apart.push(i);
+        }
+    }
+    apart
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Parameters, Structure};
+    use crate::effects::{Effect, Settings};
+    use crate::hypothesis::model::Model;
+
+    #[test]
+    fn of_fits_of_the_same_effects_at_the_same_place_the_best_goes_on() {
+        let at = |i1: f64, effect: Effect| {
+            let parameters = Parameters { i1, ..Parameters::PAPER };
+            let model = Model::new(parameters, Structure::TwoInertia, Settings::default());
+            let fit = Fit::of_likelihood(model, &[(effect, 0)], 0.0);
+            Fit { std: vec![1e-6; fit.coordinates.len()], ..fit }
+        };
+        let own = Parameters::PAPER.i1;
+        let fits = [
+            at(own + 5e-7, Effect::CoulombMotor),
+            at(own, Effect::CoulombMotor),
+            at(own + 5e-6, Effect::CoulombMotor),
+            at(own, Effect::ViscousMotor),
+        ];
+        assert_eq!(apart(&[1, 0, 2, 3], &fits), [1, 2, 3]);
+        assert_eq!(apart(&[3, 2], &fits), [3, 2]);
     }
 }
