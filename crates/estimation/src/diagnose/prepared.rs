@@ -23,9 +23,6 @@ use crate::numerics::level::deviation;
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
 const SEARCHED: usize = 16_384;
 
-/// Share of a window's height from which what it shows is drawn.
-const OPEN: f64 = 0.5;
-
 /// A record ready for the search: in the band of its motion, with that band.
 pub struct Prepared {
     pub record: Record,
@@ -150,7 +147,8 @@ impl Prepared {
         Self { record, band, torque_rms, ..*self }
     }
 
-    /// The torque that moved the axis and what each model needs for that motion, in the band, where the window is open.
+    /// The torque that moved the axis and what each model needs for that motion, in the band, where the window is open by half
+    /// at least.
     pub fn torque_overlay(&self, gap: &Gap) -> Overlay {
         let (record, taper) = (&self.record, &self.band.taper);
         let torque = self.band.filtered(&record.torque);
@@ -162,11 +160,11 @@ impl Prepared {
             after: Vec::new(),
             noise: self.band.noise_rms(),
         };
-        let open = OPEN * taper.iter().copied().fold(0.0, f64::max);
+        let half = 0.5 * taper.iter().copied().fold(0.0, f64::max);
         for (k, w) in taper.iter().enumerate() {
             let [before, after] = [0, 1].map(|m: usize| gap.runs[m][k][0] + gap.runs[m][k][1]);
             let values = [torque[k], torque[k] + before, torque[k] + after];
-            let [measured, before, after] = if *w > open { values.map(|v| v / w) } else { [f64::NAN; 3] };
+            let [measured, before, after] = if *w > half { values.map(|v| v / w) } else { [f64::NAN; 3] };
             o.push([record.time(k), measured, before, after]);
         }
         o
