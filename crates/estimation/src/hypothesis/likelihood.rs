@@ -399,11 +399,6 @@ impl Band {
         self.at_side(side, &(0..self.omega.len()).map(torque).collect::<Vec<C>>())
     }
 
-    /// Half the sum of squares of the whitened rows.
-    pub fn half_squares(&self, l: &TorqueResidual, s: Discrepancy) -> f64 {
-        0.5 * self.whiten(&l.rows, &l.weights, s).iter().map(|v| v * v).sum::<f64>()
-    }
-
     /// Inverse of the covariance's Cholesky factor at each bin: `z0 = a r1`, `z1 = b r1 + c r2`; and log det.
     pub(super) fn factor(&self, weight: Weight, s: Discrepancy) -> (f64, C, f64, f64) {
         let (n11, n22, n12) = weight.noise;
@@ -438,14 +433,16 @@ impl Band {
         out
     }
 
-    /// Log determinant of the covariance, less the density of readings.
-    fn log_det(&self, weights: &[Weight], s: Discrepancy) -> f64 {
-        weights.iter().zip(&self.weight).map(|(n, w)| w * (self.factor(*n, s).3 - n.density)).sum()
-    }
-
-    /// Log likelihood at that discrepancy.
+    /// Log likelihood at that discrepancy, per density of readings.
     pub fn log_likelihood(&self, l: &TorqueResidual, s: Discrepancy) -> f64 {
-        -self.half_squares(l, s) - self.log_det(&l.weights, s)
+        let both = self.sight == Sight::Both;
+        let bin = |(m, (noise, weight)): (usize, (&Weight, &f64))| {
+            let (a, b, c, log_det) = self.factor(*noise, s);
+            let first = l.rows[0][m];
+            let second = if both { (b * first + l.rows[1][m] * c).norm_sqr() } else { 0.0 };
+            weight * ((first * a).norm_sqr() + second + log_det - noise.density)
+        };
+        -l.weights.iter().zip(&self.weight).enumerate().map(bin).sum::<f64>()
     }
 
     /// Real values compared.
