@@ -183,6 +183,11 @@ impl Search<'_> {
         over
     }
 
+    /// Whether enough was simulated for no further way to be gone that was passed by.
+    fn is_over_half_of_budget(&self) -> bool {
+        self.problem.steps() > BUDGET / 2
+    }
+
     pub fn evidence(&self, fit: &Fit, independent: f64) -> f64 {
         self.problem.evidence(fit, independent)
     }
@@ -279,7 +284,7 @@ impl Search<'_> {
     /// several large causes leaves what the others do, beside which it earns next to nothing on its own.
     fn forward(&self, from: Fit, by: Measure<'_>, pool: &mut Pool) -> Fit {
         let mut at = from;
-        let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_over_budget();
+        let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_over_half_of_budget();
         while at.terms.len() < MOST && !ends(&at) {
             let mut all = self.extended(&at, at.terms.len(), pool);
             all.retain(|f| self.is_material(&at, f));
@@ -301,7 +306,7 @@ impl Search<'_> {
         let share = self.independent(std::slice::from_ref(chosen));
         for size in 1..=chosen.terms.len().max(1) {
             for fit in self.likeliest(size, share, pool) {
-                if self.problem.steps() > BUDGET / 2 {
+                if self.is_over_half_of_budget() {
                     return;
                 }
                 self.extended(&fit, size, pool);

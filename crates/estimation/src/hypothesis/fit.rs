@@ -68,13 +68,16 @@ impl Fit {
         effects
     }
 
-    /// Whether it is the same hypothesis as another, every free value within a standard error of that one's.
+    /// Whether it is the same hypothesis as another, every free value within a standard error of both.
     #[must_use]
     pub fn has_come_to(&self, other: &Self) -> bool {
-        let is_near = |(c, std): (&Coordinate, &f64)| (c.value(&self.model) - c.value(&other.model)).abs() <= *std;
+        let values = |fit: &Self| fit.coordinates.iter().map(|c| c.value(&fit.model)).collect::<Vec<f64>>();
+        let errors = self.std.iter().zip(&other.std).map(|(a, b)| a.min(*b));
+        // What was held has no error.
+        let is_near = |((a, b), std): ((f64, f64), f64)| a == b || (std.is_finite() && (a - b).abs() <= std);
         self.terms == other.terms
-            && other.std.len() == other.coordinates.len()
-            && other.coordinates.iter().zip(&other.std).all(is_near)
+            && errors.len() == self.coordinates.len()
+            && values(self).into_iter().zip(values(other)).zip(errors).all(is_near)
     }
 }
 
