@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::pool::Pool;
+use super::race::RACING;
 use super::search::Search;
 use crate::effects::Effect;
 use crate::hypothesis::determined::is_simpler;
@@ -12,8 +13,6 @@ use crate::hypothesis::fit::{Fit, PROBE, Term};
 use crate::hypothesis::model::{Coordinate, Model};
 use crate::hypothesis::starts::{Screening, StartPoint};
 
-/// Starts that are fitted of those that the regression ranks first.
-const FITTED: usize = 12;
 /// The best that are gone on with: effects, in their richer forms; hypotheses of each size, beside the chosen way.
 pub const PROMISING: usize = 4;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
@@ -92,7 +91,7 @@ impl Search<'_> {
         held.into_iter().chain(freed).collect()
     }
 
-    /// The fit with each effect that may join it, a few steps from the best starts of all.
+    /// The fit with each effect that may join it, a few steps from the best starts of all, two for each place in the race.
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
         let Some(screening) = Screening::of(&self.problem, fit) else { return Vec::new() };
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
@@ -110,10 +109,10 @@ impl Search<'_> {
                 promising.push(p.term.0);
             }
         }
-        points.truncate(FITTED);
+        points.truncate(2 * RACING);
         points.extend(of(&promising, true));
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        points.truncate(FITTED);
+        points.truncate(2 * RACING);
         let from = screening.fit.discrepancy;
         let done = AtomicUsize::new(0);
         let probe = |start: &StartPoint| {

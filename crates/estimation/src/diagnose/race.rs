@@ -6,7 +6,7 @@ use super::search::{ALIKE, Search};
 use crate::hypothesis::fit::{Fit, STEPS};
 
 /// Fits that go on.
-const RACING: usize = 6;
+pub const RACING: usize = 6;
 /// Variance of what a few steps leave, over that of the best, from which no further ones are made.
 const OUT_OF_RACE: f64 = 30.0;
 /// Steps between two looks at how a fit stands beside the others.
