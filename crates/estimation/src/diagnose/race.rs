@@ -88,5 +88,8 @@ mod tests {
         ];
         assert_eq!(apart(&[1, 0, 2, 3], &fits), [1, 2, 3]);
         assert_eq!(apart(&[3, 2], &fits), [3, 2]);
+        // What was held has an infinite error, and may be anywhere.
+        let held = fits.map(|fit| Fit { std: vec![f64::INFINITY; fit.std.len()], ..fit });
+        assert_eq!(apart(&[1, 0], &held), [1, 0]);
     }
 }
