@@ -109,7 +109,6 @@ impl Search<'_> {
                 promising.push(p.term.0);
             }
         }
-        points.truncate(2 * RACING);
         points.extend(of(&promising, true));
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         points.truncate(2 * RACING);

@@ -4,7 +4,7 @@ use super::descent::Along;
 use super::likelihood::C;
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::problem::{PLANNER, Problem};
-use super::tracking::Resolution;
+use super::tracking::{Resolution, Torques};
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect, Place, Scale, Start};
@@ -53,19 +53,21 @@ impl Problem<'_> {
             return None;
         }
         let h = self.step_within(c, &at.model);
-        Some(self.change_along(trajectory, [&at.model, &moved(&at.model, c, h)], &effects, 1.0 / h))
+        let own = trajectory.resisted(&at.model, effects.iter().copied());
+        Some(self.change_along(trajectory, &own, &moved(&at.model, c, h), &effects, 1.0 / h))
     }
 
-    /// What some effects of one model resist a motion with beyond those of another, by a factor.
+    /// What some effects of a model resist a motion with beyond the `own` torques of another's, by a factor.
     pub(super) fn change_along(
         &self,
         trajectory: &Trajectory,
-        [from, to]: [&Model; 2],
+        own: &Torques,
+        to: &Model,
         of: &[Effect],
         factor: f64,
     ) -> [Vec<C>; 2] {
         let mut change = trajectory.resisted(to, of.iter().copied());
-        for (change, own) in change.iter_mut().zip(trajectory.resisted(from, of.iter().copied())) {
+        for (change, own) in change.iter_mut().zip(own) {
             change.iter_mut().zip(own).for_each(|(c, o)| *c -= o);
         }
         PLANNER.with_borrow_mut(|planner| self.band.rows(&change, factor, planner))

@@ -29,6 +29,9 @@ const AT_FLOOR: f64 = 1.15;
 
 pub type C = Complex<f64>;
 
+/// Spectra of the equations, of the second nothing where there is one.
+pub type Spectra = [Vec<C>; 2];
+
 /// Which equations the record has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {

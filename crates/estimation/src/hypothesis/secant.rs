@@ -6,12 +6,9 @@
 use rayon::prelude::*;
 
 use super::descent::Along;
-use super::likelihood::C;
+use super::likelihood::{C, Spectra};
 use super::model::Coordinate;
 use super::problem::Problem;
-
-/// Spectra of the equations.
-type Spectra = [Vec<C>; 2];
 
 /// Columns of all coordinates at a point, the simulated ones of which are brought along.
 #[derive(Clone)]

@@ -5,10 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, PROBE, Term};
-use super::likelihood::{C, Weight};
+use super::likelihood::{C, Spectra, Weight};
 use super::model::Model;
 use super::problem::Problem;
 use super::scales::{Scales, slow};
+use super::tracking::Torques;
 use super::trajectory::Trajectory;
 
 use crate::axis::Structure;
@@ -41,12 +42,10 @@ pub struct Screening<'a> {
 }
 
 /// Spectra of what a model lacks, by the effects that are on in it; `None` of one that could not be run.
-type Looks = Vec<(Settings, Option<Arc<Rows>>)>;
+type Looks = Vec<(Settings, Option<Arc<Spectra>>)>;
 
-/// Spectra of the equations.
-type Rows = [Vec<C>; 2];
-
-/// Shapes of one form of an effect that are run of those that rank first along the motion of the fit.
+/// Shapes of one form of an effect that are run of those that rank first along the motion of the fit: the two that are gone on with, and
+/// one for what the effect does to the motion.
 const RUN: usize = 3;
 
 impl<'a> Screening<'a> {
@@ -78,7 +77,7 @@ impl<'a> Screening<'a> {
 
     /// What the fit's model lacks with other effects of one kind. Shapes that are looked at side by side are unlike, forms are looked at one
     /// after the other: no run is made twice, on any number of threads.
-    fn rows(&self, effect: Effect, effects: &Settings) -> Option<Arc<Rows>> {
+    fn rows(&self, effect: Effect, effects: &Settings) -> Option<Arc<Spectra>> {
         let looks = || self.looked_at[effect as usize].lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, known)) = looks().iter().find(|(known, _)| known == effects) {
             return known.clone();
@@ -90,11 +89,11 @@ impl<'a> Screening<'a> {
         rows
     }
 
-    /// The same along the fit's motion, without a run.
-    fn rows_along(&self, trajectory: &Trajectory, effect: Effect, effects: &Settings) -> Rows {
+    /// The same along the fit's motion, without a run, where the fit's model resists that with `own` torques of the effect.
+    fn rows_along(&self, trajectory: &Trajectory, own: &Torques, effect: Effect, effects: &Settings) -> Spectra {
         let fit = &self.fit;
         let model = Model { effects: *effects, ..fit.model };
-        let mut rows = self.problem.change_along(trajectory, [&fit.model, &model], &[effect], 1.0);
+        let mut rows = self.problem.change_along(trajectory, own, &model, &[effect], 1.0);
         for (rows, own) in rows.iter_mut().zip(&fit.rows.rows) {
             rows.iter_mut().zip(own).for_each(|(r, o)| *r += o);
         }
@@ -367,7 +366,9 @@ impl Screening<'_> {
     fn foremost(&self, scales: &Scales, term: Term, grid: Vec<Settings>) -> Vec<Settings> {
         let is_seen_there = term.0.info().place != Place::Sensor;
         let Some(along) = self.trajectory.as_ref().filter(|_| is_seen_there && grid.len() > RUN) else { return grid };
-        let first = self.starts_at(scales, term, &grid, |s| Some(Arc::new(self.rows_along(along, term.0, s))));
+        let own = along.resisted(&self.fit.model, [term.0]);
+        let rows_of = |s: &Settings| Some(Arc::new(self.rows_along(along, &own, term.0, s)));
+        let first = self.starts_at(scales, term, &grid, rows_of);
         if first.len() < RUN { grid } else { first.into_iter().take(RUN).map(|s| s.shapes).collect() }
     }
 
@@ -377,7 +378,7 @@ impl Screening<'_> {
         scales: &Scales,
         term: Term,
         grid: &[Settings],
-        rows_of: impl Fn(&Settings) -> Option<Arc<Rows>> + Sync,
+        rows_of: impl Fn(&Settings) -> Option<Arc<Spectra>> + Sync,
     ) -> Vec<StartPoint> {
         let mut all: Vec<StartPoint> =
             grid.par_iter().filter_map(|s| self.start_at(scales, term, s, &rows_of)).collect();
@@ -391,7 +392,7 @@ impl Screening<'_> {
         scales: &Scales,
         (effect, form): Term,
         shapes: &Settings,
-        rows_of: impl Fn(&Settings) -> Option<Arc<Rows>>,
+        rows_of: impl Fn(&Settings) -> Option<Arc<Spectra>>,
     ) -> Option<StartPoint> {
         let (p, fit) = (&self.problem, &self.fit);
         let info = effect.info();
