@@ -12,6 +12,12 @@ use crate::scalar::Scalar;
 const FADE: ParameterInfo =
     ParameterInfo::shape("fade", "1/s", 0.0, 0.0, 1e3, "Rate at which the change comes to rest; 0: it goes on");
 
+/// Whether a change is still under way over a good part of a record of that length, s: what has come to rest within a tenth of it was
+/// there all the time, and is no drift.
+fn is_slow(fade: f64, length: f64) -> bool {
+    fade * length <= 10.0
+}
+
 /// The time that a steady drift would have needed to come as far.
 fn drifted<S: Scalar>(fade: S, time: f64) -> S {
     mean_decay(fade * time) * time
@@ -37,7 +43,7 @@ impl Force for StiffnessDrift {
         named: true,
         textbook: false,
         odds: 0.05,
-        bounds: |p, x| (p[0] * x.length).abs() <= 0.95,
+        bounds: |p, x| (p[0] * x.length).abs() <= 0.95 && is_slow(p[1], x.length),
         example: &[0.3, 0.5],
         variants: &[Variant { name: "", free: &[0] }, Variant { name: "that comes to rest", free: &[0, 1] }],
     };
@@ -72,7 +78,7 @@ impl DryFriction for FrictionDrift {
         named: true,
         textbook: false,
         odds: 0.01,
-        bounds: |p, x| p[0].abs() * x.length <= x.torque,
+        bounds: |p, x| p[0].abs() * x.length <= x.torque && is_slow(p[2], x.length),
         example: &[4e-3, 1e-4, 0.5],
         variants: &[
             Variant { name: "dry", free: &[0] },
@@ -87,5 +93,17 @@ impl DryFriction for FrictionDrift {
         let s = drifted(p[2], slip.time);
         let per_speed = p[1].re() * s.re();
         Level { per_speed, constant: per_speed == 0.0, ..Level::constant((p[0] + p[1] * slip.speed) * s) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_over_within_a_tenth_of_the_record_is_no_drift() {
+        // 99 % of the change is over after 4.6 of its time constants: of a fast one within half of the record.
+        assert!([0.0, 0.05, 0.5, 0.99].iter().all(|fade| is_slow(*fade, 10.0)));
+        assert!(![1.01, 193.0].iter().any(|fade| is_slow(*fade, 10.0)));
     }
 }
