@@ -42,6 +42,12 @@ impl Pool {
         likeliest_of(terms, self.fits.iter().filter(|f| f.converged))
     }
 
+    /// Takes the fits of these effects in these forms out.
+    pub fn give_up(&mut self, terms: &[Term]) {
+        let given_up = sorted(terms);
+        self.fits.retain(|f| sorted(&f.terms) != given_up);
+    }
+
     /// All of them.
     pub fn fits(&self) -> &[Fit] {
         &self.fits
@@ -63,4 +69,29 @@ fn sorted(terms: &[Term]) -> Vec<Term> {
     let mut terms = terms.to_vec();
     terms.sort_unstable();
     terms
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Parameters, Structure};
+    use crate::effects::{Effect, Settings};
+    use crate::hypothesis::model::Model;
+
+    #[test]
+    fn what_is_given_up_goes_in_any_order_and_other_forms_stay() {
+        let (coulomb, drift) = (Effect::CoulombMotor, Effect::FrictionDrift);
+        let model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
+        let all: [Vec<Term>; 4] = [
+            vec![(coulomb, 0), (drift, 1)],
+            vec![(drift, 1), (coulomb, 0)],
+            vec![(coulomb, 0)],
+            vec![(coulomb, 1), (drift, 1)],
+        ];
+        let mut pool = Pool::default();
+        pool.extend(all.iter().map(|terms| Fit::of_likelihood(model, terms, 0.0)));
+        pool.give_up(&all[0]);
+        let left: Vec<&Vec<Term>> = pool.fits().iter().map(|f| &f.terms).collect();
+        assert_eq!(left, [&all[2], &all[3]]);
+    }
 }

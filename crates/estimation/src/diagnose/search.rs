@@ -134,12 +134,19 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
         }
         search.extend_rivals(&chosen, &mut pool);
         let Some(better) = search.better_in_pool(&chosen, &pool) else { break };
+        let terms = better.terms.clone();
         let better = search.pruned(better, &mut pool);
         let other = search.stepwise(better, &mut pool);
         if other.terms == chosen.terms {
             break;
         }
-        chosen = other;
+        let share = search.independent(std::slice::from_ref(&chosen));
+        if search.evidence(&other, share) > search.evidence(&chosen, share) {
+            chosen = other;
+        } else {
+            // It was likelier by what is no cause alone.
+            pool.give_up(&terms);
+        }
     }
     (search.progress)("the forms of what was found");
     let chosen = search.in_best_form(chosen, &mut pool);
@@ -304,7 +311,10 @@ impl Search<'_> {
             return;
         }
         let share = self.independent(std::slice::from_ref(chosen));
-        for size in 1..=chosen.terms.len().max(1) {
+        // Of one inertia a further cause costs little, and of many small ones none helps much before the others are there.
+        let rigid = self.problem.nominal.structure == Structure::Rigid;
+        let deepest = if rigid && !self.is_exact(chosen) { MOST - 1 } else { chosen.terms.len().max(1) };
+        for size in 1..=deepest {
             for fit in self.likeliest(size, share, pool) {
                 if self.is_over_half_of_budget() {
                     return;
