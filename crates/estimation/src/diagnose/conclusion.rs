@@ -9,7 +9,7 @@ use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
 use super::verdict::Verdict;
 use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
-use crate::effects::{Effect, Family};
+use crate::effects::{EFFECTS, Effect, Family};
 use crate::examine::NOMINAL_OFF;
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
 use crate::hypothesis::fit::Fit;
@@ -349,9 +349,10 @@ impl Search<'_> {
 }
 
 /// Probability that an effect is there, and what no cause explains does not do as it would: of what the record says for it, and of how
-/// often machines have it. Friction is named that explains half of what is left without it, a spring is not.
+/// often machines have its like, whatever its law. Friction is named that explains half of what is left without it, a spring is not.
 fn discounted(effect: Effect, decisive: f64) -> f64 {
-    let odds = effect.info().odds;
+    let like = EFFECTS.iter().filter(|like| like.is_alternative_to(effect)).map(|like| like.info().odds);
+    let odds = like.fold(effect.info().odds, f64::max);
     odds * decisive / (odds * decisive + (1.0 - decisive))
 }
 
@@ -414,8 +415,10 @@ mod tests {
 
     #[test]
     fn friction_needs_less_beside_a_remainder_than_what_few_machines_have() {
-        // Odds of 3 and of one to one: 0.6 of it is 1.8/2.2.
-        assert!((discounted(Effect::CoulombMotor, 0.6) - 1.8 / 2.2).abs() < 1e-12);
+        // Odds of ten to one, whatever the law: 0.6 of it is 6/6.4.
+        for friction in [Effect::CoulombMotor, Effect::PreslidingMotor] {
+            assert!((discounted(friction, 0.6) - 6.0 / 6.4).abs() < 1e-12);
+        }
         let spring = Effect::ExternalSpring.info().odds;
         assert!((discounted(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
         assert!(discounted(Effect::ExternalSpring, 0.6) < LIKELY && LIKELY < discounted(Effect::ViscousTable, 0.5));
