@@ -17,7 +17,7 @@ use crate::hypothesis::discrepancy::Discrepancy;
 use crate::hypothesis::fit::{Fit, STEPS};
 use crate::hypothesis::likelihood::Band;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::problem::{Problem, largest};
+use crate::hypothesis::problem::{Problem, Work, largest};
 use crate::numerics::level::deviation;
 
 /// Samples, at the rate of the band, that a search works on at most: the first of the record.
@@ -92,14 +92,15 @@ fn referred(
 }
 
 impl Prepared {
-    /// A search in it for some effects.
+    /// A search in it for some effects, its work counted with that of other looks.
     pub fn search<'a>(
         &'a self,
         case: &Case<'_>,
         suspects: Vec<Effect>,
+        work: &Work,
         progress: &'a (dyn Fn(&str) + Sync),
     ) -> Search<'a> {
-        let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak);
+        let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak).counted_in(work);
         let reference = self.reference;
         Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
     }

@@ -24,6 +24,7 @@ use crate::conditioning::{Record, bridged};
 use crate::effects::Effect;
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::Fit;
+use crate::hypothesis::problem::Work;
 
 /// Share of the torque that an account of a rigid axis leaves at most where the band that its motion rules is understood so far that what
 /// it lacks may be the edge of a cause that lies beyond.
@@ -35,6 +36,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
     let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
     let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
+    let work = Work::default();
     // What leaves so little that the error of the band's rate counts is settled at the record's own.
     let near = |d: &Decision, p: &Prepared| {
         !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR_THE_NOISE
@@ -42,7 +44,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let refined = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
         let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
         progress("at the record's own rate");
-        let other = decide(own.search(case, likely(&decision), progress), Some(&decision.chosen));
+        let other = decide(own.search(case, likely(&decision), &work, progress), Some(&decision.chosen));
         let [left, own_left] = [searched.left(&decision.chosen), own.left(&other.chosen)];
         let leaves_more = is_materially_less(left * left, own_left * own_left);
         // A closer look has no more to explain.
@@ -51,13 +53,13 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     // A rigid axis is taken to be under control.
     let rigid = case.nominal.structure == Structure::Rigid;
     let (searched, own) = prepared(&train, &case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
-    let decision = decide(searched.search(case, suspects.clone(), progress), None);
+    let decision = decide(searched.search(case, suspects.clone(), &work, progress), None);
     let (mut searched, mut decision) = refined(searched, own, decision);
     let left = searched.left(&decision.chosen);
     if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
         progress("beyond the band that the motion rules");
         let (wide, own) = prepared(&train, &case.nominal, Reach::Whole);
-        let further = decide_further(wide.search(case, suspects.clone(), progress), &decision.chosen);
+        let further = decide_further(wide.search(case, suspects.clone(), &work, progress), &decision.chosen);
         if let Some((wide, other)) = further.map(|d| refined(wide, own, d))
             // More to explain and less left of it: what was missing is there.
             && wide.left(&other.chosen) < left
@@ -65,7 +67,7 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
             (searched, decision) = (wide, other);
         }
     }
-    if let Some((part, other)) = further_on(&searched, &train, case, suspects, &decision.chosen, progress) {
+    if let Some((part, other)) = further_on(&searched, &train, case, (suspects, &work), &decision.chosen, progress) {
         (searched, decision) = (part, other);
     }
     progress("held-out data");
@@ -92,12 +94,12 @@ fn further_on(
     searched: &Prepared,
     train: &Record,
     case: &Case<'_>,
-    suspects: Vec<Effect>,
+    (suspects, work): (Vec<Effect>, &Work),
     chosen: &Fit,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Option<(Prepared, Decision)> {
     let (part, lacks) = searched.worst_beyond(train, case, &chosen.model)?;
-    let search = part.search(case, suspects, progress);
+    let search = part.search(case, suspects, work, progress);
     if !search.leaves_materially_less(&lacks, chosen) {
         return None;
     }

@@ -50,9 +50,11 @@ pub struct Problem<'a> {
     pub(super) exact: bool,
     /// Largest change of a nominal parameter, in its logarithm.
     pub farthest: f64,
-    /// Steps simulated so far.
-    steps: Arc<AtomicU64>,
+    steps: Work,
 }
+
+/// Steps simulated so far, in one look at a record or in several.
+pub type Work = Arc<AtomicU64>;
 
 impl<'a> Problem<'a> {
     /// A record compared in a band, its largest torque that of the log.
@@ -108,6 +110,12 @@ impl Problem<'_> {
             InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.record)
         };
         Self { dynamics: dynamics().map(Arc::new), ..self.clone() }
+    }
+
+    /// The same, its steps counted with those of other looks.
+    #[must_use]
+    pub fn counted_in(self, steps: &Work) -> Self {
+        Self { steps: steps.clone(), ..self }
     }
 
     /// The same for fits that are made to their end.

@@ -104,7 +104,7 @@ fn near_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_p
     let (searched, _) = prepared(&record, &nominal, Reach::Shown);
     let suspects =
         EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
-    let mut search = searched.search(&case, suspects, &|_| ());
+    let mut search = searched.search(&case, suspects, &Work::default(), &|_| ());
     let fit = search.only_near_the_data_sheet().expect("causes");
     assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
     assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);

@@ -14,10 +14,10 @@ fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
         let nominal = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
         let case = case(&record, nominal, &noise);
         let (searched, _) = prepared(&record.part(0..2800), &nominal, Reach::Ruled);
-        let found = decide(searched.search(&case, EFFECTS.to_vec(), &|_| ()), None).chosen;
+        let found = decide(searched.search(&case, EFFECTS.to_vec(), &Work::default(), &|_| ()), None).chosen;
         assert_eq!(found.effects(), [Effect::CoulombMotor]);
         let (part, lacks) = searched.worst_beyond(&record, &case, &found.model).expect("a further part");
-        let search = part.search(&case, EFFECTS.to_vec(), &|_| ());
+        let search = part.search(&case, EFFECTS.to_vec(), &Work::default(), &|_| ());
         assert!(!late || search.leaves_materially_less(&lacks, &found));
         let all = decide_further(search, &found).map(|d| d.chosen.effects());
         assert_eq!(all, late.then(|| vec![Effect::CoulombMotor, Effect::EndStop]));
