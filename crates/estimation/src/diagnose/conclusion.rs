@@ -415,9 +415,9 @@ mod tests {
 
     #[test]
     fn friction_needs_less_beside_a_remainder_than_what_few_machines_have() {
-        // Odds of ten to one, whatever the law: 0.6 of it is 6/6.4.
+        // Odds of six to one, whatever the law: 0.6 of it is 3.6/4.
         for friction in [Effect::CoulombMotor, Effect::PreslidingMotor] {
-            assert!((discounted(friction, 0.6) - 6.0 / 6.4).abs() < 1e-12);
+            assert!((discounted(friction, 0.6) - 3.6 / 4.0).abs() < 1e-12);
         }
         let spring = Effect::ExternalSpring.info().odds;
         assert!((discounted(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
