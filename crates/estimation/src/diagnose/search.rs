@@ -27,8 +27,8 @@ use crate::hypothesis::scales::Scales;
 
 /// Most causes looked for.
 const MOST: usize = 5;
-/// Simulated steps, of all looks at a record, after which what was found is only added to: fifteen seconds on two cores. One record in
-/// twenty has more. Half of them are for ways that were passed by.
+/// Simulated steps, of all looks at a record, after which what was found is only added to, fifteen to twenty seconds on two cores: one
+/// record in twenty has more. Half of them are for ways that were passed by.
 const BUDGET: u64 = 60_000_000;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
