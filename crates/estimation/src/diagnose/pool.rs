@@ -44,8 +44,7 @@ impl Pool {
 
     /// Takes the fits of these effects in these forms out.
     pub fn give_up(&mut self, terms: &[Term]) {
-        let given_up = sorted(terms);
-        self.fits.retain(|f| sorted(&f.terms) != given_up);
+        self.fits.retain(|f| !has_just(f, terms));
     }
 
     /// All of them.
@@ -61,8 +60,12 @@ impl Pool {
 
 /// The likeliest fit of these effects in these forms, in any order.
 pub fn likeliest_of<'f>(terms: &[Term], fits: impl IntoIterator<Item = &'f Fit>) -> Option<&'f Fit> {
-    let same = |f: &&Fit| f.terms.len() == terms.len() && terms.iter().all(|t| f.terms.contains(t));
-    fits.into_iter().filter(same).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+    fits.into_iter().filter(|f| has_just(f, terms)).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+}
+
+/// Whether a fit is of these effects in these forms, in any order.
+fn has_just(fit: &Fit, terms: &[Term]) -> bool {
+    fit.terms.len() == terms.len() && terms.iter().all(|t| fit.terms.contains(t))
 }
 
 fn sorted(terms: &[Term]) -> Vec<Term> {

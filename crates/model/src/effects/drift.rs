@@ -12,8 +12,8 @@ use crate::scalar::Scalar;
 const FADE: ParameterInfo =
     ParameterInfo::shape("fade", "1/s", 0.0, 0.0, 1e3, "Rate at which the change comes to rest; 0: it goes on");
 
-/// Whether a change is still under way over a good part of a record of that length, s: what has come to rest within a tenth of it was
-/// there all the time, and is no drift.
+/// Whether a change is under way over a good part of a record of that length, s: with a time constant below a tenth of it, it is over in
+/// half of the record and was there nearly all the time, which is no drift.
 fn is_slow(fade: f64, length: f64) -> bool {
     fade * length <= 10.0
 }
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_change_over_within_a_tenth_of_the_record_is_no_drift() {
+    fn a_change_with_a_time_constant_below_a_tenth_of_the_record_is_no_drift() {
         // 99 % of the change is over after 4.6 of its time constants: of a fast one within half of the record.
         assert!([0.0, 0.05, 0.5, 0.99].iter().all(|fade| is_slow(*fade, 10.0)));
         assert!(![1.01, 193.0].iter().any(|fade| is_slow(*fade, 10.0)));
