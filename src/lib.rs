@@ -8,7 +8,7 @@
 //! eixo_model         axis, drive, effects, scalar                depends on nothing
 //! eixo_fmu           fmi2, fmi3, variables                       -> eixo_model
 //! eixo_records       trace                                       -> eixo_model
-//! eixo_estimation    numerics, conditioning, hypothesis,
+//! eixo_estimation    numerics, conditioning, hypothesis, control,
 //!                    identify, examine, diagnose                 -> eixo_model, eixo_records
 //! eixo_validator     fmu (all but fmu::package)                  -> eixo_records
 //! ```
@@ -16,7 +16,7 @@
 //! Imports run downward only: `cli -> fleet -> report -> circle`, `cli -> serve`, `cli -> package -> circle`, and from each of them to the
 //! crates.
 
-pub use eixo_estimation::{diagnose, examine, identify, numerics};
+pub use eixo_estimation::{control, diagnose, examine, identify, numerics};
 pub use eixo_fmu::{fmi2, fmi3, variables};
 pub use eixo_model::{axis, drive, effects, scalar};
 pub use eixo_records as trace;

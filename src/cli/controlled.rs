@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use super::examined::Part;
-use crate::diagnose::{Model, Record, UnderControl};
+use crate::control::UnderControl;
+use crate::diagnose::{Model, Record};
 use crate::fmu::simulate::{Column, Setting, SimulationResult};
 use crate::report::Block;
 use crate::report::diagnose::errors_in_the_loop;

@@ -12,8 +12,9 @@ use super::outputs;
 use super::progress::Progress;
 use super::stdout::{WIDTH, layout, out};
 use crate::axis::Structure;
+use crate::control::UnderControl;
 use crate::diagnose::{
-    CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, UnderControl, diagnose, estimate_noise,
+    CHANNELS, Case, Estimate, Model, NoiseEstimate, Outcome, Record, Replay, diagnose, estimate_noise, verified,
 };
 use crate::effects::{EFFECTS, Effect};
 use crate::fleet::{Found, Tracked};
@@ -146,7 +147,7 @@ fn examine(
             Some(reference) => {
                 let command = command.as_deref().unwrap_or(&train.torque);
                 let seen = UnderControl { record: &train, reference, command, controller };
-                outcome.diagnosis.closed_loop = Some(seen.verify(&outcome.decision));
+                outcome.diagnosis.closed_loop = Some(verified(&seen, &outcome.decision));
             }
             None => warnings.push(format!(
                 "{}: [controller] is given, but the trace has no column of the reference: the loop is not simulated.",

@@ -1,6 +1,7 @@
 //! `diagnosis.json`: names and order of the fields are a contract with programs.
 
-use eixo::diagnose::{ClosedLoop, Commands, Hypothesis, LoopErrors, LoopRanked};
+use eixo::control::LoopErrors;
+use eixo::diagnose::{ClosedLoop, Commands, Hypothesis, LoopRanked};
 use eixo::report::diagnose::json::value;
 use serde_json::Value;
 

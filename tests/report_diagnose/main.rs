@@ -4,9 +4,8 @@ mod contract;
 mod fixture;
 mod words;
 
-use eixo::diagnose::{
-    ClosedLoop, Commands, Confusable, Diagnosis, Hypothesis, LoopErrors, LoopRanked, Site, Undecided, Verdict,
-};
+use eixo::control::LoopErrors;
+use eixo::diagnose::{ClosedLoop, Commands, Confusable, Diagnosis, Hypothesis, LoopRanked, Site, Undecided, Verdict};
 use eixo::effects::{Effect, Place};
 use eixo::report::diagnose::{Findings, json, report, short};
 use eixo::report::terminal::{self, Layout};

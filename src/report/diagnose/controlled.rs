@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::naming::{improved, title};
 use super::sentences;
-use crate::diagnose::{Diagnosis, LoopErrors, Verdict};
+use crate::control::LoopErrors;
+use crate::diagnose::{Diagnosis, Verdict};
 use crate::report::chart::{Axis, Chart, Colour, Dash, Series};
 use crate::report::{Block, Cell, Figure, Table};
 use crate::trace::{AxisKind, Signal};

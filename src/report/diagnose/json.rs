@@ -4,10 +4,11 @@ use serde_json::{Map, Value, json};
 
 use super::naming::{RESIDUAL, held_out, variable};
 use super::sentences;
+use crate::control::LoopErrors;
 use crate::diagnose::location::{FrequencyPart, PartOf, Side, StateCurve, TimeSlot};
 use crate::diagnose::{
-    AxisParameter, Cause, ClosedLoop, ClosureOf, Diagnosis, Estimate, Figures, GapReport, Levels, LoopErrors, Ranked,
-    Remainder, Site, Verdict, Where,
+    AxisParameter, Cause, ClosedLoop, ClosureOf, Diagnosis, Estimate, Figures, GapReport, Levels, Ranked, Remainder,
+    Site, Verdict, Where,
 };
 
 /// Name and version of the format.

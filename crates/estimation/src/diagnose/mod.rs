@@ -27,7 +27,7 @@ mod weighing;
 pub use crate::conditioning::{CHANNELS, NoiseEstimate, NoiseMethod, Record, TORQUE, estimate_noise, find_period};
 pub use crate::hypothesis::{BaseParameter, Fit, Hypothesis, Model};
 pub use assess::{Case, Outcome, Replay};
-pub use closed_loop::{ClosedLoop, Commands, LoopErrors, LoopRanked, Sample, UnderControl};
+pub use closed_loop::{ClosedLoop, Commands, LoopRanked, verified};
 pub use conclusion::{Decision, UNCAUSED};
 pub use diagnosis::{
     AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Levels, Ranked, Remainder,
