@@ -86,7 +86,7 @@ impl Search<'_> {
     /// The verdict on the hypothesis at the end.
     pub fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, mut pool: Vec<Fit>) -> Decision {
         pool.push(chosen.clone());
-        let independent = self.independent(std::slice::from_ref(&chosen));
+        let independent = self.independent([&chosen]);
         let nominal = &self.problem.nominal;
         let is_off = self.evidence(&parameters, independent) > self.evidence(&given, independent);
         let plain = if is_off { parameters.clone() } else { given.clone() };

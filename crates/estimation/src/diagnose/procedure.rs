@@ -17,7 +17,7 @@ use super::material::{NEAR_THE_NOISE, NEGLIGIBLE, is_materially_less};
 use super::prepared::{Prepared, prepared};
 use super::quantisation;
 use super::residual::located;
-use super::search::{decide, decide_further};
+use super::search::{Search, decide, decide_further};
 use super::summary::{build, overlays};
 use crate::axis::Structure;
 use crate::conditioning::{Record, bridged};
@@ -34,42 +34,7 @@ const UNDERSTOOD: f64 = 0.1;
 #[must_use]
 pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     let (train, held) = split(case);
-    let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
-    let suspects: Vec<Effect> = case.suspects.iter().copied().filter(may).collect();
-    let work = Work::default();
-    // What leaves so little that the error of the band's rate counts is settled at the record's own.
-    let near = |d: &Decision, p: &Prepared| {
-        !d.chosen.terms.is_empty() && p.band.noise_multiple(&d.chosen.rows) < NEAR_THE_NOISE
-    };
-    let refined = |searched: Prepared, own: Option<Prepared>, decision: Decision| {
-        let Some(own) = own.filter(|_| near(&decision, &searched)) else { return (searched, decision) };
-        progress("at the record's own rate");
-        let other = decide(own.search(case, likely(&decision), &work, progress), Some(&decision.chosen));
-        let [left, own_left] = [searched.left(&decision.chosen), own.left(&other.chosen)];
-        let leaves_more = is_materially_less(left * left, own_left * own_left);
-        // A closer look has no more to explain.
-        if own_left > NEGLIGIBLE && leaves_more { (searched, decision) } else { (own, other) }
-    };
-    // A rigid axis is taken to be under control.
-    let rigid = case.nominal.structure == Structure::Rigid;
-    let (searched, own) = prepared(&train, &case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
-    let decision = decide(searched.search(case, suspects.clone(), &work, progress), None);
-    let (mut searched, mut decision) = refined(searched, own, decision);
-    let left = searched.left(&decision.chosen);
-    if rigid && (NEGLIGIBLE..UNDERSTOOD).contains(&left) && !searched.band.at_floor(&decision.chosen.rows) {
-        progress("beyond the band that the motion rules");
-        let (wide, own) = prepared(&train, &case.nominal, Reach::Whole);
-        let further = decide_further(wide.search(case, suspects.clone(), &work, progress), &decision.chosen);
-        if let Some((wide, other)) = further.map(|d| refined(wide, own, d))
-            // More to explain and less left of it: what was missing is there.
-            && wide.left(&other.chosen) < left
-        {
-            (searched, decision) = (wide, other);
-        }
-    }
-    if let Some((part, other)) = further_on(&searched, &train, case, (suspects, &work), &decision.chosen, progress) {
-        (searched, decision) = (part, other);
-    }
+    let (searched, decision) = Looks::new(case, progress).decided(&train);
     progress("held-out data");
     let fits = [&decision.given, &decision.parameters, &decision.chosen];
     let models = fits.map(|f| f.model);
@@ -89,23 +54,85 @@ pub fn diagnose(case: &Case<'_>, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
     Outcome { diagnosis, improved: models[2], models, decision, overlays, replay }
 }
 
-/// What joins the causes of the searched part of a record where their model lacks materially more, further on in it.
-fn further_on(
-    searched: &Prepared,
-    train: &Record,
-    case: &Case<'_>,
-    (suspects, work): (Vec<Effect>, &Work),
-    chosen: &Fit,
-    progress: &(dyn Fn(&str) + Sync),
-) -> Option<(Prepared, Decision)> {
-    let (part, lacks) = searched.worst_beyond(train, case, &chosen.model)?;
-    let search = part.search(case, suspects, work, progress);
-    if !search.leaves_materially_less(&lacks, chosen) {
-        return None;
+/// The looks that are taken at one record: in its band, at its own rate, in a wider band, further on in it.
+struct Looks<'a> {
+    case: &'a Case<'a>,
+    /// Effects that may be named.
+    suspects: Vec<Effect>,
+    /// What all of them have simulated.
+    work: Work,
+    progress: &'a (dyn Fn(&str) + Sync),
+}
+
+impl<'a> Looks<'a> {
+    fn new(case: &'a Case<'a>, progress: &'a (dyn Fn(&str) + Sync)) -> Self {
+        let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
+        let suspects = case.suspects.iter().copied().filter(may).collect();
+        Self { case, suspects, work: Work::default(), progress }
     }
-    progress("a later part of the record");
-    let other = decide_further(search, chosen)?;
-    Some((part, other))
+
+    /// A search for every effect that may be named.
+    fn search<'p>(&'p self, prepared: &'p Prepared) -> Search<'p> {
+        prepared.search(self.case, self.suspects.clone(), &self.work, self.progress)
+    }
+
+    /// The decision on a record, and the look that it was made in.
+    fn decided(&self, train: &Record) -> (Prepared, Decision) {
+        // A rigid axis is taken to be under control.
+        let rigid = self.case.nominal.structure == Structure::Rigid;
+        let (searched, own) = prepared(train, &self.case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
+        let decision = decide(self.search(&searched), None);
+        let (mut searched, mut decision) = self.at_own_rate(searched, own, decision);
+        if let Some(wide) = rigid.then(|| self.beyond_the_band(train, &searched, &decision)).flatten() {
+            (searched, decision) = wide;
+        }
+        self.further_on(train, &searched, &decision.chosen).unwrap_or((searched, decision))
+    }
+
+    /// What leaves so little that the error of the band's rate counts is settled at the record's own.
+    fn at_own_rate(&self, searched: Prepared, own: Option<Prepared>, decision: Decision) -> (Prepared, Decision) {
+        let is_near =
+            !decision.chosen.terms.is_empty() && searched.band.noise_multiple(&decision.chosen.rows) < NEAR_THE_NOISE;
+        let Some(own) = own.filter(|_| is_near) else { return (searched, decision) };
+        (self.progress)("at the record's own rate");
+        let search = own.search(self.case, likely(&decision), &self.work, self.progress);
+        let other = decide(search, Some(&decision.chosen));
+        let [left, own_left] = [searched.left(&decision.chosen), own.left(&other.chosen)];
+        let leaves_more = is_materially_less(left * left, own_left * own_left);
+        // A closer look has no more to explain.
+        if own_left > NEGLIGIBLE && leaves_more { (searched, decision) } else { (own, other) }
+    }
+
+    /// What joins the causes of a rigid axis where the band is whole, and leaves less there.
+    fn beyond_the_band(
+        &self,
+        train: &Record,
+        searched: &Prepared,
+        decision: &Decision,
+    ) -> Option<(Prepared, Decision)> {
+        let left = searched.left(&decision.chosen);
+        if !(NEGLIGIBLE..UNDERSTOOD).contains(&left) || searched.band.at_floor(&decision.chosen.rows) {
+            return None;
+        }
+        (self.progress)("beyond the band that the motion rules");
+        let (wide, own) = prepared(train, &self.case.nominal, Reach::Whole);
+        let further = decide_further(self.search(&wide), &decision.chosen)?;
+        let (wide, other) = self.at_own_rate(wide, own, further);
+        // More to explain and less left of it: what was missing is there.
+        (wide.left(&other.chosen) < left).then_some((wide, other))
+    }
+
+    /// What joins the causes of the searched part of a record where their model lacks materially more, further on in it.
+    fn further_on(&self, train: &Record, searched: &Prepared, chosen: &Fit) -> Option<(Prepared, Decision)> {
+        let (part, lacks) = searched.worst_beyond(train, self.case, &chosen.model)?;
+        let search = self.search(&part);
+        if !search.leaves_materially_less(&lacks, chosen) {
+            return None;
+        }
+        (self.progress)("a later part of the record");
+        let other = decide_further(search, chosen)?;
+        Some((part, other))
+    }
 }
 
 /// The record that the fits see, and the one that they do not.

@@ -140,8 +140,7 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
         if other.terms == chosen.terms {
             break;
         }
-        let share = search.independent(std::slice::from_ref(&chosen));
-        if search.evidence(&other, share) > search.evidence(&chosen, share) {
+        if search.is_likelier_by(search.independent([&chosen]), &other, &chosen) {
             chosen = other;
         } else {
             // It was likelier by what is no cause alone.
@@ -200,15 +199,24 @@ impl Search<'_> {
     }
 
     /// Share of independent values of the residual of the likeliest.
-    pub fn independent(&self, fits: &[Fit]) -> f64 {
-        let best = fits.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+    pub fn independent<'f>(&self, fits: impl IntoIterator<Item = &'f Fit>) -> f64 {
+        let best = fits.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
         best.map_or(1.0, |f| self.band().independent(&f.rows, f.discrepancy))
     }
 
     /// Whether a fit is likelier than another, with as much of its residual independent as the one that fits better leaves so.
     fn is_likelier(&self, fit: &Fit, than: &Fit) -> bool {
-        let share = self.independent(&[fit.clone(), than.clone()]);
+        self.is_likelier_by(self.independent([fit, than]), fit, than)
+    }
+
+    /// The same with a share of its residual independent.
+    fn is_likelier_by(&self, share: f64, fit: &Fit, than: &Fit) -> bool {
         self.evidence(fit, share) > self.evidence(than, share)
+    }
+
+    /// The likeliest of several accounts, with as much of the residual independent as the one that fits best leaves so.
+    fn likeliest_account(&self, fits: &[Fit]) -> Option<Fit> {
+        self.best(fits, self.independent(fits)).cloned()
     }
 
     fn best<'f>(&self, fits: &'f [Fit], independent: f64) -> Option<&'f Fit> {
@@ -264,7 +272,7 @@ impl Search<'_> {
         if self.at_floor(chosen) || self.is_negligible(chosen) {
             return None;
         }
-        let share = self.independent(std::slice::from_ref(chosen));
+        let share = self.independent([chosen]);
         let most = self.longest_rival(chosen);
         // A longer account is believed, as several at once are, where it explains the torque.
         let is_rival = |f: &&Fit| !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f));
@@ -284,7 +292,7 @@ impl Search<'_> {
             added.into_iter().filter(|f| self.is_material(best, f) && !is_lost(best, f, share)).collect();
         let share = self.independent(&all);
         let next = self.best(&all, share)?;
-        (self.evidence(next, share) > self.evidence(best, share)).then(|| next.clone())
+        self.is_likelier_by(share, next, best).then(|| next.clone())
     }
 
     /// Effects added as long as a measure grows that takes all that is left as independent, and dropped at the end where it is not: each of
@@ -310,7 +318,7 @@ impl Search<'_> {
         if self.at_floor(chosen) || self.is_negligible(chosen) {
             return;
         }
-        let share = self.independent(std::slice::from_ref(chosen));
+        let share = self.independent([chosen]);
         // Of one inertia a further cause costs little, and of many small ones none helps much before the others are there.
         let rigid = self.problem.nominal.structure == Structure::Rigid;
         let deepest = if rigid && !self.is_exact(chosen) { MOST - 1 } else { chosen.terms.len().max(1) };
@@ -373,10 +381,7 @@ impl Search<'_> {
             let mut all = self.extended(&without, i, pool);
             pool.push(without);
             all.push(best.clone());
-            let share = self.independent(&all);
-            if let Some(other) = self.best(&all, share) {
-                best = other.clone();
-            }
+            best = self.likeliest_account(&all).unwrap_or(best);
         }
         best
     }
@@ -391,10 +396,7 @@ impl Search<'_> {
             let mut all = self.reformed(&best, i);
             pool.extend(all.iter().cloned());
             all.push(best.clone());
-            let share = self.independent(&all);
-            if let Some(other) = self.best(&all, share) {
-                best = other.clone();
-            }
+            best = self.likeliest_account(&all).unwrap_or(best);
         }
         best
     }
@@ -406,11 +408,11 @@ impl Search<'_> {
             let mut all: Vec<Fit> =
                 (0..best.terms.len()).into_par_iter().filter_map(|i| self.without(&best, i, pool)).collect();
             pool.extend(all.iter().cloned());
-            let share = self.independent(std::slice::from_ref(&best));
+            let share = self.independent([&best]);
             all.retain(|plain| {
-                !self.is_material(plain, &best) || is_lost(plain, &best, share) || {
-                    self.evidence(plain, share) >= self.evidence(&best, share)
-                }
+                !self.is_material(plain, &best)
+                    || is_lost(plain, &best, share)
+                    || !self.is_likelier_by(share, &best, plain)
             });
             match self.best(&all, share) {
                 Some(plain) => best = plain.clone(),
