@@ -8,9 +8,9 @@ use crate::diagnose::{
     UNCAUSED, Undecided, Verdict,
 };
 use crate::effects::{Contrast, Effect};
-use crate::examine::NOMINAL_OFF;
 use crate::report::format::{self, Medium};
 use crate::trace::AxisKind;
+use crate::trace::machine::NOMINAL_OFF;
 
 /// The verdict in a sentence.
 pub fn sentence(d: &Diagnosis) -> String {

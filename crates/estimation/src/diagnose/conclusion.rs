@@ -4,16 +4,16 @@ use std::sync::atomic::Ordering;
 
 use super::diagnosis::Undecided;
 use super::material::{MATERIAL, MINOR, NEAR_THE_NOISE};
-use super::moves::MOVED_WITH_EFFECTS;
+use super::moves::{MOVED, MOVED_WITH_EFFECTS};
 use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
 use super::verdict::Verdict;
 use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
-use crate::effects::{EFFECTS, Effect, Family};
-use crate::examine::NOMINAL_OFF;
+use crate::effects::{EFFECTS, Effect, Family, ONCE};
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
 use crate::hypothesis::fit::Fit;
 use crate::hypothesis::model::Model;
+use crate::trace::machine::NOMINAL_OFF;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
 const GAIN_LIKENESS: f64 = 0.25;
@@ -181,7 +181,9 @@ impl Search<'_> {
                 None if is_determined(i) => 1.0,
                 None => 0.0,
             };
-            discounted(effect, steadiness(finished, effect, independent) * decisive) * doubt
+            let repeats = self.problem.scales.as_ref().is_none_or(|s| s.repeats(effect, &chosen.model));
+            let odds = if repeats { usual_odds(effect) } else { ONCE };
+            discounted(odds, steadiness(finished, effect, independent) * decisive) * doubt
         };
         let standing: Vec<f64> = all.clone().map(standing).collect();
         let twins = all.map(|i| self.constant_instead(chosen, i, &pool, independent)).collect();
@@ -348,11 +350,15 @@ impl Search<'_> {
     }
 }
 
-/// Probability that an effect is there, and what no cause explains does not do as it would: of what the record says for it, and of how
-/// often machines have its like, whatever its law. Friction is named that explains half of what is left without it, a spring is not.
-fn discounted(effect: Effect, decisive: f64) -> f64 {
+/// How often machines have the like of an effect, whatever its law.
+fn usual_odds(effect: Effect) -> f64 {
     let like = EFFECTS.iter().filter(|like| like.is_alternative_to(effect)).map(|like| like.info().odds);
-    let odds = like.fold(effect.info().odds, f64::max);
+    like.fold(effect.info().odds, f64::max)
+}
+
+/// Probability that an effect of such odds is there, and what no cause explains does not do as it would. Friction is named that explains
+/// half of what is left without it, a spring is not.
+fn discounted(odds: f64, decisive: f64) -> f64 {
     odds * decisive / (odds * decisive + (1.0 - decisive))
 }
 
@@ -362,9 +368,9 @@ fn inertia_off(fit: &Fit, nominal: &Model) -> f64 {
     (inertia(&fit.model) / inertia(nominal)).ln().abs()
 }
 
-/// Whether that is so far that what is fitted beside it says nothing of this axis.
+/// Whether that is nearly as far as it may be: what is fitted beside it says nothing of this axis.
 fn is_run_off(fit: &Fit, nominal: &Model) -> bool {
-    inertia_off(fit, nominal) > NOMINAL_OFF.ln()
+    inertia_off(fit, nominal) > NOMINAL_OFF.ln() - MOVED
 }
 
 /// The likeliest fit of all effects of another but one, each in its form: another form of one may do what the missing one does, and
@@ -415,14 +421,15 @@ mod tests {
 
     #[test]
     fn friction_needs_less_beside_a_remainder_than_what_few_machines_have() {
-        // Odds of six to one, whatever the law: 0.6 of it is 3.6/4.
+        let of = |effect, decisive| discounted(usual_odds(effect), decisive);
+        // Odds of ten to one, whatever the law: 0.6 of it is 6/6.4.
         for friction in [Effect::CoulombMotor, Effect::PreslidingMotor] {
-            assert!((discounted(friction, 0.6) - 3.6 / 4.0).abs() < 1e-12);
+            assert!((of(friction, 0.6) - 6.0 / 6.4).abs() < 1e-12);
         }
         let spring = Effect::ExternalSpring.info().odds;
-        assert!((discounted(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
-        assert!(discounted(Effect::ExternalSpring, 0.6) < LIKELY && LIKELY < discounted(Effect::ViscousTable, 0.5));
-        assert_eq!([0.0, 1.0].map(|p| discounted(Effect::ExternalSpring, p)), [0.0, 1.0]);
+        assert!((of(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
+        assert!(of(Effect::ExternalSpring, 0.6) < LIKELY && LIKELY < of(Effect::ViscousTable, 0.5));
+        assert_eq!([0.0, 1.0].map(|p| of(Effect::ExternalSpring, p)), [0.0, 1.0]);
     }
 
     fn decision(parameters: Fit) -> Decision {

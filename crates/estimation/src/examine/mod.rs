@@ -44,10 +44,8 @@ use rayon::prelude::*;
 pub use finding::{Finding, Severity};
 
 use crate::axis::{AxisKind, Parameters, Structure};
+use crate::trace::machine::NOMINAL_OFF;
 use crate::trace::{Machine, Signal, Trace, bridge};
-
-/// Times that the inertia that moves may be off its nominal value, either way: beyond it the record is of another axis, unit or sign.
-pub const NOMINAL_OFF: f64 = 5.0;
 
 /// The nominal model, where one is known.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -101,8 +101,7 @@ impl First {
 impl<'a> Descent<'a> {
     pub fn new(problem: &'a Problem<'a>, start: &Model, terms: &'a [Term], from: Discrepancy) -> Option<Self> {
         let free = problem.free(terms);
-        let coordinates: Vec<Coordinate> =
-            free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal, problem.farthest)).collect();
+        let coordinates: Vec<Coordinate> = free.iter().map(|f| bounded(Coordinate::new(*f, start), problem)).collect();
         let at = problem.along(start, problem.bandwidth(from))?;
         Some(Self {
             problem,
@@ -541,11 +540,11 @@ impl Normal {
     }
 }
 
-/// The coordinate of a nominal parameter, its logarithm kept within so much of the nominal value's.
-fn bounded(c: Coordinate, nominal: &Model, farthest: f64) -> Coordinate {
+/// The coordinate of a nominal parameter, its logarithm kept as near to the nominal value's as the problem asks.
+fn bounded(c: Coordinate, problem: &Problem<'_>) -> Coordinate {
     match c.free {
-        Free::Base(_) => {
-            let at = c.x(nominal);
+        Free::Base(p) => {
+            let (at, farthest) = (c.x(&problem.nominal), problem.farthest(p));
             Coordinate { bounds: [at - farthest, at + farthest], ..c }
         }
         Free::Effect(..) | Free::Loop(_) => c,

@@ -208,6 +208,12 @@ impl Scales {
         })
     }
 
+    /// Whether the travel shows an effect of a model again, where it is one that repeats.
+    pub fn repeats(&self, effect: Effect, model: &Model) -> bool {
+        let [low, high] = self.travel[usize::from(effect.info().place == Place::Table)];
+        effect.repeats(&model.effects, high - low)
+    }
+
     /// Whether the side of an effect moves both ways: where it does not, friction is a constant torque.
     pub fn goes_back(&self, effect: Effect) -> bool {
         let side = usize::from(effect.info().place == Place::Table);

@@ -65,7 +65,7 @@ impl<I: Side> DryFriction for Coulomb<I> {
         memory: 0,
         named: true,
         textbook: [true, false][I::INDEX],
-        odds: 6.0,
+        odds: 10.0,
         bounds: |p, x| {
             p[0] <= x.torque
                 && x.can_dissipate_dry(p[0], 0.0)

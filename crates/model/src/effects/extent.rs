@@ -236,6 +236,15 @@ mod tests {
     }
 
     #[test]
+    fn a_ripple_of_any_order_repeats_where_the_travel_shows_two_periods_and_one_of_a_turn_does_anyway() {
+        let mut settings = crate::effects::Settings::default();
+        settings.of_mut(Effect::TorqueRipple)[1] = 10.0;
+        let repeats = |effect: Effect, travel: f64| effect.repeats(&settings, travel);
+        assert!(repeats(Effect::TorqueRipple, 1.3) && !repeats(Effect::TorqueRipple, 1.2));
+        assert!(repeats(Effect::Unbalance, 1.2) && repeats(Effect::CoulombMotor, 0.0));
+    }
+
+    #[test]
     fn a_delay_that_the_band_does_not_turn_by_a_fiftieth_of_a_radian_is_none() {
         let extent = resting();
         let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &extent);

@@ -1,7 +1,7 @@
 //! A spring from the table to the frame: way cover, hose, gas spring. `f = stiffness*(theta2 - rest)`.
 
 use super::family::Family;
-use super::info::{EffectInfo, ParameterInfo, Place, Scale, Start, Variant};
+use super::info::{EffectInfo, ONCE, ParameterInfo, Place, Scale, Start, Variant};
 use super::shapes::{Base, Force, Internal, Moment, Reaction, natural_frequency};
 use crate::scalar::Scalar;
 
@@ -26,7 +26,7 @@ impl Force for ExternalSpring {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 0.02,
+        odds: ONCE,
         bounds: |p, x| p[0] * x.travel() <= 4.0 * x.torque,
         example: &[5e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],

@@ -32,7 +32,7 @@ impl<I: Side> Force for Load<I> {
         textbook: [true, false][I::INDEX],
         // Every axis has friction, few carry a weight. Above a half: with less, a symmetric friction together with a weight would be
         // named one asymmetric friction, which is rarer still.
-        odds: 1.2,
+        odds: 2.0,
         bounds: |p, x| p[0].abs() <= 20.0 * x.torque,
         example: &[3e-3],
         variants: &[Variant { name: "", free: &[0] }],

@@ -26,7 +26,7 @@ pub use active::{ActiveEffects, effect_scope};
 pub use extent::Extent;
 pub use family::{Contrast, Family};
 pub(crate) use forces::{Forces, StepMotion};
-pub use info::{EffectInfo, ParameterInfo, Place, Role, Scale, Start, Variant};
+pub use info::{EffectInfo, ONCE, ParameterInfo, Place, Role, Scale, Start, Variant};
 pub use input::{Ramp, TorqueHistory};
 use law::{Absent, Forced, Sliding};
 pub use law::{Law, WithLaw};
@@ -161,6 +161,15 @@ macro_rules! effects {
             pub const fn identifying_parameter(self) -> Option<usize> {
                 match self {
                     $(Self::$name => when!(force, $shape, <$law as Force>::IDENTIFYING, None),)*
+                }
+            }
+
+            /// Whether a travel, rad, shows its period twice where that may be any: seen once it is a torque of the position like others.
+            #[must_use]
+            pub fn repeats(self, settings: &Settings, travel: f64) -> bool {
+                match self.length() {
+                    Some(Length::Periods(order)) => settings.of(self)[order] * travel >= 2.0 * std::f64::consts::TAU,
+                    _ => true,
                 }
             }
 

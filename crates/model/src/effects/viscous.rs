@@ -34,7 +34,7 @@ impl<I: Side> Force for Viscous<I> {
         memory: 0,
         named: true,
         textbook: [true, false][I::INDEX],
-        odds: 6.0,
+        odds: 10.0,
         bounds: |p, x| p[1].abs() <= 0.95 && x.can_dissipate(p[0], 1),
         example: [&[1e-3, 0.2], &[1e-4, 0.2]][I::INDEX],
         variants: VARIANTS,

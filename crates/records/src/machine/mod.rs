@@ -38,6 +38,9 @@ use crate::axis::{Hold, Parameters, PhysicalData, Structure};
 use crate::effects::{EFFECTS, Effect, Settings};
 use reader::{Reader, Section};
 
+/// Times that the inertia that moves may be off its nominal value, either way: beyond it a record is of another axis, unit or sign.
+pub const NOMINAL_OFF: f64 = 5.0;
+
 /// Largest axis file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
