@@ -129,6 +129,13 @@ impl Extent<'_> {
         let speed = if reversals > 0.0 { self.slow } else { self.speed };
         order * self.travel() >= 0.75 * std::f64::consts::TAU && order * speed <= self.band
     }
+
+    /// Whether such an order is once per turn as far as the travel tells it, within a quarter of a period, on a rigid axis: there a torque
+    /// periodic in the motor's angle is the law of a mass off the table's axis, which has an order less to be fitted.
+    #[must_use]
+    pub fn is_of_a_turn(&self, order: f64) -> bool {
+        self.stiffness == 0.0 && (order - 1.0).abs() * self.travel() < 0.25 * std::f64::consts::TAU
+    }
 }
 
 #[cfg(test)]
@@ -233,6 +240,17 @@ mod tests {
         };
         assert!(admits(900.0, 5.0) && admits(2000.0, 5.0) && !admits(4000.0, 5.0));
         assert!(admits(900.0, 0.0) && !admits(2000.0, 0.0));
+    }
+
+    #[test]
+    fn a_ripple_once_per_turn_of_a_rigid_axis_is_an_unbalance() {
+        let travel = [0.0, 6.0];
+        let admits = |stiffness: f64, effect: Effect, values: &[f64]| {
+            (effect.info().bounds)(values, &Extent { stiffness, positions: &travel, ..resting() })
+        };
+        let ripple = |stiffness: f64, order: f64| admits(stiffness, Effect::TorqueRipple, &[0.5, order, 0.0]);
+        assert!(!ripple(0.0, 1.0) && !ripple(0.0, 1.2) && ripple(0.0, 1.3) && ripple(1e3, 1.0));
+        assert!(admits(0.0, Effect::Unbalance, &[0.5, 0.0]));
     }
 
     #[test]

@@ -43,7 +43,7 @@ impl Force for TorqueRipple {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| x.has_amplitude(p[0]) && x.turns(p[1]),
+        bounds: |p, x| x.has_amplitude(p[0]) && x.turns(p[1]) && !x.is_of_a_turn(p[1]),
         example: &[5e-3, 4.0, 0.3],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
     };
