@@ -153,6 +153,7 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     let anew: Vec<Fit> = (0..chosen.terms.len()).into_par_iter().filter_map(|i| search.refitted(&chosen, i)).collect();
     pool.extend(anew);
     let chosen = search.pruned(chosen, &mut pool);
+    let parameters = search.told_alone(parameters);
     search.conclude(given, parameters, chosen, pool.into_fits())
 }
 
@@ -169,6 +170,15 @@ impl Search<'_> {
         pool.extend([given.clone(), parameters.clone()]);
         self.gap = self.dynamic_gap(&parameters);
         Baseline { given, parameters, pool }
+    }
+
+    /// What the axis' parameters alone are told to be: where they have gone far and that leaves less of the torque, as the motion has them.
+    fn told_alone(&self, parameters: Fit) -> Fit {
+        let by_motion = self.have_moved(&parameters, MOVED).then(|| {
+            let told = self.problem.parameters_with_motion_given(parameters.discrepancy, STEPS);
+            told.filter(|f| self.left(f) < self.left(&parameters))
+        });
+        by_motion.flatten().unwrap_or(parameters)
     }
 
     /// A fit from another look at the record, made to its end.

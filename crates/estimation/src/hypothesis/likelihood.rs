@@ -11,6 +11,10 @@
 //! equation, white in the band, of the size that makes the likelihood largest (Kennedy, O'Hagan, JRSS B 63(3), 2001; Whittle, JRSS B 15,
 //! 1953). Without discrepancy this is the likelihood of output error, with a large one that of inverse dynamics. A side that is not
 //! measured is eliminated.
+//!
+//! That density takes the torque as given: the discrepancy moves the axis. Where the motion is given, as far as a drive follows its
+//! reference, the discrepancy is in the torque that it took, and the readings have the density that the reference model gives them:
+//! `ln det C` at the reference's stiffness ([`Band::with_motion_given`]).
 
 mod score;
 
@@ -59,6 +63,7 @@ impl Sight {
     }
 }
 
+#[derive(Clone)]
 pub struct Band {
     pub n: usize,
     pub dt: f64,
@@ -80,6 +85,8 @@ pub struct Band {
     reference: Vec<Weight>,
     /// Share of the record that is weighed.
     weighed: f64,
+    /// Whether the motion is given, and what is lacking is in the torque that it took.
+    motion_is_given: bool,
 }
 
 /// What the encoders' noise makes in the equations of a model at a bin, and how dense its readings lie.
@@ -182,10 +189,29 @@ impl Band {
                 }
             })
             .collect();
-        let mut band =
-            Self { n, dt, sight, taper, omega, weight, noise, common, combine, spread, reference: Vec::new(), weighed };
+        let mut band = Self {
+            n,
+            dt,
+            sight,
+            taper,
+            omega,
+            weight,
+            noise,
+            common,
+            combine,
+            spread,
+            reference: Vec::new(),
+            weighed,
+            motion_is_given: false,
+        };
         band.reference = band.weights(reference);
         band
+    }
+
+    /// The same with the motion given.
+    #[must_use]
+    pub fn with_motion_given(&self) -> Self {
+        Self { motion_is_given: true, ..self.clone() }
     }
 
     /// The stiffness of parameters as the equations show it at a bin: of one equation its first entry. There the side without an encoder
@@ -443,7 +469,9 @@ impl Band {
             let (a, b, c, log_det) = self.factor(*noise, s);
             let first = l.rows[0][m];
             let second = if both { (b * first + l.rows[1][m] * c).norm_sqr() } else { 0.0 };
-            weight * ((first * a).norm_sqr() + second + log_det - noise.density)
+            let density =
+                if self.motion_is_given { log_det - self.factor(self.reference[m], s).3 } else { noise.density };
+            weight * ((first * a).norm_sqr() + second + log_det - density)
         };
         -l.weights.iter().zip(&self.weight).enumerate().map(bin).sum::<f64>()
     }

@@ -32,6 +32,14 @@ impl Problem<'_> {
         self.fit(others, &[], from, effort).filter(is_it).or(nominal)
     }
 
+    /// The fit from the nominal parameters with the motion given. What effects do is mostly unlike an inertia's torque, as friction is: among
+    /// the torque it makes no inertia, and where the torque is given, a heavy one.
+    pub fn parameters_with_motion_given(&self, from: Discrepancy, effort: usize) -> Option<Fit> {
+        let band = self.band.with_motion_given();
+        let fit = self.compared_in(&band).fit(&self.nominal, &[], from, effort)?;
+        Some(Fit { log_likelihood: self.band.log_likelihood(&fit.rows, fit.discrepancy), ..fit })
+    }
+
     /// Whether the axis of the nominal model swings faster than a model with both sides measured can be held to.
     fn is_beyond_holding(&self) -> bool {
         self.band.sight == Sight::Both && self.nominal.parameters.modal().wn * self.record.dt > HELD

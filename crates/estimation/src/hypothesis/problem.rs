@@ -125,6 +125,11 @@ impl Problem<'_> {
         Self { exact: true, ..self.clone() }
     }
 
+    /// The same compared in another band.
+    pub(super) fn compared_in<'b>(&'b self, band: &'b Band) -> Problem<'b> {
+        Problem { band, ..self.clone() }
+    }
+
     /// The same with the axis' own parameters near those of its data sheet.
     #[must_use]
     pub fn near_the_data_sheet(&self) -> Self {

@@ -19,7 +19,6 @@ use crate::hypothesis::likelihood::{C, TorqueResidual};
 use crate::hypothesis::model::Model;
 use crate::hypothesis::problem::{Problem, Work};
 use crate::hypothesis::tracking::{steps_per_sample, track, track_step_by_step};
-use crate::trace::machine::NOMINAL_OFF;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -25,13 +25,13 @@ fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
 }
 
 #[test]
-fn an_inertia_stays_within_what_a_data_sheet_may_be_off_where_friction_is_most_of_the_torque() {
-    // To and fro at a constant speed: the inertia's torque is a fiftieth of the friction's, and nothing but the inertia is free.
+fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torque() {
+    // To and fro at a constant speed. With the torque given the friction would make an inertia of ten times as much.
     let way = |t: f64| 0.5 * (0.6 * t).sin().asin();
     let record = led(way, with(&[(Effect::CoulombMotor, 0, 20.0)]), 1e-3, |t| 2.0 * (1.1 * t).sin(), 7);
     let o = diagnosed(&record, INERTIA);
-    let off = (o.models[1].parameters.i1 / INERTIA).ln();
-    assert!((off.abs() - NOMINAL_OFF.ln()).abs() < 1e-6, "{off}");
+    let off = o.models[1].parameters.i1 / INERTIA;
+    assert!((0.7..1.4).contains(&off), "{off}");
     assert_eq!(named(&o), ["dry_friction"], "{:?}", ranking(&o));
 }
 

@@ -68,7 +68,9 @@ impl Band {
                 if both {
                     column[1][m] -= (d[1][0] * e[0] + d[1][1] * e[1]) * *slope;
                 }
-                grows[i][m] += 2.0 * weight * slope * (of(&d, &vs, 0, 0) + of(&d, &vs, 1, 1)).re;
+                if !self.motion_is_given {
+                    grows[i][m] += 2.0 * weight * slope * (of(&d, &vs, 0, 0) + of(&d, &vs, 1, 1)).re;
+                }
             }
         }
         grows
