@@ -32,6 +32,28 @@ fn a_drive_switched_off_for_the_last_third_is_found_and_left_out() {
 }
 
 #[test]
+fn a_weight_that_swings_on_while_the_drive_is_off_is_left_out_and_a_torque_that_stands_there_is_refused() {
+    let dt = 1e-3;
+    let settings = effect("gravity", &[("sine", 0.02)]);
+    let mut torque = Multisine::new(Kind::RandomPhase, 4000, 1, 30, 0.005, 0.0, 5).unwrap().period().repeat(2);
+    torque.extend(vec![0.0; 4000]);
+    let options = SimulateOptions { start: 0.0, dt, hold: Hold::Zoh, scheme: Scheme::Exact, substeps: 4 };
+    let run = simulate(&Parameters::PAPER, Structure::Rigid, &settings, [1.0, 0.0, 1.0, 0.0], &torque, &options);
+    let mut e = noise(4, 1e-5);
+    let x: Vec<f64> = run.readings.iter().map(|r| r.theta1 + e()).collect();
+    let input = Input { dt, torque: Some(&torque), theta1: Some(&x), ..Input::default() };
+    let found = examine(&input);
+    assert!(!found.refuses(), "{:#?}", found.findings);
+    let off = found.find("drive_off").expect("it swings on");
+    assert!(off.severity == Severity::Warn && off.samples == 4000, "{off:?}");
+    assert!(off.seen.starts_with("T is zero for 4000 samples (33.3 % of the record)"), "{}", off.seen);
+    assert!(found.longest().is_some_and(|r| r.end <= 8000), "{:?}", found.longest());
+    let standing: Vec<f64> = torque.iter().enumerate().map(|(k, t)| if k < 8000 { *t } else { 0.005 }).collect();
+    let found = examine(&Input { torque: Some(&standing), ..input });
+    assert!(found.refuses() && found.find("stuck").is_some(), "{:#?}", found.findings);
+}
+
+#[test]
 fn samples_that_are_missing_under_even_stamps_are_found_where_the_axis_moves_and_a_jump_of_one_encoder_is_none() {
     let whole = plain();
     let speed = |k: usize| (whole.v[3][k] - whole.v[3][k - 1]).abs();
