@@ -110,9 +110,15 @@ impl UnderControl<'_> {
     #[must_use]
     pub fn errors(&self, model: &Model) -> LoopErrors {
         let (commands, positions) = self.run(model);
+        self.errors_of(&commands, &positions)
+    }
+
+    /// Errors of a run, its command and position one value a sample.
+    #[must_use]
+    pub fn errors_of(&self, commands: &[f64], positions: &[f64]) -> LoopErrors {
         let position =
-            self.record.channels[self.channel()].as_ref().map_or(f64::NAN, |measured| relative(&positions, measured));
-        LoopErrors { command: relative(&commands, self.command), position }
+            self.record.channels[self.channel()].as_ref().map_or(f64::NAN, |measured| relative(positions, measured));
+        LoopErrors { command: relative(commands, self.command), position }
     }
 }
 

@@ -4,7 +4,6 @@ use super::material::DISTINCT;
 use super::{Decision, Fit};
 use crate::control::{LoopErrors, UnderControl};
 use crate::hypothesis::Hypothesis;
-use crate::hypothesis::model::Model;
 
 /// The drive's command over time, N.m.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -52,25 +51,28 @@ pub struct ClosedLoop {
 /// What the loop says of every hypothesis of a decision.
 #[must_use]
 pub fn verified(seen: &UnderControl<'_>, decision: &Decision) -> ClosedLoop {
-    let of = |model: &Model| seen.errors(model);
+    let run = |fit: &Fit| {
+        let (commands, positions) = seen.run(&fit.model);
+        (seen.errors_of(&commands, &positions), commands)
+    };
+    let (before, commands_before) = run(&decision.given);
+    let (after, commands_after) = run(&decision.chosen);
     let commands = Commands {
         time: (0..seen.reference.len()).map(|k| seen.record.time(k)).collect(),
         measured: seen.command.to_vec(),
-        before: seen.run(&decision.given.model).0,
-        after: seen.run(&decision.chosen.model).0,
+        before: commands_before,
+        after: commands_after,
     };
-    let before = of(&decision.given.model);
     let closure = |e: &LoopErrors| 1.0 - (e.command / before.command).powi(2);
-    let after = of(&decision.chosen.model);
     let ranked = |t: &Fit| {
-        let errors = of(&t.model);
+        let errors = seen.errors(&t.model);
         LoopRanked { hypothesis: t.hypothesis(), errors, closure: closure(&errors) }
     };
     let mut ranking: Vec<LoopRanked> = decision.ranking.iter().map(|w| ranked(&w.fit)).collect();
     ranking.sort_by(|a, b| b.closure.total_cmp(&a.closure));
     ClosedLoop {
         before,
-        reidentified: of(&decision.parameters.model),
+        reidentified: seen.errors(&decision.parameters.model),
         after,
         closure: closure(&after),
         agrees: ranking.first().is_none_or(|best| best.closure <= closure(&after) + DISTINCT),

@@ -48,37 +48,33 @@ fn one(input: &Input<'_>, channel: Channel<'_>) -> (Vec<Finding>, Vec<Range<usiz
     // A drive that is off logs no torque at all, and the axis may swing on: what is left of the record is sound.
     let is_off = |r: &Range<usize>| channel.name == "T" && channel.values[r.clone()].iter().all(|v| v.abs() == 0.0);
     let (off, stuck): (Vec<_>, Vec<_>) = stuck.into_iter().partition(is_off);
-    let whole = |ranges: &[Range<usize>]| {
+    for (ranges, id, severity, seen, means, way_out) in [
+        (
+            off,
+            "drive_off",
+            Severity::Warn,
+            "is zero",
+            "The drive is off and the axis moves on by itself, or the channel is dead there.",
+            "These stretches are left out.",
+        ),
+        (
+            stuck,
+            "stuck",
+            Severity::Refuse,
+            "keeps one value",
+            "The sensor, its cable or the logger stopped; the axis did not.",
+            "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
+        ),
+    ] {
+        if ranges.is_empty() {
+            continue;
+        }
         let total: usize = ranges.iter().map(Range::len).sum();
-        format!("for {total} samples ({:.1} % of the record) while the axis moves", 100.0 * total as f64 / n as f64)
-    };
-    if !off.is_empty() {
-        findings.push(
-            Finding::new(
-                "drive_off",
-                Severity::Warn,
-                channel.name,
-                format!("{} is zero {}.", channel.name, whole(&off)),
-                "The drive is off and the axis moves on by itself, or the channel is dead there.",
-                "These stretches are left out.",
-            )
-            .at(input, off.clone()),
-        );
-        bad.extend(off);
-    }
-    if !stuck.is_empty() {
-        findings.push(
-            Finding::new(
-                "stuck",
-                Severity::Refuse,
-                channel.name,
-                format!("{} keeps one value {}.", channel.name, whole(&stuck)),
-                "The sensor, its cable or the logger stopped; the axis did not.",
-                "Use a part without these stretches (--from, --to), or leave the column out of [signals].",
-            )
-            .at(input, stuck.clone()),
-        );
-        bad.extend(stuck);
+        let share = 100.0 * total as f64 / n as f64;
+        let seen =
+            format!("{} {seen} for {total} samples ({share:.1} % of the record) while the axis moves.", channel.name);
+        findings.push(Finding::new(id, severity, channel.name, seen, means, way_out).at(input, ranges.clone()));
+        bad.extend(ranges);
     }
     held(channel, &mut findings);
     clipped(input, channel, &mut findings);

@@ -89,6 +89,11 @@ fn path(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
     (path + from.map_or(0.0, |start| (farthest - start).abs()), reversals)
 }
 
+/// The side on which an effect acts: the table's, or the motor's as any other.
+fn side(effect: Effect) -> usize {
+    usize::from(effect.info().place == Place::Table)
+}
+
 /// Whether the torque acts in a model when and as it was logged.
 fn is_as_logged(model: &Model) -> bool {
     let (on_time, ahead) = model.on_time();
@@ -178,7 +183,7 @@ impl Scales {
         let work = if is_as_logged(model) { self.work } else { work_of(model, record, &self.moved) };
         effects.into_iter().all(|e| {
             let info = e.info();
-            let side = usize::from(info.place == Place::Table);
+            let side = side(e);
             let extent = Extent {
                 torque: self.peak,
                 positions: &self.positions[side],
@@ -210,20 +215,24 @@ impl Scales {
 
     /// Whether the travel shows an effect of a model again, where it is one that repeats.
     pub fn repeats(&self, effect: Effect, model: &Model) -> bool {
-        let [low, high] = self.travel[usize::from(effect.info().place == Place::Table)];
-        effect.repeats(&model.effects, high - low)
+        effect.repeats(model.effects.of(effect), self.travel_of(side(effect)))
     }
 
     /// Whether the side of an effect moves both ways: where it does not, friction is a constant torque.
     pub fn goes_back(&self, effect: Effect) -> bool {
-        let side = usize::from(effect.info().place == Place::Table);
+        let side = side(effect);
+        self.paths[side].0 > (1.0 + BACK) * self.travel_of(side)
+    }
+
+    /// Travel of a side, rad.
+    fn travel_of(&self, side: usize) -> f64 {
         let [low, high] = self.travel[side];
-        self.paths[side].0 > (1.0 + BACK) * (high - low)
+        high - low
     }
 
     /// The value that is a fraction of a scale.
     pub fn value(&self, effect: Effect, scale: Scale, f: f64) -> f64 {
-        let side = usize::from(effect.info().place == Place::Table);
+        let side = side(effect);
         match scale {
             Scale::One | Scale::Order | Scale::Frequency => f,
             Scale::Speed => f * self.speed[side],
@@ -231,8 +240,7 @@ impl Scales {
             Scale::Torque => f * self.peak,
             Scale::Rotation => f * self.rotation[side],
             Scale::Sample => f * self.dt,
-            Scale::Travel if f > 0.0 => self.travel[1][1] - f * (self.travel[1][1] - self.travel[1][0]),
-            Scale::Travel => self.travel[1][0] - f * (self.travel[1][1] - self.travel[1][0]),
+            Scale::Travel => self.travel[1][usize::from(f > 0.0)] - f * self.travel_of(1),
         }
     }
 }

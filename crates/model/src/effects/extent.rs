@@ -257,7 +257,7 @@ mod tests {
     fn a_ripple_of_any_order_repeats_where_the_travel_shows_two_periods_and_one_of_a_turn_does_anyway() {
         let mut settings = crate::effects::Settings::default();
         settings.of_mut(Effect::TorqueRipple)[1] = 10.0;
-        let repeats = |effect: Effect, travel: f64| effect.repeats(&settings, travel);
+        let repeats = |effect: Effect, travel: f64| effect.repeats(settings.of(effect), travel);
         assert!(repeats(Effect::TorqueRipple, 1.3) && !repeats(Effect::TorqueRipple, 1.2));
         assert!(repeats(Effect::Unbalance, 1.2) && repeats(Effect::CoulombMotor, 0.0));
     }

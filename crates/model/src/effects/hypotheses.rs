@@ -49,6 +49,15 @@ impl Effect {
         }
     }
 
+    /// Whether a travel, rad, shows its period twice where that may be any: seen once it is a torque of the position like others.
+    #[must_use]
+    pub fn repeats(self, values: &[f64], travel: f64) -> bool {
+        match self.length() {
+            Some(Length::Periods(order)) => values[order] * travel >= 2.0 * std::f64::consts::TAU,
+            _ => true,
+        }
+    }
+
     /// Whether it is a constant torque alone: an amplifier's offset, a weight.
     #[must_use]
     pub fn is_bias(self) -> bool {

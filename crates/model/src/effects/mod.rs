@@ -164,15 +164,6 @@ macro_rules! effects {
                 }
             }
 
-            /// Whether a travel, rad, shows its period twice where that may be any: seen once it is a torque of the position like others.
-            #[must_use]
-            pub fn repeats(self, settings: &Settings, travel: f64) -> bool {
-                match self.length() {
-                    Some(Length::Periods(order)) => settings.of(self)[order] * travel >= 2.0 * std::f64::consts::TAU,
-                    _ => true,
-                }
-            }
-
             /// The parameter that is half of a play, whose contacts the step locates in time.
             #[must_use]
             pub const fn play_parameter(self) -> Option<usize> {
