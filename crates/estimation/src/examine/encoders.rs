@@ -5,6 +5,7 @@
 
 use rustfft::num_complex::Complex;
 
+use super::as_logged::explains_as_well_as_exchanged;
 use super::finding::{Finding, Severity};
 use super::least::non_negative;
 use super::momentum::{COHERENT, MAIN, T, TABLE};
@@ -204,13 +205,14 @@ pub(super) fn compare_encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], 
         1.0 - non_negative(&gram, &[ad, av]).1 / aa
     };
     let (as_given, exchanged) = (misfit(TABLE, 1.0), misfit(MAIN, -1.0));
-    // An impact on the table (the end of its travel) drives it as a torque drives a motor: the exchange must also explain the torque
-    // better.
+    // An impact on the table (the end of its travel) or a weight on it drives it as a torque drives a motor: the exchange must also explain
+    // the torque better, with friction and load on the motor too.
     let unexplained = |motor: usize, table: usize| motor_side_unexplained(s, lines, motor, table);
     let speaks = || unexplained(TABLE, MAIN) < 0.5 * unexplained(MAIN, TABLE);
     // Of exchanged columns the one named theta2 is the motor's, which at low frequencies does not move less than the table.
     let may_be = ratio.abs() > COMPATIBLE_RATIO.recip();
-    if may_be && exchanged < 0.3 && as_given > 3.0 * exchanged && speaks() {
+    let sound = || explains_as_well_as_exchanged(input);
+    if may_be && exchanged < 0.3 && as_given > 3.0 * exchanged && speaks() && !sound() {
         findings.push(Finding::new(
             "swapped",
             Severity::Refuse,

@@ -12,6 +12,7 @@
 //!
 //! A finding of severity [`Severity::Refuse`] says that a verdict from this record would be about its defect.
 
+mod as_logged;
 mod ceiling;
 mod channels;
 mod computed;

@@ -19,9 +19,10 @@ use super::finding::{Finding, Severity, rounded};
 use super::least::{bounded, standard_error};
 use super::motor_side::fits_better_as_logged;
 use super::pairs::{FACTORS, factor};
-use super::robust::quantile;
+use super::robust::{noise, quantile};
 use super::smoothing::{SHORTEST, smoothed, widths};
 use super::spectra::Spectra;
+use super::standing::NOISE;
 use super::{AxisKind, Input, NOMINAL_OFF, Nominal, Structure};
 use crate::identify::lsq::triangularise;
 
@@ -108,7 +109,7 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
 fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
     let mut best: Option<TimeDomainFit> = None;
-    for found in at_widths(input, torque, x) {
+    for found in at_widths(input, torque, x, None) {
         if found.left < MAX_RESIDUAL
             && found.mass > SIGNIFICANT * found.error
             && found.mass.is_finite()
@@ -122,12 +123,14 @@ fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
 
 /// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is
 /// significantly negative. For slow moves, where friction or a weight is nearly all of the torque: their spectra have few lines above the
-/// noise.
+/// noise. It is asked where the axis moves beyond the noise of its encoder: at rest friction balances any torque below breakaway, and has
+/// no sign.
 pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    at_widths(input, torque, x).into_iter().min_by(|a, b| a.left.total_cmp(&b.left)).is_some_and(|found| {
+    let found = at_widths(input, torque, x, Some(noise(x)));
+    found.into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(|found| {
         let (friction, mass) = (found.friction / found.friction_error, found.mass / found.error);
-        found.left < MAX_RESIDUAL
+        found.unbiased() < MAX_RESIDUAL
             && (friction > 0.0 && mass > -SIGNIFICANT || friction > -SIGNIFICANT && mass > SIGNIFICANT)
     })
 }
@@ -152,27 +155,58 @@ struct TimeDomainFit {
     /// Friction at the ninth decile of the speeds and its standard error, N.m (N).
     friction: f64,
     friction_error: f64,
+    /// Independent samples, and coefficients.
+    samples: f64,
+    coefficients: f64,
 }
 
-/// The fits with the smoothings of all widths, the narrowest first.
-fn at_widths(input: &Input<'_>, torque: &[f64], x: &[f64]) -> Vec<TimeDomainFit> {
+impl TimeDomainFit {
+    /// Residual share of the variance of the torque that unrelated columns leave at one on the average; infinite where they explain any torque.
+    fn unbiased(&self) -> f64 {
+        let freedom = self.samples - self.coefficients;
+        if freedom > 0.0 { self.left * (self.samples - 1.0) / freedom } else { f64::INFINITY }
+    }
+}
+
+/// The fits with the smoothings of all widths, the narrowest first; with the encoder's `noise`, rad (m), of the samples at which the axis moves
+/// beyond it.
+fn at_widths(input: &Input<'_>, torque: &[f64], x: &[f64], noise: Option<f64>) -> Vec<TimeDomainFit> {
     let widths: Vec<usize> = widths(x.len()).collect();
-    widths.into_par_iter().filter_map(|width| time_domain_fit(input, torque, x, width)).collect()
+    widths.into_par_iter().filter_map(|width| time_domain_fit(input, torque, x, width, noise)).collect()
 }
 
-/// The fit with a smoothing of `width` samples to either side.
-fn time_domain_fit(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -> Option<TimeDomainFit> {
+/// Standard deviation of a speed over two samples, times their interval, after a mean over `2*width + 1` samples, twice, of a white noise of
+/// one: that of a difference of two such means, whose `2*(2*width + 1)` weights are all about one size.
+fn of_speed(width: usize) -> f64 {
+    std::f64::consts::SQRT_2 * ((2 * width + 1) as f64).powf(-1.5)
+}
+
+/// Whether a weight's torque over the angle `x`, rad, is told from a spring's.
+pub(super) fn turns_a_weight(input: &Input<'_>, x: &[f64]) -> bool {
+    let middle = x[x.len() / 2];
+    let size = x.iter().fold(0.0_f64, |m, v| m.max((v - middle).abs()));
+    input.motion == AxisKind::Rotary && size > HINGE && size < TURNS
+}
+
+/// The fit with a smoothing of `width` samples to either side; `noise` as in [`at_widths`].
+fn time_domain_fit(
+    input: &Input<'_>,
+    torque: &[f64],
+    x: &[f64],
+    width: usize,
+    noise: Option<f64>,
+) -> Option<TimeDomainFit> {
     let (t, q) = (smoothed(torque, width), smoothed(x, width));
     let dt = input.dt;
     let speed = |k: usize| (q[k + 1] - q[k - 1]) / (2.0 * dt);
     let fast = quantile((1..q.len() - 1).map(speed), 0.9);
     let quiet = 0.02 * fast;
     let middle = x[x.len() / 2];
-    let size = x.iter().fold(0.0_f64, |m, v| m.max((v - middle).abs()));
-    let hinge = input.motion == AxisKind::Rotary && size > HINGE && size < TURNS;
-    let columns = if hinge { 7 } else { 5 };
+    let columns = if turns_a_weight(input, x) { 7 } else { 5 };
     let stride = (q.len() / SAMPLES).max(1);
-    let rows: Vec<usize> = (1..q.len() - 1).step_by(stride).collect();
+    let least = noise.map(|noise| NOISE * noise * of_speed(width) / dt);
+    let moves = |k: &usize| least.is_none_or(|least| speed(*k).abs() > least);
+    let rows: Vec<usize> = (1..q.len() - 1).step_by(stride).filter(moves).collect();
     let rate = |k: usize| (q[k + 1] - 2.0 * q[k] + q[k - 1]) / (dt * dt);
     let triangle = triangularise(rows.len(), columns, 1, |i, out| {
         let k = rows[i];
@@ -195,6 +229,8 @@ fn time_domain_fit(input: &Input<'_>, torque: &[f64], x: &[f64], width: usize) -
         error: variance(0, 0).sqrt(),
         friction: of(1) * fast + of(2),
         friction_error: (fast * fast * variance(1, 1) + 2.0 * fast * variance(1, 2) + variance(2, 2)).sqrt(),
+        samples: (rows.len() * stride) as f64 / (2 * width + 1) as f64,
+        coefficients: columns as f64,
     })
 }
 

@@ -3,6 +3,7 @@
 use super::equation::MomentumEquation;
 use super::{MAIN, T, TABLE};
 use crate::axis::Structure;
+use crate::examine::as_logged::explains_as_well_as_late;
 use crate::examine::encoders::motor_side_unexplained;
 use crate::examine::finding::{Finding, Severity};
 use crate::examine::nominal::nominal_explains;
@@ -149,8 +150,16 @@ fn fit_torque(
         findings.push(Finding::new(
             "misaligned",
             // In closed loop the torque responds to a disturbance after it has moved the axis: only a warning where the equation also holds
-            // without a delay.
-            if (ahead || behind) && plus.1 > DOMINANT && here.1 < MAJORITY { Severity::Refuse } else { Severity::Warn },
+            // without a delay, or holds with the weight and the load that the spectra do not know of.
+            if (ahead || behind)
+                && plus.1 > DOMINANT
+                && here.1 < MAJORITY
+                && !explains_as_well_as_late(input, plus.0)
+            {
+                Severity::Refuse
+            } else {
+                Severity::Warn
+            },
             "T",
             if plus.0 < 0 {
                 format!("The motion comes about {} samples ({late:.4e} s) before its torque.", -plus.0)

@@ -179,3 +179,32 @@ fn a_motor_under_friction_feels_a_table_at_rest_and_no_table_of_another_axis() {
     columns.v[3] = (0..8192).map(|k| 0.3 * (2.9 * f64::from(k) * dt).sin() + e()).collect();
     assert!(!feels(&columns));
 }
+
+#[test]
+fn a_table_that_moves_only_where_the_coupling_pulls_hardest_is_held_by_friction_though_the_torque_hides_the_pull() {
+    // Friction of the motor that grows and falls with the angle is nearly all of its torque.
+    let (p, dt, breakaway) = (Parameters::PAPER, 1e-3, 7e-3);
+    let parts: Vec<(f64, f64, f64)> = (1..6).map(f64::from).map(|i| (0.3 / i, 1.7 * i, 1.3 * i * i)).collect();
+    let of = |t: f64, n: i32| -> f64 { parts.iter().map(|(a, w, p)| a * w.powi(n) * (w * t + p).sin()).sum() };
+    let rate = |t: f64| -> f64 { parts.iter().map(|(a, w, p)| a * w * (w * t + p).cos()).sum() };
+    let mut e = noise(46, 1e-5);
+    let mut columns = Columns { dt, v: Default::default() };
+    let mut table = 0.0;
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * dt;
+        let twist = (of(t, 0) - table).clamp(-breakaway / p.k, breakaway / p.k);
+        table = of(t, 0) - twist;
+        let friction = 0.1 * (1.0 + 0.8 * (9.0 * of(t, 0)).sin()) * rate(t).signum();
+        columns.v[0].push(-p.i1 * of(t, 2) + p.k * twist + friction);
+        columns.v[1].push(of(t, 0) + e());
+        columns.v[3].push(table + e());
+    }
+    let feels = |x: &Columns| motor_holds_coupling(&Input { nominal: Some(NOMINAL), ..x.positions() });
+    assert!(feels(&columns));
+    assert!(standing::friction_holds_table(&columns.positions()));
+    // Encoders that count from different zeros.
+    columns.v[3].iter_mut().for_each(|y| *y += 3.0);
+    assert!(standing::friction_holds_table(&columns.positions()));
+    columns.v[3].reverse();
+    assert!(!standing::friction_holds_table(&columns.positions()));
+}
