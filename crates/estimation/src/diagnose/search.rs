@@ -98,7 +98,8 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
             }
         }
     }
-    if !search.at_floor(&chosen) && !search.is_negligible(&chosen) {
+    let leaves_nothing = search.at_floor(&chosen) || search.is_negligible(&chosen);
+    if !leaves_nothing || chosen.terms.len() > 1 {
         // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
         (search.progress)("the textbook's friction");
         // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.

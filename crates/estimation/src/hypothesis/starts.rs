@@ -240,6 +240,9 @@ fn peaks(power: &[f64], most: usize) -> Vec<usize> {
     all
 }
 
+/// Places of the angle that a torque is looked at by, where its periods need no more.
+const LEAST_PLACES: usize = 4096;
+
 /// Orders (periods per radian over 2 pi: as the effect's own unit, 1/rad) at which the residual is periodic in the angle.
 fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<Vec<f64>> {
     let motion = p.motion_of(fit)?;
@@ -257,17 +260,19 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
     let low = motion.iter().map(|m| m[2 * side]).fold(f64::INFINITY, f64::min);
     let high = motion.iter().map(|m| m[2 * side]).fold(f64::NEG_INFINITY, f64::max);
     let range = (high - low).max(1e-12);
-    const BINS: usize = 4096;
-    let mut bins = vec![C::default(); 4 * BINS];
-    for (k, m) in motion.iter().enumerate() {
-        let at = ((m[2 * side] - low) / range * (BINS as f64 - 1.0)) as usize;
-        bins[at.min(BINS - 1)] += C::new(z[k].re * band.taper[k], 0.0);
-    }
-    FftPlanner::new().plan_fft_forward(4 * BINS).process(&mut bins);
     // Not faster than the band where the axis is slow, at least half a period over the range.
     let speed = slow(motion.iter().map(|m| m[2 * side + 1])).max(1e-12);
     let step = std::f64::consts::TAU / (4.0 * range);
-    let top = ((band.omega.last()? / speed / step) as usize).min(BINS / 2);
+    let fastest = (band.omega.last()? / speed / step) as usize;
+    // Eight places of the angle to a period of the fastest; more than there are samples show no more.
+    let places = (2 * fastest).min(band.n).max(LEAST_PLACES).next_power_of_two();
+    let top = fastest.min(places / 2);
+    let mut bins = vec![C::default(); 4 * places];
+    for (k, m) in motion.iter().enumerate() {
+        let at = ((m[2 * side] - low) / range * (places as f64 - 1.0)) as usize;
+        bins[at.min(places - 1)] += C::new(z[k].re * band.taper[k], 0.0);
+    }
+    FftPlanner::new().plan_fft_forward(4 * places).process(&mut bins);
     let power: Vec<f64> = (0..=top).map(|m| if m < 3 { 0.0 } else { bins[m].norm_sqr() }).collect();
     Some(peaks(&power, 4).into_iter().filter(|m| *m > 2).map(|m| m as f64 * step).collect())
 }

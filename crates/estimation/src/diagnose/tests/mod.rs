@@ -64,7 +64,18 @@ fn led(
     foreign: impl Fn(f64) -> f64,
     seed: u64,
 ) -> Record {
-    let n = 6000;
+    led_for(6000, wanted, effects, torque_noise, foreign, seed)
+}
+
+/// The same of `n` samples.
+fn led_for(
+    n: u32,
+    wanted: impl Fn(f64) -> f64,
+    effects: Settings,
+    torque_noise: f64,
+    foreign: impl Fn(f64) -> f64,
+    seed: u64,
+) -> Record {
     let axis = Axis::new(parameters(INERTIA), Structure::Rigid, effects, Scheme::Exact, DT);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut noise = |size: f64| noise(&mut rng, size);

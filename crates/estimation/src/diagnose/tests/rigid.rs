@@ -137,6 +137,16 @@ fn a_ripple_faster_than_the_motion_is_found_beyond_its_band() {
 }
 
 #[test]
+fn a_ripple_is_found_over_any_number_of_turns() {
+    // A screw's cogging over forty turns, at 140 rad/s on the average: a thousand periods, six hundred of them in the part that fits see.
+    let hidden = [(Effect::TorqueRipple, 0, 2.0), (Effect::TorqueRipple, 1, 24.0), (Effect::TorqueRipple, 2, 0.5)];
+    let way = |t: f64| 6.0 * t - 1.5 * (1.1 * t).sin() + 0.1 * ((70.0 * t).sin() + (190.0 * t).sin());
+    let o = diagnosed(&led_for(21_000, way, with(&hidden), 1e-9, |_| 0.0, 6), INERTIA);
+    assert_eq!(named(&o), ["torque_ripple"], "{:#?}", ranking(&o));
+    assert!((o.improved.effects.of(Effect::TorqueRipple)[1] / 24.0 - 1.0).abs() < 1e-3);
+}
+
+#[test]
 fn a_small_cause_that_explains_next_to_all_that_a_large_one_leaves_is_named_beside_it() {
     let hidden = [
         (Effect::CoulombMotor, 0, 30.0),
