@@ -114,6 +114,7 @@ impl Search<'_> {
             && let Some(least) = weighing.least_likely().filter(|_| chosen.terms.len() > 1)
             && let Some(refitted) = weighing.refitted(least).or_else(|| self.refitted(&chosen, least))
         {
+            let left = self.left(&refitted);
             let ranking = &weighing.ranking;
             let without = self.concluded_without(&chosen, least, refitted, ranking, [&given, &parameters], independent);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
@@ -122,6 +123,8 @@ impl Search<'_> {
             if others + 1 < chosen.terms.len() || !is_understood || !is_its_own || without.named() >= others {
                 return without;
             }
+            // What is not named explains nothing: the others are beside what is left without it.
+            weighing.doubt_beside(least, confidence_beside(left) / confidence_beside(self.left(&chosen)));
             open = Some(least);
         }
         let are_likely = weighing.likely() + usize::from(open.is_some()) == chosen.terms.len();
@@ -173,7 +176,7 @@ impl Search<'_> {
             .clone()
             .map(|i| is_determined(i).then(|| self.nested(chosen, i, parameters, &pool)).flatten())
             .collect();
-        let doubt = (1.0 - DOUBT * self.left(chosen).sqrt()).clamp(0.0, 1.0);
+        let confidence = confidence_beside(self.left(chosen));
         let standing = |i: usize| {
             let effect = chosen.terms[i].0;
             let decisive = match &nested[i] {
@@ -183,7 +186,7 @@ impl Search<'_> {
             };
             let repeats = self.problem.scales.as_ref().is_none_or(|s| s.repeats(effect, &chosen.model));
             let odds = if repeats { usual_odds(effect) } else { ONCE };
-            discounted(odds, steadiness(finished, effect, independent) * decisive) * doubt
+            discounted(odds, steadiness(finished, effect, independent) * decisive) * confidence
         };
         let standing: Vec<f64> = all.clone().map(standing).collect();
         let twins = all.map(|i| self.constant_instead(chosen, i, &pool, independent)).collect();
@@ -350,6 +353,11 @@ impl Search<'_> {
     }
 }
 
+/// Confidence in a cause beside a share of the torque that no cause explains ([`DOUBT`]).
+fn confidence_beside(left: f64) -> f64 {
+    (1.0 - DOUBT * left.sqrt()).clamp(0.0, 1.0)
+}
+
 /// How often machines have the like of an effect, whatever its law.
 fn usual_odds(effect: Effect) -> f64 {
     let like = EFFECTS.iter().filter(|like| like.is_alternative_to(effect)).map(|like| like.info().odds);
@@ -417,6 +425,14 @@ mod tests {
             &terms,
             log_likelihood,
         )
+    }
+
+    #[test]
+    fn a_cause_is_believed_less_the_more_of_the_torque_no_cause_explains() {
+        // One in twenty is none beside a hundredth of the torque, one in six beside a tenth, and all are beside four times it.
+        for (left, none) in [(0.0, 0.0), (0.01, 0.05), (0.1, 0.158), (4.0, 1.0)] {
+            assert!((confidence_beside(left) - (1.0 - none)).abs() < 1e-3, "{left}");
+        }
     }
 
     #[test]

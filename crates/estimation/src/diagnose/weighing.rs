@@ -78,6 +78,12 @@ impl Weighing {
         (0..p.len()).min_by(|a, b| p[*a].total_cmp(&p[*b])).filter(|i| !is_likely(&p[*i]))
     }
 
+    /// The probabilities of all others `times` what they are.
+    pub fn doubt_beside(&mut self, effect: usize, times: f64) {
+        let others = self.probabilities.iter_mut().enumerate().filter(|(i, _)| *i != effect);
+        others.for_each(|(_, p)| *p *= times.min(1.0));
+    }
+
     /// Of two that the record cannot tell apart one explains it.
     pub fn share_with_twins(&mut self) {
         for (p, twin) in self.probabilities.iter_mut().zip(&self.twins) {
@@ -161,6 +167,23 @@ mod tests {
     fn fit(effects: &[Effect]) -> Fit {
         let terms: Vec<(Effect, usize)> = effects.iter().map(|e| (*e, 0)).collect();
         Fit::of_likelihood(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), &terms, 0.0)
+    }
+
+    #[test]
+    fn beside_one_that_is_not_named_the_others_are_doubted_and_none_is_believed_more() {
+        let of = |times: f64| {
+            let mut weighing = Weighing {
+                nested: Vec::new(),
+                standing: Vec::new(),
+                twins: Vec::new(),
+                ranking: Vec::new(),
+                probabilities: vec![0.9, 0.3, 0.8],
+            };
+            weighing.doubt_beside(1, times);
+            weighing.probabilities
+        };
+        assert_eq!(of(0.5), [0.45, 0.3, 0.4]);
+        assert_eq!(of(1.2), [0.9, 0.3, 0.8]);
     }
 
     #[test]
