@@ -258,9 +258,6 @@ impl Search<'_> {
                 best = next;
                 continue;
             }
-            if self.is_over_budget() {
-                break;
-            }
             // What was named first was named without the others, however little they leave together.
             let other = self.exchanged(best.clone(), pool);
             // Where next to nothing is left, a freer account only follows what no log is true to.
@@ -388,6 +385,9 @@ impl Search<'_> {
             return best;
         }
         for i in 0..best.terms.len() {
+            if self.is_over_budget() {
+                break;
+            }
             let Some(without) = self.without(&best, i, pool) else { continue };
             let mut all = self.extended(&without, i, pool);
             pool.push(without);
