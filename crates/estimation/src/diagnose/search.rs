@@ -100,7 +100,8 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     }
     let leaves_nothing = search.at_floor(&chosen) || search.is_negligible(&chosen);
     if !leaves_nothing || chosen.terms.len() > 1 {
-        // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them.
+        // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them: where nothing is
+        // left, as long as there is work left.
         (search.progress)("the textbook's friction");
         // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
         let most = if chosen.terms.len() == 1 { search.longest_rival(&chosen) } else { MOST };
@@ -108,7 +109,8 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
         pool.extend(textbook.iter().cloned());
         let share = search.independent(&textbook);
         let rivals: Vec<Fit> = textbook.into_iter().filter(|f| f.terms.len() <= most).collect();
-        if let Some(first) = search.best(&rivals, share).filter(|f| f.terms != chosen.terms).cloned() {
+        let goes_on = |f: &&Fit| f.terms != chosen.terms && !(leaves_nothing && search.is_over_budget());
+        if let Some(first) = search.best(&rivals, share).filter(goes_on).cloned() {
             let other = search.stepwise(first, &mut pool);
             if search.is_likelier(&other, &chosen) {
                 chosen = other;

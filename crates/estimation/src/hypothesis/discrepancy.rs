@@ -1,4 +1,9 @@
 //! The size of what a model lacks beyond the noise: the one of largest likelihood.
+//!
+//! It is white in the band, though a remainder seldom is. With a power that falls with frequency, as friction's own does, a cause that is
+//! not in the model yet passes for noise: fits then follow the upper end of the band and leave more of the torque, and fewer whole machines
+//! are told right (`scripts/blind/RESULT.md`). How few values a coloured remainder has of its own is counted instead
+//! ([`Band::independent`]), and whether a cause stands out of one of any colour is asked at the end (`diagnose/octaves.rs`).
 
 use super::likelihood::{Band, Sight, TorqueResidual};
 use super::model::Model;
