@@ -99,7 +99,9 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
         }
     }
     let leaves_nothing = search.at_floor(&chosen) || search.is_negligible(&chosen);
-    if !leaves_nothing || chosen.terms.len() > 1 {
+    // One effect that leaves nothing needs no rival, several of the textbook's own are one of them.
+    let is_short = chosen.terms.len() == 1 || chosen.terms.iter().all(|t| t.0.info().textbook);
+    if !(leaves_nothing && is_short) {
         // All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them: where nothing is
         // left, as long as there is work left.
         (search.progress)("the textbook's friction");
