@@ -46,6 +46,11 @@ impl Search<'_> {
         share * rms(&self.problem.record.torque)
     }
 
+    /// Whether a fit leaves nothing to look for: at the noise's floor, or next to none of the torque.
+    pub fn leaves_nothing(&self, fit: &Fit) -> bool {
+        self.at_floor(fit) || self.is_negligible(fit)
+    }
+
     /// Whether what a fit leaves holds no further cause.
     pub fn is_enough(&self, fit: &Fit) -> bool {
         self.leaves_little(fit) || self.is_negligible(fit)

@@ -65,7 +65,7 @@ pub fn decide(mut search: Search<'_>, known: Option<&Fit>) -> Decision {
 pub fn decide_further(mut search: Search<'_>, known: &Fit) -> Option<Decision> {
     let mut baseline = search.baseline();
     let known = search.resumed(known)?;
-    if search.at_floor(&known) || search.is_negligible(&known) {
+    if search.leaves_nothing(&known) {
         return None;
     }
     search.joined(&known, &mut baseline.pool)?;
@@ -89,7 +89,7 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     let mut chosen = search.stepwise(known.unwrap_or_else(|| parameters.clone()), &mut pool);
     // A rigid axis has one inertia, which runs off with no more than a share of any cause.
     let coupled = search.problem.nominal.structure == Structure::TwoInertia;
-    if coupled && !search.at_floor(&chosen) && !search.is_negligible(&chosen) && search.have_moved(&parameters, MOVED) {
+    if coupled && !search.leaves_nothing(&chosen) && search.have_moved(&parameters, MOVED) {
         (search.progress)("near the data sheet's parameters");
         if let Some(other) = search.near_the_data_sheet(&given) {
             pool.push(other.clone());
@@ -98,7 +98,7 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
             }
         }
     }
-    let leaves_nothing = search.at_floor(&chosen) || search.is_negligible(&chosen);
+    let leaves_nothing = search.leaves_nothing(&chosen);
     // One effect that leaves nothing needs no rival, several of the textbook's own are one of them.
     let is_short = chosen.terms.len() == 1 || chosen.terms.iter().all(|t| t.0.info().textbook);
     if !(leaves_nothing && is_short) {
@@ -281,7 +281,7 @@ impl Search<'_> {
 
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
     fn better_in_pool(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
-        if self.at_floor(chosen) || self.is_negligible(chosen) {
+        if self.leaves_nothing(chosen) {
             return None;
         }
         let share = self.independent([chosen]);
@@ -327,7 +327,7 @@ impl Search<'_> {
     /// Looks for one effect more beside the likeliest hypotheses that the chosen way passed by, as long as that is cheap: two causes that
     /// are each a poor account alone are found beside one another only.
     fn extend_rivals(&self, chosen: &Fit, pool: &mut Pool) {
-        if self.at_floor(chosen) || self.is_negligible(chosen) {
+        if self.leaves_nothing(chosen) {
             return;
         }
         let share = self.independent([chosen]);

@@ -51,7 +51,7 @@ fn an_axis_as_it_is_lacks_nothing_but_the_noise_of_its_encoder() {
     // The record begins and ends in the midst of a motion, the torque at one end is not the one at the other.
     let way = |t: f64| 0.5 * (1.1 * t).sin() + 0.2 * (2.3 * t).sin() + 0.02 * t * t;
     let rigid = |seed| {
-        let record = led(way, Settings::default(), 0.0, |_| 0.0, seed).part(400..5900);
+        let record = led(SAMPLES, way, Settings::default(), 0.0, |_| 0.0, seed).part(400..5900);
         of_the_truth(&record, &Model::new(parameters(INERTIA), Structure::Rigid, Settings::default()), Reach::Ruled)
     };
     let coupled = |seed| {

@@ -24,6 +24,8 @@ use rand_chacha::ChaCha8Rng;
 
 const INERTIA: f64 = 2.0;
 const DT: f64 = 2e-3;
+/// Samples of a log.
+const SAMPLES: u32 = 6000;
 
 fn parameters(i1: f64) -> Parameters {
     Parameters { i1, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 }
@@ -53,22 +55,11 @@ fn of_one_encoder(start: f64, torque: Vec<f64>, theta: Vec<f64>) -> Record {
 /// A record of moves to and fro under a position controller; `foreign` is a torque that no model knows of.
 fn logged(effects: Settings, amplitude: f64, torque_noise: f64, foreign: impl Fn(f64) -> f64, seed: u64) -> Record {
     let wanted = |t: f64| amplitude * ((0.9 * t).sin() + 0.35 * (2.3 * t).sin() * (1.0 - (-t).exp()));
-    led(wanted, effects, torque_noise, foreign, seed)
+    led(SAMPLES, wanted, effects, torque_noise, foreign, seed)
 }
 
-/// The same along any way.
+/// The same of `n` samples along any way.
 fn led(
-    wanted: impl Fn(f64) -> f64,
-    effects: Settings,
-    torque_noise: f64,
-    foreign: impl Fn(f64) -> f64,
-    seed: u64,
-) -> Record {
-    led_for(6000, wanted, effects, torque_noise, foreign, seed)
-}
-
-/// The same of `n` samples.
-fn led_for(
     n: u32,
     wanted: impl Fn(f64) -> f64,
     effects: Settings,

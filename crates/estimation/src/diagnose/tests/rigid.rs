@@ -8,7 +8,7 @@ fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
     // The way reaches the stop in its second half.
     let way = |t: f64| (0.9 * t).sin() * if t < 6.0 { 0.8 } else { 1.5 };
     for (effects, late) in [(effects, true), (with(&[(Effect::CoulombMotor, 0, 3.0)]), false)] {
-        let record = led(way, effects, 0.0, |_| 0.0, 5);
+        let record = led(SAMPLES, way, effects, 0.0, |_| 0.0, 5);
         let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
         let noise = estimate_noise(&record.torque, &channels, None);
         let nominal = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
@@ -28,7 +28,7 @@ fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
 fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torque() {
     // To and fro at a constant speed. With the torque given the friction would make an inertia of ten times as much.
     let way = |t: f64| 0.5 * (0.6 * t).sin().asin();
-    let record = led(way, with(&[(Effect::CoulombMotor, 0, 20.0)]), 1e-3, |t| 2.0 * (1.1 * t).sin(), 7);
+    let record = led(SAMPLES, way, with(&[(Effect::CoulombMotor, 0, 20.0)]), 1e-3, |t| 2.0 * (1.1 * t).sin(), 7);
     let o = diagnosed(&record, INERTIA);
     let off = o.models[1].parameters.i1 / INERTIA;
     assert!((0.7..1.4).contains(&off), "{off}");
@@ -39,7 +39,7 @@ fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torq
 fn onwards(effect: Effect, wander: f64) -> Record {
     let way = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
     // Without its start from rest, where friction holds and a load does not.
-    led(way, with(&[(effect, 0, 0.5)]), 1e-4, |t| wander * (1.3 * t).sin(), 5).part(500..6000)
+    led(SAMPLES, way, with(&[(effect, 0, 0.5)]), 1e-4, |t| wander * (1.3 * t).sin(), 5).part(500..6000)
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_ripple_is_found_over_any_number_of_turns() {
     // A screw's cogging over forty turns, at 140 rad/s on the average: a thousand periods, six hundred of them in the part that fits see.
     let hidden = [(Effect::TorqueRipple, 0, 2.0), (Effect::TorqueRipple, 1, 24.0), (Effect::TorqueRipple, 2, 0.5)];
     let way = |t: f64| 6.0 * t - 1.5 * (1.1 * t).sin() + 0.1 * ((70.0 * t).sin() + (190.0 * t).sin());
-    let o = diagnosed(&led_for(21_000, way, with(&hidden), 1e-9, |_| 0.0, 6), INERTIA);
+    let o = diagnosed(&led(21_000, way, with(&hidden), 1e-9, |_| 0.0, 6), INERTIA);
     assert_eq!(named(&o), ["torque_ripple"], "{:#?}", ranking(&o));
     assert!((o.improved.effects.of(Effect::TorqueRipple)[1] / 24.0 - 1.0).abs() < 1e-3);
 }
