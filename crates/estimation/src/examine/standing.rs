@@ -6,6 +6,7 @@ use super::Input;
 use super::finding::{Finding, Severity};
 use super::robust::noise;
 use super::spectra::Spectra;
+use super::usable::mean;
 use crate::numerics::level::deviation;
 
 /// Blocks that a record is cut into, and the least samples of one: their means have a quarter of the encoder's noise or less.
@@ -30,10 +31,6 @@ pub(super) fn held_share(input: &Input<'_>) -> f64 {
     let power = |b: usize| torque[b * size..(b + 1) * size].iter().map(|t| (t - middle).powi(2)).sum::<f64>();
     let sum = |holds: &dyn Fn(usize) -> bool| (0..positions.means.len()).filter(|b| holds(*b)).map(power).sum::<f64>();
     sum(&|b| positions.rests(b)) / sum(&|_| true).max(f64::MIN_POSITIVE)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// The positions of an encoder in blocks, rad (m).

@@ -17,7 +17,8 @@ const HOLDS: f64 = 0.1;
 /// Standstill between motions is left in up to this share of the record: an axis that rests between moves is not cut to pieces.
 const REST: f64 = 0.2;
 
-fn mean(values: &[f64]) -> f64 {
+/// Mean of a block; zero of an empty one.
+pub(super) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
