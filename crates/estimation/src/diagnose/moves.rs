@@ -13,7 +13,7 @@ use crate::hypothesis::fit::{Fit, PROBE, Term};
 use crate::hypothesis::model::{Coordinate, Model};
 use crate::hypothesis::starts::{Screening, StartPoint};
 
-/// The best that are gone on with: effects, in their richer forms; hypotheses of each size, beside the chosen way.
+/// The best that are gone on with: effects, in their richer forms, and twice as many in one; hypotheses of each size, beside the chosen way.
 pub const PROMISING: usize = 4;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 pub const MOVED: f64 = 0.2;
@@ -91,7 +91,7 @@ impl Search<'_> {
         held.into_iter().chain(freed).collect()
     }
 
-    /// The fit with each effect that may join it, a few steps from the best starts of all, two for each place in the race.
+    /// The fit with each effect that may join it, a few steps from the best starts of all ([`gone_on_from`]).
     fn added(&self, fit: &Fit, keep: usize) -> Vec<Fit> {
         let Some(screening) = Screening::of(&self.problem, fit) else { return Vec::new() };
         let suspects: Vec<Effect> = self.suspects.iter().copied().filter(|e| self.may_join(&fit.terms, *e)).collect();
@@ -111,7 +111,7 @@ impl Search<'_> {
         }
         points.extend(of(&promising, true));
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        points.truncate(2 * RACING);
+        let points = gone_on_from(points, |p| p.term.0);
         let from = screening.fit.discrepancy;
         let done = AtomicUsize::new(0);
         let probe = |start: &StartPoint| {
@@ -203,6 +203,21 @@ impl Search<'_> {
     }
 }
 
+/// Of starts, best first, two for each place in the race, and the first of every promising effect beside those: what a regression promises
+/// of the forms of one friction differs by less than what the fits come to.
+fn gone_on_from<P>(starts: Vec<P>, effect: impl Fn(&P) -> Effect) -> Vec<P> {
+    let mut seen: Vec<Effect> = Vec::new();
+    let is_gone_on_from = |(at, start): (usize, P)| {
+        let own = effect(&start);
+        let is_first = !seen.contains(&own);
+        if is_first {
+            seen.push(own);
+        }
+        (at < 2 * RACING || is_first && seen.len() <= 2 * PROMISING).then_some(start)
+    };
+    starts.into_iter().enumerate().filter_map(is_gone_on_from).collect()
+}
+
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
 fn forms(effect: Effect, richer: bool) -> Vec<usize> {
     let info = effect.info();
@@ -214,6 +229,19 @@ fn forms(effect: Effect, richer: bool) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::effects::EFFECTS;
+
+    #[test]
+    fn many_starts_of_one_effect_leave_the_first_of_others_in_and_no_more() {
+        let crowd = [Effect::CoulombMotor; 2 * RACING];
+        let others = [Effect::ViscousMotor, Effect::ViscousMotor, Effect::CoulombMotor, Effect::Delay];
+        let starts: Vec<Effect> = crowd.iter().chain(&others).copied().collect();
+        let on = gone_on_from(starts, |e| *e);
+        assert_eq!(on[..2 * RACING], crowd);
+        assert_eq!(on[2 * RACING..], [Effect::ViscousMotor, Effect::Delay]);
+        // Of effects that each have one the best.
+        let on = gone_on_from(EFFECTS.to_vec(), |e| *e);
+        assert_eq!(on, EFFECTS[..2 * RACING]);
+    }
 
     #[test]
     fn every_form_of_an_effect_is_looked_at_once_the_plain_ones_first() {
