@@ -14,9 +14,8 @@ use rayon::prelude::*;
 
 use super::Input;
 use super::least::non_negative;
-use super::motor_side::QUIET;
+use super::motion::{Direction, acceleration, speed};
 use super::rigid::{MAX_RESIDUAL, SAMPLES, SIGNIFICANTLY_WORSE, turns_a_weight};
-use super::robust::quantile;
 use super::smoothing::{smoothed, widths};
 use crate::identify::lsq::triangularise;
 
@@ -70,8 +69,7 @@ fn unexplained_at_widths(input: &Input<'_>) -> Vec<f64> {
 /// The share for smoothed columns.
 fn unexplained(input: &Input<'_>, t: &[f64], x: &[f64], table: Option<&[f64]>) -> Option<f64> {
     let dt = input.dt;
-    let rate = |v: &[f64], k: usize| (v[k + 1] - v[k - 1]) / (2.0 * dt);
-    let quiet = QUIET * quantile((1..x.len() - 1).map(|k| rate(x, k)), 0.9);
+    let direction = Direction::of_angle(x, dt);
     let middle = x[x.len() / 2];
     let rows: Vec<usize> = (1..x.len() - 1).step_by((x.len() / SAMPLES).max(1)).collect();
     // Coefficients of either sign are taken out of the torque and of the columns whose coefficients have one.
@@ -79,11 +77,10 @@ fn unexplained(input: &Input<'_>, t: &[f64], x: &[f64], table: Option<&[f64]>) -
     let positive = if table.is_some() { 5 } else { 3 };
     let triangle = triangularise(rows.len(), either, 1 + positive, |i, out| {
         let k = rows[i];
-        let v = rate(x, k);
-        let sign = if v.abs() <= quiet { 0.0 } else { v.signum() };
-        let [twist, twisting] = table.map_or([0.0; 2], |y| [x[k] - y[k], v - rate(y, k)]);
+        let v = speed(x, k, dt);
+        let [twist, twisting] = table.map_or([0.0; 2], |y| [x[k] - y[k], v - speed(y, k, dt)]);
         let of_position = [1.0, x[k] - middle, x[k].sin(), x[k].cos()];
-        let of_motion = [(x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt), v, sign, twist, twisting];
+        let of_motion = [acceleration(x, k, dt), v, direction.at(v), twist, twisting];
         out[..either].copy_from_slice(&of_position[..either]);
         out[either] = t[k];
         out[either + 1..].copy_from_slice(&of_motion[..positive]);

@@ -11,8 +11,8 @@
 
 use super::Input;
 use super::finding::runs;
+use super::motion::{Direction, acceleration, speed};
 use super::rigid::{MAX_RESIDUAL, SAMPLES};
-use super::robust::quantile;
 use super::smoothing::{SHORTEST, smoothed};
 use crate::identify::lsq::triangularise;
 
@@ -85,16 +85,14 @@ fn at_width(input: &Input<'_>, torque: &[f64], width: usize, held: bool) -> Opti
         return None;
     }
     let rows: Vec<usize> = free.iter().copied().step_by((free.len() / SAMPLES).max(1)).collect();
-    let speed = |k: usize| (q[k + 1] - q[k - 1]) / (2.0 * dt);
-    let quiet = 0.02 * quantile((1..last).map(speed), 0.9);
+    let direction = Direction::of_angle(q, dt);
     let middle = q[q.len() / 2];
     let fill = |k: usize, out: &mut [f64]| {
         for (o, x) in out.iter_mut().zip(&positions) {
-            *o = (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt);
+            *o = acceleration(x, k, dt);
         }
-        let v = speed(k);
-        let sign = if v.abs() <= quiet { 0.0 } else { v.signum() };
-        out[positions.len()..columns].copy_from_slice(&[v, sign, q[k] - middle, 1.0]);
+        let v = speed(q, k, dt);
+        out[positions.len()..columns].copy_from_slice(&[v, direction.at(v), q[k] - middle, 1.0]);
     };
     let solution = triangularise(rows.len(), columns, 1, |i, out| {
         fill(rows[i], out);

@@ -21,6 +21,7 @@ mod encoders;
 mod finding;
 mod least;
 mod momentum;
+mod motion;
 mod motor_side;
 mod nominal;
 mod pairs;

@@ -1,9 +1,9 @@
 //! The motor's equation of motion with the nominal parameters, `T = I1*a1 + B*d' + K*d`, where `d = theta1 - theta2` is the twist (rad, m):
 //! it holds whatever other torque acts on the table. Residuals are ratios of standard deviations, without unit.
 
+use super::motion::{Direction, acceleration, speed};
 use super::regression::Regression;
 use super::rigid::SIGNIFICANT;
-use super::robust::quantile;
 use super::smoothing::{smoothed, widths};
 use super::standing::friction_holds_table;
 use super::{Input, NOMINAL_OFF, Nominal, Structure};
@@ -11,9 +11,6 @@ use crate::numerics::level::deviation;
 
 /// Residual with a column as logged, over that with the column corrected, below which the column needs no correction.
 const BETTER_FIT: f64 = 0.8;
-
-/// Share of the ninth decile of the speeds up to which friction has no sign: about zero the sign is that of the noise.
-pub(super) const QUIET: f64 = 0.02;
 
 /// Residual with the coupling to the table as logged, over that without coupling, below which the column is this axis' table.
 const NEEDED_REDUCTION: f64 = 0.5;
@@ -64,13 +61,11 @@ fn coupling_share(input: &Input<'_>, table: &[f64]) -> Option<CouplingShare> {
     let (t, x1, dt) = (input.torque?, input.theta1?, input.dt);
     let by = |width: usize| {
         let [t, x, y] = [t, x1, table].map(|v| smoothed(v, width));
-        let rate = |v: &[f64], k: usize| (v[k + 1] - v[k - 1]) / (2.0 * dt);
-        let quiet = QUIET * quantile((1..x.len() - 1).map(|k| rate(&x, k)), 0.9);
+        let direction = Direction::of_angle(&x, dt);
         let row = |k: usize| {
-            let v = rate(&x, k);
-            let pull = p.b * (v - rate(&y, k)) + p.k * (x[k] - y[k]);
-            let sign = if v.abs() <= quiet { 0.0 } else { v.signum() };
-            ([pull, p.i1 * (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt), v, sign, 1.0], t[k])
+            let v = speed(&x, k, dt);
+            let pull = p.b * (v - speed(&y, k, dt)) + p.k * (x[k] - y[k]);
+            ([pull, p.i1 * acceleration(&x, k, dt), v, direction.at(v), 1.0], t[k])
         };
         let fit = Regression::of(t.len(), row)?;
         let left = fit.left / deviation(&t);
@@ -111,9 +106,8 @@ fn residual_with_twist(input: &Input<'_>, twist: &[f64], coupling: f64, torque: 
     let by = |width: usize| {
         let [t, x, d] = [t, x1, twist].map(|v| smoothed(v, width));
         let missed = (1..t.len() - 1).map(|k| {
-            let acceleration = (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (dt * dt);
-            let pull = p.b * (d[k + 1] - d[k - 1]) / (2.0 * dt) + p.k * d[k];
-            torque * t[k] - p.i1 * acceleration - coupling * pull
+            let pull = p.b * speed(&d, k, dt) + p.k * d[k];
+            torque * t[k] - p.i1 * acceleration(&x, k, dt) - coupling * pull
         });
         deviation(&missed.collect::<Vec<f64>>()) / (torque.abs() * deviation(&t))
     };

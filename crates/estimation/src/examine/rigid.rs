@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::finding::{Finding, Severity, rounded};
 use super::least::{bounded, standard_error};
+use super::motion::{Direction, acceleration, speed};
 use super::motor_side::fits_better_as_logged;
 use super::pairs::{FACTORS, factor};
 use super::robust::{noise, quantile};
@@ -198,21 +199,18 @@ fn time_domain_fit(
 ) -> Option<TimeDomainFit> {
     let (t, q) = (smoothed(torque, width), smoothed(x, width));
     let dt = input.dt;
-    let speed = |k: usize| (q[k + 1] - q[k - 1]) / (2.0 * dt);
-    let fast = quantile((1..q.len() - 1).map(speed), 0.9);
-    let quiet = 0.02 * fast;
+    let direction = Direction::of_angle(&q, dt);
+    let fast = direction.fast;
     let middle = x[x.len() / 2];
     let columns = if turns_a_weight(input, x) { 7 } else { 5 };
     let stride = (q.len() / SAMPLES).max(1);
     let least = noise.map(|noise| NOISE * noise * of_speed(width) / dt);
-    let moves = |k: &usize| least.is_none_or(|least| speed(*k).abs() > least);
+    let moves = |k: &usize| least.is_none_or(|least| speed(&q, *k, dt).abs() > least);
     let rows: Vec<usize> = (1..q.len() - 1).step_by(stride).filter(moves).collect();
-    let rate = |k: usize| (q[k + 1] - 2.0 * q[k] + q[k - 1]) / (dt * dt);
     let triangle = triangularise(rows.len(), columns, 1, |i, out| {
         let k = rows[i];
-        let v = speed(k);
-        let sign = if v.abs() <= quiet { 0.0 } else { v.signum() };
-        let all = [rate(k), v, sign, q[k] - middle, 1.0, q[k].sin(), q[k].cos()];
+        let v = speed(&q, k, dt);
+        let all = [acceleration(&q, k, dt), v, direction.at(v), q[k] - middle, 1.0, q[k].sin(), q[k].cos()];
         out[..columns].copy_from_slice(&all[..columns]);
         out[columns] = t[k];
     });
@@ -352,7 +350,7 @@ impl MotionLines {
 
 /// Accelerations at all samples but the first and the last.
 fn accelerations(x: &[f64], dt: f64) -> impl Iterator<Item = f64> {
-    x.windows(3).map(move |w| (w[2] - 2.0 * w[1] + w[0]) / (dt * dt))
+    (1..x.len().max(2) - 1).map(move |k| acceleration(x, k, dt))
 }
 
 /// The equation above, summed over the lines of motion: columns of unit size.
@@ -387,9 +385,9 @@ impl Balance {
             }
         };
         let speeds = || {
-            let speed: Vec<f64> = x.windows(3).map(|w| (w[2] - w[0]) / (2.0 * dt)).collect();
-            let quiet = 0.02 * quantile(speed.iter().copied(), 0.9);
-            let sign: Vec<f64> = speed.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
+            let speed: Vec<f64> = (1..n - 1).map(|k| speed(x, k, dt)).collect();
+            let direction = Direction::of(speed.iter().copied());
+            let sign: Vec<f64> = speed.iter().map(|v| direction.at(*v)).collect();
             (speed, sign)
         };
         let (mean, (speed, sign)) = rayon::join(mean, speeds);

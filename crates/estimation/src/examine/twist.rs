@@ -16,10 +16,10 @@ use rayon::prelude::*;
 
 use super::encoders::table_tracks_motor;
 use super::finding::{Finding, Severity, rounded};
-use super::motor_side::{QUIET, fitting_twist};
+use super::motion::Direction;
+use super::motor_side::fitting_twist;
 use super::regression::Regression;
 use super::rigid::{SAMPLES, SIGNIFICANT};
-use super::robust::quantile;
 use super::smoothing::{smoothed, widths};
 use super::{Input, NOMINAL_OFF};
 use crate::numerics::level::deviation;
@@ -121,11 +121,10 @@ impl Reading {
             [(after - before) / (2.0 * dt), (twisted_after - twisted_before) / (2.0 * dt)]
         };
         let acceleration = |k: usize| (at(k + 1)[0] - 2.0 * at(k)[0] + at(k - 1)[0]) / (dt * dt);
-        let quiet = QUIET * quantile((1..n - 1).map(|k| rates(k)[0]), 0.9);
+        let direction = Direction::of((1..n - 1).map(|k| rates(k)[0]));
         let row = |k: usize| {
             let [v, rate] = rates(k);
-            let direction = if v.abs() <= quiet { 0.0 } else { v.signum() };
-            ([at(k)[1], rate, v, direction, 1.0], acceleration(k))
+            ([at(k)[1], rate, v, direction.at(v), 1.0], acceleration(k))
         };
         let fit = Regression::of(n, row)?;
         let accelerations: Vec<f64> = (1..n - 1).step_by((n / SAMPLES).max(1)).map(acceleration).collect();
