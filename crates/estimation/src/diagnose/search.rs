@@ -27,9 +27,9 @@ use crate::hypothesis::scales::Scales;
 
 /// Most causes looked for.
 const MOST: usize = 5;
-/// Simulated steps, of all looks at a record, after which what was found is only added to, fifteen to twenty seconds on two cores: one
-/// record in twenty has more. Half of them are for ways that were passed by.
-const BUDGET: u64 = 60_000_000;
+/// Simulated steps, of all looks at a record, after which what was found is only added to, until half as many more: fifteen to twenty seconds
+/// on two cores. One record in twenty has more. Half of them are for ways that were passed by.
+const BUDGET: u64 = 45_000_000;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
 
@@ -295,7 +295,7 @@ impl Search<'_> {
 
     /// The fit with the effect that explains the most beside it; `None` where none is a material cause.
     fn joined(&self, best: &Fit, pool: &mut Pool) -> Option<Fit> {
-        if best.terms.len() >= MOST || self.problem.steps() > 2 * BUDGET {
+        if best.terms.len() >= MOST || self.problem.steps() > BUDGET + BUDGET / 2 {
             return None;
         }
         let added = self.extended(best, best.terms.len(), pool);
