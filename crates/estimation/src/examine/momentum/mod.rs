@@ -17,8 +17,8 @@ mod torque;
 use super::Input;
 use super::encoders::{compare_encoders, encoder_ratio, slow_motion_finding};
 use super::finding::{Finding, Severity};
+use super::motion::Direction;
 use super::rigid::{self, NominalFit};
-use super::robust::quantile;
 use super::spectra::Spectra;
 use conditions::{check_band, check_directions, check_time_scale};
 use lines::coherent_lines;
@@ -60,8 +60,8 @@ impl Rates {
             (Some(one), two) => (one, two),
             (None, two) => (two?, None),
         };
-        let quiet = 0.02 * quantile(main.iter().copied(), 0.9);
-        let sign = main.iter().map(|v| if v.abs() <= quiet { 0.0 } else { v.signum() }).collect();
+        let direction = Direction::of(main.iter().copied());
+        let sign = main.iter().map(|v| direction.at(*v)).collect();
         Some(Self { main, sign, table, collocated })
     }
 
