@@ -27,8 +27,8 @@ use crate::hypothesis::scales::Scales;
 
 /// Most causes looked for.
 const MOST: usize = 5;
-/// Simulated steps, of all looks at a record, after which what was found is only added to, until half as many more: fifteen to twenty seconds
-/// on two cores. One record in twenty has more. Half of them are for ways that were passed by.
+/// Simulated steps, of all looks at a record, after which what was found is only added to, and after half as many more not even that: ten to
+/// seventeen seconds on two cores for the slowest of the blind sets. Ways that were passed by have half of them.
 const BUDGET: u64 = 45_000_000;
 /// Difference of log evidence below which two hypotheses are alike.
 pub const ALIKE: f64 = 3.0;
