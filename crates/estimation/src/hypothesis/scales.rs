@@ -1,5 +1,6 @@
 //! The scales of a record: what an effect's starts are multiples of, and what bounds it.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::fit::Fit;
@@ -7,7 +8,7 @@ use super::model::Model;
 use super::problem::Problem;
 use crate::axis::Structure;
 use crate::conditioning::Record;
-use crate::effects::{Effect, Extent, Place, Scale, TorqueHistory};
+use crate::effects::{Effect, Extent, PERIODS, Place, Scale, TorqueHistory};
 use crate::numerics::level::deviation;
 
 #[derive(Clone)]
@@ -22,8 +23,8 @@ pub struct Scales {
     pub length: f64,
     pub top: f64,
     pub fastest: [f64; 2],
-    /// Speeds of motor and table below which a fifth of the path is covered.
-    slow: [f64; 2],
+    /// Largest orders of a torque periodic in the angle of motor and table that are seen, 1/rad.
+    pub orders: [f64; 2],
     /// Positions of motor and table, sorted.
     positions: [Vec<f64>; 2],
     /// Twist as measured, sorted; empty where not both sides are.
@@ -47,20 +48,23 @@ const TURN: f64 = 6.0;
 /// record counts a direction as one.
 const BACK: f64 = 0.01;
 
-/// Share of the path on which a torque that goes with the position must be in the band for it to be seen.
+/// Share of the path on which a torque that goes with the position must be in the band for it to be seen, where that is less than the
+/// periods that make a frequency.
 const SEEN: f64 = 0.2;
 
-/// Speed below which that share of the path is covered, of speeds at equal intervals.
-pub fn slow(speeds: impl Iterator<Item = f64>) -> f64 {
-    let mut speeds: Vec<f64> = speeds.map(f64::abs).collect();
+/// Largest order of a torque periodic in the angle, 1/rad, whose frequency is in the band, rad/s, over that part of the path where the axis
+/// is slow, and whose period is longer than the noise of a position, rad; of speeds, rad/s, at intervals of `dt`, s.
+fn largest_order(speeds: impl Iterator<Item = f64>, dt: f64, band: f64, noise: f64) -> f64 {
+    // Slower than the noise makes it in the band the axis stands.
+    let mut speeds: Vec<f64> = speeds.map(f64::abs).filter(|v| *v > TURN * noise * band).collect();
     speeds.sort_by(f64::total_cmp);
-    let path: f64 = speeds.iter().sum();
-    let mut gone = 0.0;
-    let seen = speeds.into_iter().find(|v| {
-        gone += v;
-        gone >= SEEN * path
+    let path = speeds.iter().sum::<f64>() * dt;
+    let mut covered = 0.0;
+    let slow = speeds.into_iter().find(|v| {
+        covered += v * dt;
+        covered >= SEEN * path || covered * band >= PERIODS * TAU * v
     });
-    seen.unwrap_or(0.0)
+    slow.map_or(0.0, |v| band / v)
 }
 
 /// The path of a motion, and its reversals, those below a threshold left out.
@@ -140,10 +144,10 @@ impl Scales {
         let work = work_of(&p.nominal, p.record, &moved);
         let shifted = (t.motion[last][2 * driven] - t.motion[0][2 * driven]).abs();
         let peak = p.peak;
-        let paths = [0, 1].map(|i: usize| {
-            let noise = p.record.channels[2 * i].as_ref().map_or(0.0, |_| p.record.noise[2 * i]);
-            path(t.motion.iter().map(|m| m[2 * i]), TURN * noise)
-        });
+        let top = p.band.omega.last().copied().unwrap_or(1.0);
+        let noise = [0, 2].map(|i: usize| p.record.channels[i].as_ref().map_or(0.0, |_| p.record.noise[i]));
+        let paths = [0, 1].map(|i: usize| path(t.motion.iter().map(|m| m[2 * i]), TURN * noise[i]));
+        let speeds = |i: usize| t.motion.iter().map(move |m| m[2 * i + 1]);
         let sorted = |mut x: Vec<f64>| {
             x.sort_by(f64::total_cmp);
             x
@@ -166,8 +170,8 @@ impl Scales {
             travel: [t1, t2],
             dt: p.record.dt,
             length: n * p.record.dt,
-            top: p.band.omega.last().copied().unwrap_or(1.0),
-            slow: [1, 3].map(|i: usize| slow(t.motion.iter().map(|m| m[i]))),
+            top,
+            orders: [0, 1].map(|i| largest_order(speeds(i), p.record.dt, top, noise[i])),
             fastest: [1, 3].map(|i| t.motion.iter().fold(0.0_f64, |m, s| m.max(s[i].abs()))),
             positions: [0, 2].map(|i: usize| sorted(t.motion.iter().map(|m| m[i]).collect())),
             twists: sorted(twists),
@@ -189,7 +193,7 @@ impl Scales {
                 positions: &self.positions[side],
                 speed: self.speed[side],
                 fastest: self.fastest[side],
-                slow: self.slow[side],
+                order: self.orders[side],
                 twist: self.twist,
                 twists: &self.twists,
                 dt: self.dt,
@@ -252,12 +256,23 @@ mod tests {
     use crate::effects::Settings;
 
     #[test]
-    fn a_fifth_of_the_path_is_covered_below_a_speed() {
-        // A speed that grows evenly goes a fifth of its path below the root of a fifth of its end; one that is constant all of it at that.
-        let grows = slow((0..=1000).map(f64::from));
-        assert!((grows / (1000.0 * 0.2_f64.sqrt()) - 1.0).abs() < 2e-3, "{grows}");
-        assert_eq!(slow([2.0, -2.0, 2.0].into_iter()), 2.0);
-        assert_eq!(slow(std::iter::empty()), 0.0);
+    fn a_torque_periodic_in_the_angle_is_seen_while_it_is_in_the_band_over_a_fifth_of_the_path_or_three_periods() {
+        // From rest at an acceleration a the path below a speed v is v^2/(2 a): a fifth of it below the root of a fifth of the last speed,
+        // and B/v*v^2/(2 a) = 3*2 pi of the largest order in a band up to B at v = 12 pi*a/B.
+        let (dt, a) = (1e-3, 2.0);
+        let speeds = |n: i32| (0..=n).map(move |k| a * dt * f64::from(k));
+        for (n, band, order) in
+            [(1000, 10.0, 10.0 / (2.0 * 0.2_f64.sqrt())), (5000, 40.0, 40.0 / (12.0 * std::f64::consts::PI * a / 40.0))]
+        {
+            let found = largest_order(speeds(n), dt, band, 0.0);
+            assert!((found / order - 1.0).abs() < 5e-3, "{found} {order}");
+        }
+        // No period is shorter than six times 2 pi of the noise, however much is covered at less speed.
+        let [quiet, noisy] = [0.0, 1e-3].map(|noise| largest_order(speeds(5000), dt, 400.0, noise));
+        assert!(quiet > 1e3 && noisy < 1.0 / (TURN * 1e-3), "{quiet} {noisy}");
+        assert_eq!(largest_order([2.0, -2.0, 2.0].into_iter(), dt, 10.0, 0.0), 5.0);
+        assert_eq!(largest_order([1e-3, 0.0].into_iter(), dt, 10.0, 1.0), 0.0);
+        assert_eq!(largest_order(std::iter::empty(), dt, 10.0, 0.0), 0.0);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::fit::{Fit, PROBE, Term};
 use super::likelihood::{C, Spectra, Weight};
 use super::model::Model;
 use super::problem::Problem;
-use super::scales::{Scales, slow};
+use super::scales::Scales;
 use super::tracking::Torques;
 use super::trajectory::Trajectory;
 
@@ -261,9 +261,8 @@ fn orders(p: &Problem<'_>, fit: &Fit, reg: &Regression, side: usize) -> Option<V
     let high = motion.iter().map(|m| m[2 * side]).fold(f64::NEG_INFINITY, f64::max);
     let range = (high - low).max(1e-12);
     // Not faster than the band where the axis is slow, at least half a period over the range.
-    let speed = slow(motion.iter().map(|m| m[2 * side + 1])).max(1e-12);
     let step = std::f64::consts::TAU / (4.0 * range);
-    let fastest = (band.omega.last()? / speed / step) as usize;
+    let fastest = (p.scales.as_ref()?.orders[side] / step) as usize;
     // Eight places of the angle to a period of the fastest; more than there are samples show no more.
     let places = (2 * fastest).min(band.n).max(LEAST_PLACES).next_power_of_two();
     let top = fastest.min(places / 2);

@@ -11,8 +11,8 @@ pub struct Extent<'a> {
     pub speed: f64,
     /// Largest speed of that side, rad/s.
     pub fastest: f64,
-    /// Speed of that side below which it covers a fifth of its path, rad/s.
-    pub slow: f64,
+    /// Largest order of a torque periodic in that side's angle that the record shows, 1/rad.
+    pub order: f64,
     /// Rms twist, rad.
     pub twist: f64,
     /// Twist as measured, rad, sorted; empty where not both sides are.
@@ -38,7 +38,7 @@ const MEASURED: f64 = 1.5;
 /// Least share of the record over which a coupling with play is in contact: one that never closes couples nothing.
 const CONTACT: f64 = 0.1;
 /// Least number of periods that make a frequency: a torque with fewer changes slowly, as a transient does.
-const PERIODS: f64 = 3.0;
+pub const PERIODS: f64 = 3.0;
 /// Least amplitude of a periodic torque, over the largest torque: the accuracy of a drive's torque.
 const KNOWN: f64 = 1e-3;
 
@@ -114,20 +114,23 @@ impl Extent<'_> {
         time.abs() * self.band >= 0.02 && time.abs() >= 0.05 * self.dt
     }
 
-    /// Whether an angular frequency lies in the band, with as many periods in the record as make it one.
+    /// Whether the record has as many periods of an angular frequency as make it one.
+    #[must_use]
+    pub fn has_periods(&self, omega: f64) -> bool {
+        omega * self.length >= PERIODS * std::f64::consts::TAU
+    }
+
+    /// Whether an angular frequency lies in the band, with as many periods in the record.
     #[must_use]
     pub fn holds(&self, omega: f64) -> bool {
-        omega <= self.band && omega * self.length >= PERIODS * std::f64::consts::TAU
+        omega <= self.band && self.has_periods(omega)
     }
 
     /// Whether a torque that is periodic in the angle, of an order in 1/rad, can be observed: nearly one period lies within the travel, and
-    /// its frequency is in the band over a fifth of the path. An axis that never reverses is slow only where it starts and stops, and
-    /// friction has a shape of its own there: its rms speed counts instead.
+    /// its frequency is in the band where the axis is slow.
     #[must_use]
     pub fn turns(&self, order: f64) -> bool {
-        let (_, reversals) = self.path;
-        let speed = if reversals > 0.0 { self.slow } else { self.speed };
-        order * self.travel() >= 0.75 * std::f64::consts::TAU && order * speed <= self.band
+        order * self.travel() >= 0.75 * std::f64::consts::TAU && order <= self.order
     }
 
     /// Whether such an order is once per turn as far as the travel tells it, within a quarter of a period, on a rigid axis: there a torque
@@ -149,7 +152,7 @@ mod tests {
             positions: &[0.0, 1.0],
             speed: 1.0,
             fastest: 1.0,
-            slow: 0.3,
+            order: 1000.0,
             twist: 0.0,
             twists: &[],
             dt: 4e-4,
@@ -223,23 +226,17 @@ mod tests {
             (Effect::FlexibleMode.info().bounds)(&[inertia, inertia * omega * omega, damping], &resting())
         };
         assert!(admits(990.0, 0.01) && admits(1040.0, 0.06) && !admits(1040.0, 0.01) && !admits(1200.0, 0.06));
+        // Three periods of it are in a record of a second, however wide its peak is.
+        let three = 3.0 * std::f64::consts::TAU;
+        assert!(admits(1.01 * three, 0.2) && !admits(0.99 * three, 0.01));
     }
 
     #[test]
-    fn a_ripple_of_less_than_a_thousandth_of_the_torque_is_none() {
+    fn a_ripple_of_less_than_a_thousandth_of_the_torque_or_out_of_the_orders_that_are_seen_is_none() {
         let admits = |amplitude: f64| (Effect::TorqueRipple.info().bounds)(&[amplitude, 10.0, 0.0], &resting());
         assert!(admits(0.5) && admits(-0.01) && !admits(5e-4) && !admits(1.1));
-    }
-
-    #[test]
-    fn a_ripple_faster_than_the_band_at_the_rms_speed_is_seen_where_the_axis_is_slow() {
-        // At a radian a second, in a band of 1000 rad/s.
-        let admits = |order: f64, reversals: f64| {
-            let extent = Extent { path: (10.0, reversals), ..resting() };
-            (Effect::TorqueRipple.info().bounds)(&[0.5, order, 0.0], &extent)
-        };
-        assert!(admits(900.0, 5.0) && admits(2000.0, 5.0) && !admits(4000.0, 5.0));
-        assert!(admits(900.0, 0.0) && !admits(2000.0, 0.0));
+        let seen = |order: f64| (Effect::TorqueRipple.info().bounds)(&[0.5, order, 0.0], &resting());
+        assert!(seen(999.0) && !seen(1001.0) && seen(4.8) && !seen(4.7));
     }
 
     #[test]

@@ -17,14 +17,16 @@ use crate::scalar::Scalar;
 /// Least damping ratio of a mode: that of bare steel. An undamped mode would vibrate on for the whole record from its start.
 const UNDAMPED: f64 = 1e-3;
 
-/// The half-power band of the mode's peak lies in the excited band, computed against the inertia that the mode is attached to, and the mode
-/// is damped, but not overdamped.
+/// The half-power band of the mode's peak reaches into the excited band, computed against the inertia that the mode is attached to, the
+/// record has periods of it, and the mode is damped, but not overdamped.
 fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
     let (inertia, stiffness, damping) = (p[0], p[1], p[2]);
     let coupled = (stiffness * (1.0 / inertia + 1.0 / x.inertia[0])).sqrt();
+    let own = (stiffness / inertia).sqrt();
     inertia > 0.0
         && inertia <= 4.0 * x.inertia[1]
-        && x.holds((stiffness / inertia).sqrt() - 0.5 * damping / inertia)
+        && own - 0.5 * damping / inertia <= x.band
+        && x.has_periods(own)
         && coupled <= 2.0 * x.band
         && (2.0 * UNDAMPED..=0.5).contains(&(damping / (inertia * stiffness).sqrt()))
 }

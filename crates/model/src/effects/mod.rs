@@ -23,7 +23,7 @@ mod side;
 mod transmitted;
 
 pub use active::{ActiveEffects, effect_scope};
-pub use extent::Extent;
+pub use extent::{Extent, PERIODS};
 pub use family::{Contrast, Family};
 pub(crate) use forces::{Forces, StepMotion};
 pub use info::{EffectInfo, ONCE, ParameterInfo, Place, Role, Scale, Start, Variant};
