@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::diagnosis::Undecided;
-use super::material::{MATERIAL, MINOR, NEAR_THE_NOISE};
+use super::material::{MATERIAL, MINOR};
 use super::moves::{MOVED, MOVED_WITH_EFFECTS};
 use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
@@ -12,6 +12,7 @@ use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, inste
 use crate::effects::{EFFECTS, Effect, Family, ONCE};
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
 use crate::hypothesis::fit::Fit;
+use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::model::Model;
 use crate::trace::machine::NOMINAL_OFF;
 

@@ -18,9 +18,6 @@ const NEXT_TO_ALL: f64 = 0.03;
 /// encoder on each side shows less of it in its twist.
 pub const NEGLIGIBLE: f64 = 2e-3;
 const NEGLIGIBLE_IN_TWIST: f64 = 3e-4;
-/// Noises up to which what is left may be the encoders' own: of another colour than the one that is told at the sampling rate (1/f) a noise
-/// has several times as much at the motion's.
-pub const NEAR_THE_NOISE: f64 = 10.0;
 /// Share of the torque up to which what a fit leaves tells it from another one: no drive knows its torque that well, so that no machine's
 /// remainder is that small.
 pub const DISTINCT: f64 = 5e-3;

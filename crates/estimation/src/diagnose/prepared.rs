@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::assess::Case;
 use super::gap::Gap;
-use super::material::NEAR_THE_NOISE;
 use super::overlay::Overlay;
 use super::search::Search;
 use crate::axis::Structure;
@@ -15,7 +14,7 @@ use crate::effects::Effect;
 use crate::hypothesis::band::{self, Rate, Reach};
 use crate::hypothesis::discrepancy::Discrepancy;
 use crate::hypothesis::fit::{Fit, STEPS};
-use crate::hypothesis::likelihood::Band;
+use crate::hypothesis::likelihood::{Band, NEAR_THE_NOISE};
 use crate::hypothesis::model::Model;
 use crate::hypothesis::problem::{Problem, Work, largest};
 use crate::numerics::level::deviation;

@@ -13,7 +13,7 @@ use super::conclusion::Decision;
 use super::diagnosis::ClosureOf;
 use super::gap::{self, Gaps};
 use super::location::without_offset;
-use super::material::{NEAR_THE_NOISE, NEGLIGIBLE, is_materially_less};
+use super::material::{NEGLIGIBLE, is_materially_less};
 use super::prepared::{Prepared, prepared};
 use super::quantisation;
 use super::residual::located;
@@ -24,6 +24,7 @@ use crate::conditioning::{Record, bridged};
 use crate::effects::Effect;
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::Fit;
+use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::problem::Work;
 
 /// Share of the torque that an account of a rigid axis leaves at most where the band that its motion rules is understood so far that what

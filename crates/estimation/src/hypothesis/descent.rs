@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::discrepancy::Discrepancy;
 use super::evidence::PRIOR;
 use super::fit::{Fit, Term};
-use super::likelihood::{Band, C, Sight, TorqueResidual};
+use super::likelihood::{Band, C, NEAR_THE_NOISE, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::problem::Problem;
 use super::scatter;
@@ -39,6 +39,8 @@ const WORTH: f64 = 0.05;
 const ANOTHER: f64 = 0.4;
 /// Share of the feedback's bandwidth at which a fit looks whether it is likelier.
 const LOOSER: f64 = 0.4;
+/// Share of a discrepancy's variance that is none.
+const NOISE_ALONE: f64 = 1e-12;
 /// Share of the bandwidth of a fit at its end at which another is tried, and its steps.
 const SHARPER: f64 = 0.25;
 const SHARPENING: usize = 6;
@@ -169,6 +171,24 @@ impl<'a> Descent<'a> {
             if other.log_likelihood() <= self.log_likelihood() + WORTH {
                 break;
             }
+            *self = other;
+        }
+        Some(())
+    }
+
+    /// Near the noise, steps along the measured motion from where the noise is all that is left, kept where they end likelier: a discrepancy,
+    /// at which every frequency counts alike, holds itself up by what the noise of the fast ones does to the parameters.
+    pub fn try_noise_alone(&mut self) -> Option<()> {
+        let (problem, band) = (self.problem, self.problem.band);
+        if band.at_floor(&self.at.rows) || band.noise_multiple(&self.at.rows) > NEAR_THE_NOISE {
+            return Some(());
+        }
+        let at = problem.along(&self.at.model, problem.bandwidth(self.at.s))?;
+        let mut other =
+            Self { at: Along { s: self.at.s.map(|s| NOISE_ALONE * s), ..at }, secant: None, ..self.clone() };
+        band.weigh(&mut other.at.rows, other.at.s);
+        other.steps(SHARPENING, false)?;
+        if other.log_likelihood() > self.log_likelihood() + WORTH {
             *self = other;
         }
         Some(())

@@ -155,6 +155,7 @@ impl Problem<'_> {
         let mut descent = Descent::new(&exact, &fit.model, &fit.terms, fit.discrepancy)?;
         descent.run(STEPS)?;
         descent.sharpen(false)?;
+        descent.try_noise_alone()?;
         Some(Fit { converged: true, ..descent.done() })
     }
 

@@ -28,6 +28,9 @@ use crate::axis::{Parameters, Structure};
 use crate::conditioning::Record;
 use crate::numerics::level::deviation;
 
+/// Noises up to which what is left may be the encoders' own: of another colour than the one that is told at the sampling rate (1/f) a noise
+/// has several times as much at the motion's.
+pub const NEAR_THE_NOISE: f64 = 10.0;
 /// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor.
 const AT_FLOOR: f64 = 1.15;
 

@@ -1,6 +1,8 @@
 //! Rigid axes: what is named, and what is not.
 
 use super::*;
+use crate::hypothesis::descent::Descent;
+use crate::hypothesis::fit::STEPS;
 
 #[test]
 fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
@@ -241,4 +243,28 @@ fn a_log_read_early_is_followed_with_the_torque_to_come() {
     // What is left is the error of the speed at the record's begin, which the feedback takes out.
     assert!(lacks(-early) < 1e-3, "{}", lacks(-early));
     assert!(lacks(-early + 0.1 * DT) > 0.1, "{}", lacks(-early + 0.1 * DT));
+}
+
+#[test]
+fn a_fit_near_the_noise_goes_on_to_where_the_noise_alone_is_left() {
+    let record = with_a_mode(false);
+    let model = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &model, Reach::Whole);
+    let problem = Problem::of(&searched.record, &searched.band, model, searched.peak);
+    let terms = [(Effect::MotorMode, 0)];
+    let multiple = |f: &Fit| searched.band.noise_multiple(&f.rows);
+    let mode = with(&[(Effect::MotorMode, 0, 0.7), (Effect::MotorMode, 1, 0.7 * 4900.0), (Effect::MotorMode, 2, 1.0)]);
+    let truth = Model { effects: mode, ..model };
+    let known = problem.fit(&truth, &terms, [f64::MAX; 2], STEPS).and_then(|f| problem.deepen(&f)).expect("a fit");
+    for (off, is_near) in [(1.0, true), (1.001, true), (1.2, false)] {
+        let start = Model { parameters: parameters(off * known.model.parameters.i1), ..known.model };
+        let mut descent = Descent::new(&problem, &start, &terms, known.discrepancy).expect("a run");
+        let before = descent.clone().done();
+        assert!(!searched.band.at_floor(&before.rows));
+        descent.try_noise_alone().expect("a run");
+        let after = descent.done();
+        let gain = after.log_likelihood - before.log_likelihood;
+        assert_eq!(searched.band.at_floor(&after.rows), is_near, "{off}: {} {}", multiple(&before), multiple(&after));
+        assert_eq!(gain > 10.0, is_near, "{off}: {gain}");
+    }
 }
