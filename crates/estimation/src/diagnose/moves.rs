@@ -50,7 +50,7 @@ impl Search<'_> {
             all.extend(longer.iter().map(|(fit, _)| fit).filter(|f| f.terms.len() > 1).cloned());
             shorter = longer;
         }
-        self.raced(all, Some(chosen))
+        self.raced(all, None, Some(chosen))
     }
 
     /// Whether an effect may stand beside these.
@@ -66,7 +66,7 @@ impl Search<'_> {
         }
         let mut added = self.added(fit, keep);
         added.extend(self.put_back(fit).iter().flat_map(|f| self.added(f, keep)));
-        let added = self.raced(added, None);
+        let added = self.raced(added, Some(fit), None);
         pool.extend_all(fit, &added);
         added
     }
@@ -179,7 +179,7 @@ impl Search<'_> {
         let best = |starts: Vec<StartPoint>| starts.into_iter().take(2);
         let points: Vec<StartPoint> = screening.starts(effect, &richer).into_iter().flat_map(best).collect();
         let probed = points.par_iter().filter_map(|start| screening.fitted(start, i, fit.discrepancy)).collect();
-        self.raced(probed, Some(fit))
+        self.raced(probed, None, Some(fit))
     }
 
     /// The likelier fit with the simpler law of the same thing in place of an effect that stands where it is that law.

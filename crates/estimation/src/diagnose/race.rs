@@ -15,15 +15,18 @@ const ROUND: usize = 8;
 const PATIENCE: f64 = 10.0;
 
 impl Search<'_> {
-    /// The same fits, best first, those that keep up with the best and with `rival` fitted to their end.
-    pub fn raced(&self, mut fits: Vec<Fit>, rival: Option<&Fit>) -> Vec<Fit> {
+    /// The same fits, best first, those that keep up with the best and with `rival` fitted to their end; beside `nested`, which all of them
+    /// have in them, those that have come back to it after those that are still on their way.
+    pub fn raced(&self, mut fits: Vec<Fit>, nested: Option<&Fit>, rival: Option<&Fit>) -> Vec<Fit> {
         let share = self.independent(&fits);
         let evidence = |f: &Fit| self.evidence(f, share);
-        fits.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
-        let best = rival.or(fits.first()).map_or([0.0; 2], |f| f.discrepancy);
+        let idle = |f: &Fit| nested.is_some_and(|n| has_come_back(f, n));
+        fits.sort_by(|a, b| idle(a).cmp(&idle(b)).then(evidence(b).total_cmp(&evidence(a))));
+        let likeliest = || fits.iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)));
+        let best = rival.or_else(likeliest).map_or([0.0; 2], |f| f.discrepancy);
         let is_out = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > OUT_OF_RACE * best[i]);
         let mut racing: Vec<usize> = (0..fits.len().min(RACING)).filter(|i| !is_out(&fits[*i])).collect();
-        let mut first = rival.map_or(f64::NEG_INFINITY, evidence);
+        let mut first = fits.iter().filter(|f| idle(f)).chain(rival).map(evidence).fold(f64::NEG_INFINITY, f64::max);
         for _ in 0..STEPS / ROUND {
             let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);
             let further: Vec<Option<Fit>> = racing.par_iter().map(|&i| on(&fits[i])).collect();
@@ -53,6 +56,11 @@ impl Search<'_> {
     }
 }
 
+/// Whether a fit has come back to the one that it has in it. One that is less likely than that has not: it ends no lower.
+fn has_come_back(fit: &Fit, nested: &Fit) -> bool {
+    (fit.log_likelihood - nested.log_likelihood).abs() < ALIKE
+}
+
 /// Those that go on, best first, without those that have come to where a better one is: they would end where that does.
 fn apart(racing: &[usize], fits: &[Fit]) -> Vec<usize> {
     let mut apart: Vec<usize> = Vec::new();
@@ -70,6 +78,17 @@ mod tests {
     use crate::axis::{Parameters, Structure};
     use crate::effects::{Effect, Settings};
     use crate::hypothesis::model::Model;
+
+    #[test]
+    fn a_fit_that_gains_nothing_has_come_back_and_one_that_lies_below_is_on_its_way() {
+        let at = |log_likelihood: f64| {
+            let model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
+            Fit::of_likelihood(model, &[(Effect::FlexibleMode, 0)], log_likelihood)
+        };
+        let nested = at(14117.1);
+        assert!(has_come_back(&at(14116.2), &nested) && has_come_back(&at(14119.3), &nested));
+        assert!(!has_come_back(&at(14024.3), &nested) && !has_come_back(&at(14197.1), &nested));
+    }
 
     #[test]
     fn of_fits_of_the_same_effects_at_the_same_place_the_best_goes_on() {
