@@ -37,7 +37,7 @@ pub struct Scales {
     moved: Arc<[f64]>,
     /// Square of the speed at which the record begins, (rad/s)^2.
     begins: f64,
-    /// Way of motor and table to and fro, rad, and reversals.
+    /// Way of motor and table to and fro, rad, and reversals; none of a side that is not measured.
     paths: [(f64, f64); 2],
     structure: Structure,
 }
@@ -146,7 +146,10 @@ impl Scales {
         let peak = p.peak;
         let top = p.band.omega.last().copied().unwrap_or(1.0);
         let noise = [0, 2].map(|i: usize| p.record.channels[i].as_ref().map_or(0.0, |_| p.record.noise[i]));
-        let paths = [0, 1].map(|i: usize| path(t.motion.iter().map(|m| m[2 * i]), TURN * noise[i]));
+        // How far a side goes that is not measured no model tells before its frictions are known: a load may lag far behind its motor.
+        let is_known = |i: usize| p.nominal.structure == Structure::Rigid || p.record.channels[2 * i].is_some();
+        let path_of = |i: usize| path(t.motion.iter().map(|m| m[2 * i]), TURN * noise[i]);
+        let paths = [0, 1].map(|i| if is_known(i) { path_of(i) } else { (0.0, 0.0) });
         let speeds = |i: usize| t.motion.iter().map(move |m| m[2 * i + 1]);
         let sorted = |mut x: Vec<f64>| {
             x.sort_by(f64::total_cmp);

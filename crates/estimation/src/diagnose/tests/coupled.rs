@@ -1,6 +1,7 @@
 //! Two inertias: an encoder on each side, or on the motor alone.
 
 use super::*;
+use crate::hypothesis::scales::Scales;
 
 /// A soft belt that a slow controller moves on and on, its motor's encoder alone read.
 fn of_a_belt(belt: Parameters, seed: u64) -> Record {
@@ -328,4 +329,27 @@ fn the_common_factor_of_all_at_the_table_is_found_beside_its_friction() {
     let level = o.improved.effects.of(Effect::CoulombTable)[0] / 0.15;
     let off = [found.i2 / screw.i2, found.k / screw.k, level].map(|r| (r - 1.0).abs());
     assert!(off.iter().all(|o| *o < 3e-3), "{off:?}");
+}
+
+#[test]
+fn a_friction_of_a_side_that_is_not_measured_may_take_what_its_own_motion_lets_it() {
+    let effects = with(&[(Effect::QuadraticDrag, 0, 1e-4)]);
+    let both = of_two_inertias(BELT, effects, 0.01, 0);
+    let [_, _, table, _] = both.channels.clone();
+    for (channel, is_bounded) in [(table, true), (None, false)] {
+        let [motor, ..] = both.channels.clone();
+        let record = Record { channels: [motor, None, channel, None], ..both.clone() };
+        let model = Model::new(BELT, Structure::TwoInertia, Settings::default());
+        let (searched, _) = prepared(&record, &model, Reach::Shown);
+        let problem = Problem::of(&searched.record, &searched.band, model, searched.peak);
+        let given = problem.given(&model).expect("a run");
+        let scales = Scales::new(&problem, &given).expect("a run");
+        // At a thousand times its size more than the torque ever brought would be gone along the way of a table that is seen to go it.
+        let [own, thousandfold] = [1e-4, 0.1].map(|coefficient| {
+            let drag = with(&[(Effect::QuadraticDrag, 0, coefficient)]);
+            let dragged = Model::new(BELT, Structure::TwoInertia, drag);
+            scales.admit(&record, &dragged, std::iter::once(Effect::QuadraticDrag))
+        });
+        assert!(own && thousandfold != is_bounded, "{is_bounded}");
+    }
 }
