@@ -17,6 +17,7 @@ mod quantisation;
 mod race;
 mod residual;
 mod search;
+mod steps;
 mod summary;
 #[cfg(test)]
 mod tests;
