@@ -122,18 +122,23 @@ fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     best
 }
 
-/// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is
-/// significantly negative. For slow moves, where friction or a weight is nearly all of the torque: their spectra have few lines above the
+/// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is so
+/// negative. For slow moves, where friction or a weight is nearly all of the torque: their spectra have few lines above the
 /// noise. It is asked where the axis moves beyond the noise of its encoder: at rest friction balances any torque below breakaway, and has
 /// no sign.
 pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
     let found = at_widths(input, torque, x, Some(noise(x)));
     found.into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(|found| {
-        let (friction, mass) = (found.friction / found.friction_error, found.mass / found.error);
         found.unbiased() < MAX_RESIDUAL
-            && (friction > 0.0 && mass > -SIGNIFICANT || friction > -SIGNIFICANT && mass > SIGNIFICANT)
+            && counts_as_logged(found.friction / found.friction_error, found.mass / found.error)
     })
+}
+
+/// Whether a friction and an inertia, in their standard errors, are of a torque that counts as the motion does. Both turn round with it: a
+/// friction that a late torque makes negative is none beside an inertia that is determined several times as well.
+fn counts_as_logged(friction: f64, mass: f64) -> bool {
+    friction > 0.0 && mass > -SIGNIFICANT || mass > SIGNIFICANT && -friction < SIGNIFICANT.max(mass / SIGNIFICANT)
 }
 
 /// Range of an angle about its middle from which a weight's torque is not a straight line, rad; and beyond which the column is no angle of a
@@ -444,6 +449,15 @@ mod tests {
     use super::*;
     use crate::axis::Parameters;
     use crate::numerics::level::noise;
+
+    #[test]
+    fn a_friction_that_a_late_torque_makes_negative_turns_no_inertia_round_that_is_known_several_times_as_well() {
+        // Of a sound log whose torque is two samples late.
+        assert!(counts_as_logged(-7.2, 445.0) && !counts_as_logged(7.2, -445.0));
+        // Slow moves, as logged and turned round: friction is nearly all of the torque.
+        assert!(counts_as_logged(90.0, 5.0) && counts_as_logged(90.0, -2.0) && !counts_as_logged(-90.0, 5.0));
+        assert!(counts_as_logged(-2.0, 4.0) && !counts_as_logged(-4.0, 8.0) && !counts_as_logged(-1.0, 1.0));
+    }
 
     #[test]
     fn the_standard_error_of_an_inertia_is_the_scatter_of_its_estimates_under_a_coloured_torque() {

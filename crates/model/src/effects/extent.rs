@@ -29,7 +29,7 @@ pub struct Extent<'a> {
     pub stiffness: f64,
     /// Most that friction can have taken out of the axis over the record, J: the work of the torque, and what was stored before.
     pub energy: f64,
-    /// Length of that side's path to and fro, rad, and its number of reversals.
+    /// Length of that side's path to and fro, rad, and its number of reversals; none where it is not known.
     pub path: (f64, f64),
 }
 
