@@ -240,15 +240,6 @@ mod tests {
     }
 
     #[test]
-    fn a_tight_spot_is_half_the_travel_wide_at_most_and_reaches_into_it() {
-        // Along a radian.
-        let admits =
-            |centre: f64, width: f64| (Effect::PositionFriction.info().bounds)(&[0.5, centre, width], &resting());
-        assert!(admits(0.5, 0.45) && !admits(0.5, 0.55) && !admits(0.5, 1e-5));
-        assert!(admits(-0.2, 0.3) && !admits(-0.4, 0.3) && admits(1.2, 0.3) && !admits(1.4, 0.3));
-    }
-
-    #[test]
     fn a_ripple_once_per_turn_of_a_rigid_axis_is_an_unbalance() {
         let travel = [0.0, 6.0];
         let admits = |stiffness: f64, effect: Effect, values: &[f64]| {

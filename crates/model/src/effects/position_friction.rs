@@ -32,13 +32,11 @@ impl DryFriction for PositionFriction {
         odds: 1.0,
         bounds: |p, x| {
             p[0] <= x.torque
-                // A wider one grows all along the way.
-                && p[2] <= 0.5 * x.travel()
+                && p[2] <= 0.25 * x.travel()
                 // Seen by some samples of a crossing.
                 && p[2] >= 2.0 * x.speed * x.dt
-                // What is left of it at its width lies on the way.
-                && p[1] + p[2] >= x.positions[0]
-                && p[1] - p[2] <= x.positions[x.positions.len() - 1]
+                && p[1] >= x.positions[0]
+                && p[1] <= x.positions[x.positions.len() - 1]
         },
         example: &[6e-3, 0.2, 0.3],
         variants: &[Variant { name: "", free: &[0, 1, 2] }],
