@@ -10,6 +10,7 @@
 //! Assumed: the noise is white at the sampling rate, or grows below a corner ([`super::colour`]). Where the levels never settle, the
 //! lowest part of the spectrum is it. What grows with the speed ([`super::jitter`]) counts with its mean over the record.
 
+use rayon::prelude::*;
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::colour::corner;
@@ -93,21 +94,15 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
         scatter: [None; 4],
         period,
     };
-    for (c, channel) in channels.iter().enumerate() {
-        if let Some(y) = channel {
-            let (level, method) = level_of(y, period);
-            let quantum = quantum(y).filter(|q| *q > 0.2 * level);
-            let resolution = quantum.map_or(0.0, |q| q / 12.0_f64.sqrt());
-            estimate.scatter[c] = period.and_then(|p| scatter(y, p));
-            estimate.quantum[c] = quantum;
-            (estimate.std[c], estimate.method[c]) =
-                if resolution > level { (resolution, NoiseMethod::Resolution) } else { (level, method) };
-            if method == NoiseMethod::Unsettled && estimate.method[c] == method {
-                estimate.std[c] = estimate.scatter[c].map_or(level, |s| s.max(level));
-            }
-            if let (0 | 2, NoiseMethod::Differences { order }) = (c, estimate.method[c]) {
-                estimate.jitter = [estimate.jitter, jitter(y, order)].into_iter().flatten().reduce(f64::max);
-            }
+    let of_each: Vec<Option<OfChannel>> =
+        channels.par_iter().map(|channel| channel.map(|y| OfChannel::estimate(y, period))).collect();
+    for (c, found) in of_each.into_iter().enumerate() {
+        let Some(found) = found else { continue };
+        (estimate.std[c], estimate.method[c]) = (found.std, found.method);
+        (estimate.quantum[c], estimate.scatter[c]) = (found.quantum, found.scatter);
+        // Of a speed the samples' times are not told.
+        if c.is_multiple_of(2) {
+            estimate.jitter = [estimate.jitter, found.jitter].into_iter().flatten().reduce(f64::max);
         }
     }
     for side in 0..2 {
@@ -125,6 +120,31 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
         (estimate.std[0], estimate.std[2]) = ((common + own[0]).sqrt(), (common + own[1]).sqrt());
     }
     estimate
+}
+
+/// The noise of one channel; the fields are those of a [`NoiseEstimate`].
+struct OfChannel {
+    std: f64,
+    method: NoiseMethod,
+    jitter: Option<f64>,
+    quantum: Option<f64>,
+    scatter: Option<f64>,
+}
+
+impl OfChannel {
+    fn estimate(y: &[f64], period: Option<usize>) -> Self {
+        let (level, method) = level_of(y, period);
+        let quantum = quantum(y).filter(|q| *q > 0.2 * level);
+        let resolution = quantum.map_or(0.0, |q| q / 12.0_f64.sqrt());
+        let scatter = period.and_then(|p| scatter(y, p));
+        let (std, method) = match method {
+            _ if resolution > level => (resolution, NoiseMethod::Resolution),
+            NoiseMethod::Unsettled => (scatter.map_or(level, |s| s.max(level)), method),
+            _ => (level, method),
+        };
+        let jitter = if let NoiseMethod::Differences { order } = method { jitter(y, order) } else { None };
+        Self { std, method, jitter, quantum, scatter }
+    }
 }
 
 /// The variance that the noises of two positions have in common, by their differences of an order, and that of each alone: of samples

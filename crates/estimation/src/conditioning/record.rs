@@ -106,6 +106,10 @@ impl Record {
         if is_held && ahead == 0.0 {
             return Ramp::held(torque[k.min(last)]);
         }
+        let instant = |i: usize| torque[(k * instants + i).min(last)];
+        if !is_held && ahead == 0.0 && parts == instants {
+            return Ramp { start: instant(j), end: instant(j + 1) };
+        }
         let ahead = ahead / self.dt;
         let at = |i: usize| ((k as f64 + i as f64 / parts as f64) + ahead) * instants as f64;
         let (from, to) = (at(j), at(j + 1));

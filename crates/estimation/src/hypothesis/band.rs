@@ -231,32 +231,36 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     // Within half of that a tangent of the motion is told: over longer stretches its parabola is none.
     let near = ((0.5 * SETTLING / (limit * dt)) as usize).clamp(4, n / 4);
     // What passes `late` samples late does so with the line that is taken out of it, too.
-    let filter =
-        |y: &[f64], beyond: Beyond, every: usize, late: f64, response: &dyn Fn(f64) -> Complex<f64>| -> Vec<f64> {
-            let ends = [tangent(y, near, false), tangent(y, near, true)];
-            let at = |i: isize| -> f64 {
-                let last = n as isize - 1;
-                if i < 0 {
-                    beyond.mirrored(y[(-i).min(last) as usize], ends[0], -i as f64)
-                } else if i > last {
-                    beyond.mirrored(y[(2 * last - i).max(0) as usize], ends[1], (i - last) as f64)
-                } else {
-                    y[i as usize]
-                }
-            };
-            // A straight line through the ends keeps the circle closed.
-            let (first, end) = (at(-(pad as isize)), at((total - pad) as isize - 1));
-            let line = |at: f64| first + (end - first) * at / (total as f64 - 1.0);
-            let mut z: Vec<Complex<f64>> =
-                (0..total).map(|k| Complex::new(at(k as isize - pad as isize) - line(k as f64), 0.0)).collect();
-            forward.process(&mut z);
-            for (m, v) in z.iter_mut().enumerate() {
-                let f = if 2 * m <= total { m as f64 } else { m as f64 - total as f64 } / (total as f64 * dt);
-                *v *= response(f) / total as f64;
+    let filter = |y: &[f64],
+                  beyond: Beyond,
+                  every: usize,
+                  late: f64,
+                  response: &(dyn Fn(f64) -> Complex<f64> + Sync)|
+     -> Vec<f64> {
+        let ends = [tangent(y, near, false), tangent(y, near, true)];
+        let at = |i: isize| -> f64 {
+            let last = n as isize - 1;
+            if i < 0 {
+                beyond.mirrored(y[(-i).min(last) as usize], ends[0], -i as f64)
+            } else if i > last {
+                beyond.mirrored(y[(2 * last - i).max(0) as usize], ends[1], (i - last) as f64)
+            } else {
+                y[i as usize]
             }
-            inverse.process(&mut z);
-            (0..n).step_by(every).map(|k| z[k + pad].re + line((k + pad) as f64 - late)).collect()
         };
+        // A straight line through the ends keeps the circle closed.
+        let (first, end) = (at(-(pad as isize)), at((total - pad) as isize - 1));
+        let line = |at: f64| first + (end - first) * at / (total as f64 - 1.0);
+        let mut z: Vec<Complex<f64>> =
+            (0..total).map(|k| Complex::new(at(k as isize - pad as isize) - line(k as f64), 0.0)).collect();
+        forward.process(&mut z);
+        for (m, v) in z.iter_mut().enumerate() {
+            let f = if 2 * m <= total { m as f64 } else { m as f64 - total as f64 } / (total as f64 * dt);
+            *v *= response(f) / total as f64;
+        }
+        inverse.process(&mut z);
+        (0..n).step_by(every).map(|k| z[k + pad].re + line((k + pad) as f64 - late)).collect()
+    };
     let low = |f: f64| {
         let x = (f.abs() / limit - 1.3) / 0.9;
         if x <= 0.0 {
@@ -281,13 +285,18 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         };
         held * (low(f) / sinc(f * dt * step as f64).powi(2))
     };
-    let fine = filter(&record.torque, Beyond::Even, step, if zoh { 0.5 } else { 0.0 }, &shape);
+    // As long as it may be, a record is filtered on all cores.
+    let passed = |c: usize| {
+        record.channels[c].as_ref().map(|y| filter(y, Beyond::of(c), every, 0.0, &|f| Complex::new(low(f), 0.0)))
+    };
+    let (fine, ((first, second), (third, fourth))) = rayon::join(
+        || filter(&record.torque, Beyond::Even, step, if zoh { 0.5 } else { 0.0 }, &shape),
+        || rayon::join(|| rayon::join(|| passed(0), || passed(1)), || rayon::join(|| passed(2), || passed(3))),
+    );
+    let channels = [first, second, third, fourth];
     let torque: Vec<f64> = fine.iter().copied().step_by(instants).collect();
     let mut between = fine;
     between.resize(torque.len() * instants, between.last().copied().unwrap_or_default());
-    let channels = [0, 1, 2, 3].map(|c: usize| {
-        record.channels[c].as_ref().map(|y| filter(y, Beyond::of(c), every, 0.0, &|f| Complex::new(low(f), 0.0)))
-    });
     let noise = record.noise.map(|s| s / (every as f64).sqrt());
     let common_noise = record.common_noise / every as f64;
     let idle = record.idle.iter().map(|r| r.start / every..r.end / every).collect();
