@@ -95,15 +95,12 @@ pub fn estimate_noise(torque: &[f64], channels: &[Option<&[f64]>; 4], period: Op
         period,
     };
     let of_each: Vec<Option<OfChannel>> =
-        channels.par_iter().map(|channel| channel.map(|y| OfChannel::estimate(y, period))).collect();
+        (0..4).into_par_iter().map(|c| Some(OfChannel::estimate(channels[c]?, c.is_multiple_of(2), period))).collect();
     for (c, found) in of_each.into_iter().enumerate() {
         let Some(found) = found else { continue };
         (estimate.std[c], estimate.method[c]) = (found.std, found.method);
         (estimate.quantum[c], estimate.scatter[c]) = (found.quantum, found.scatter);
-        // Of a speed the samples' times are not told.
-        if c.is_multiple_of(2) {
-            estimate.jitter = [estimate.jitter, found.jitter].into_iter().flatten().reduce(f64::max);
-        }
+        estimate.jitter = [estimate.jitter, found.jitter].into_iter().flatten().reduce(f64::max);
     }
     for side in 0..2 {
         let Some(corner) = channels[2 * side].and_then(corner) else { continue };
@@ -132,7 +129,8 @@ struct OfChannel {
 }
 
 impl OfChannel {
-    fn estimate(y: &[f64], period: Option<usize>) -> Self {
+    /// Of a speed the samples' times are not told.
+    fn estimate(y: &[f64], is_position: bool, period: Option<usize>) -> Self {
         let (level, method) = level_of(y, period);
         let quantum = quantum(y).filter(|q| *q > 0.2 * level);
         let resolution = quantum.map_or(0.0, |q| q / 12.0_f64.sqrt());
@@ -142,7 +140,10 @@ impl OfChannel {
             NoiseMethod::Unsettled => (scatter.map_or(level, |s| s.max(level)), method),
             _ => (level, method),
         };
-        let jitter = if let NoiseMethod::Differences { order } = method { jitter(y, order) } else { None };
+        let jitter = match method {
+            NoiseMethod::Differences { order } if is_position => jitter(y, order),
+            _ => None,
+        };
         Self { std, method, jitter, quantum, scatter }
     }
 }

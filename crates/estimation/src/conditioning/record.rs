@@ -106,16 +106,17 @@ impl Record {
         if is_held && ahead == 0.0 {
             return Ramp::held(torque[k.min(last)]);
         }
-        let instant = |i: usize| torque[(k * instants + i).min(last)];
+        let logged = |i: usize| torque[i.min(last)];
+        // Stepped as finely as the torque is kept, a part runs from one value of it to the next: most of what is ever simulated.
         if !is_held && ahead == 0.0 && parts == instants {
-            return Ramp { start: instant(j), end: instant(j + 1) };
+            let from = k * instants + j;
+            return Ramp { start: logged(from), end: logged(from + 1) };
         }
         let ahead = ahead / self.dt;
         let at = |i: usize| ((k as f64 + i as f64 / parts as f64) + ahead) * instants as f64;
         let (from, to) = (at(j), at(j + 1));
         // A part that ends at an instant ends there, whatever rounding says.
         let (first, next) = ((from + ROUNDING) as usize, (to - ROUNDING) as usize);
-        let logged = |i: usize| torque[i.min(last)];
         let between = |i: usize, x: f64| {
             if is_held { logged(i) } else { logged(i) + (logged(i + 1) - logged(i)) * (x - i as f64).min(1.0) }
         };
@@ -191,6 +192,19 @@ mod tests {
         assert_eq!(record.ramp(0, 0, 2, 0.0), Ramp { start: 1.0, end: 2.0 });
         assert_eq!(record.ramp(0, 0, 1, 0.25), Ramp { start: 2.0, end: 5.0 });
         assert_eq!(record.ramp(1, 0, 1, 0.5), Ramp { start: 7.0, end: 7.0 });
+    }
+
+    #[test]
+    fn a_torque_stepped_as_finely_as_it_is_kept_is_read_as_a_moment_later() {
+        let torque = [0.5, -1.0, 4.0, 2.5, 2.0, 7.0];
+        let between = Some((3, torque.to_vec()));
+        let fine = Record { between, ..record(Hold::Linear, &[0.5, 2.5]) };
+        for (k, j) in [(0, 0), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0)] {
+            let (own, later) = (fine.ramp(k, j, 3, 0.0), fine.ramp(k, j, 3, 1e-12));
+            let at = |i: usize| torque[(3 * k + j + i).min(5)];
+            assert_eq!(own, Ramp { start: at(0), end: at(1) });
+            assert!((own.start - later.start).abs() < 1e-9 && (own.end - later.end).abs() < 1e-9, "{k} {j}");
+        }
     }
 
     #[test]

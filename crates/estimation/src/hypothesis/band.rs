@@ -4,6 +4,7 @@ use super::likelihood::Sight;
 use crate::axis::Structure;
 use crate::conditioning::Record;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use rustfft::{FftPlanner, num_complex::Complex};
 
 /// Share of the acceleration's power that the band of the motion holds, and how far beyond it goes.
@@ -211,6 +212,9 @@ fn tangent(y: &[f64], samples: usize, last: bool) -> [f64; 2] {
     [of(0) + fit[0], -fit[1]]
 }
 
+/// What a filter makes of a frequency in Hz.
+type Response<'r> = &'r (dyn Fn(f64) -> Complex<f64> + Sync);
+
 /// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
 /// the band it is the one that acted.
 pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
@@ -231,12 +235,7 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     // Within half of that a tangent of the motion is told: over longer stretches its parabola is none.
     let near = ((0.5 * SETTLING / (limit * dt)) as usize).clamp(4, n / 4);
     // What passes `late` samples late does so with the line that is taken out of it, too.
-    let filter = |y: &[f64],
-                  beyond: Beyond,
-                  every: usize,
-                  late: f64,
-                  response: &(dyn Fn(f64) -> Complex<f64> + Sync)|
-     -> Vec<f64> {
+    let filter = |y: &[f64], beyond: Beyond, every: usize, late: f64, response: Response<'_>| -> Vec<f64> {
         let ends = [tangent(y, near, false), tangent(y, near, true)];
         let at = |i: isize| -> f64 {
             let last = n as isize - 1;
@@ -289,11 +288,11 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     let passed = |c: usize| {
         record.channels[c].as_ref().map(|y| filter(y, Beyond::of(c), every, 0.0, &|f| Complex::new(low(f), 0.0)))
     };
-    let (fine, ((first, second), (third, fourth))) = rayon::join(
+    let mut channels = [const { None }; 4];
+    let (fine, ()) = rayon::join(
         || filter(&record.torque, Beyond::Even, step, if zoh { 0.5 } else { 0.0 }, &shape),
-        || rayon::join(|| rayon::join(|| passed(0), || passed(1)), || rayon::join(|| passed(2), || passed(3))),
+        || channels.par_iter_mut().enumerate().for_each(|(c, channel)| *channel = passed(c)),
     );
-    let channels = [first, second, third, fourth];
     let torque: Vec<f64> = fine.iter().copied().step_by(instants).collect();
     let mut between = fine;
     between.resize(torque.len() * instants, between.last().copied().unwrap_or_default());
