@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::pool::Pool;
 use super::race::RACING;
-use super::search::Search;
+use super::search::{MOST, Search};
 use crate::effects::Effect;
 use crate::hypothesis::determined::is_simpler;
 use crate::hypothesis::fit::{Fit, PROBE, Term};
@@ -15,6 +15,10 @@ use crate::hypothesis::starts::{Screening, StartPoint};
 
 /// The best that are gone on with: effects, in their richer forms, and twice as many in one; hypotheses of each size, beside the chosen way.
 pub const PROMISING: usize = 4;
+/// Starts of each form of an effect that enter the regression of several, sets of each size that are fitted, and those of all that go on.
+const STARTS: usize = 3;
+const OF_A_SIZE: usize = 3;
+const GOING_ON: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 pub const MOVED: f64 = 0.2;
 /// The same beside effects, which let most parameters be what they are: a factor of two.
@@ -121,6 +125,32 @@ impl Search<'_> {
             fitted
         };
         points.par_iter().filter_map(probe).collect()
+    }
+
+    /// Accounts by several effects beside the model as given, each a few steps on from one regression of all of them, and on as they
+    /// keep up with one another.
+    pub fn several(&self, given: &Fit) -> Vec<Fit> {
+        let freed = self.problem.freed(given);
+        let Some(screening) = freed.and_then(|fit| Screening::of(&self.problem, &fit)) else { return Vec::new() };
+        let starts = |e: &Effect| {
+            let forms: Vec<usize> = (0..e.info().variants.len()).collect();
+            screening.starts(*e, &forms).into_iter().flat_map(|of_form| of_form.into_iter().take(STARTS))
+        };
+        let points: Vec<StartPoint> = self.suspects.par_iter().flat_map_iter(starts).collect();
+        let subsets = screening.best_subsets(&points, MOST, OF_A_SIZE);
+        let coarse = self.problem.coarse();
+        let mut probed: Vec<Fit> = Vec::new();
+        for size in 2..=MOST {
+            if self.is_over_budget() {
+                break;
+            }
+            let of_size = subsets.par_iter().filter(|s| s.terms.len() == size);
+            probed.par_extend(of_size.filter_map(|s| coarse.fit(&s.model, &s.terms, s.discrepancy, PROBE)));
+        }
+        let share = self.independent(&probed);
+        probed.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
+        probed.truncate(GOING_ON);
+        self.raced(probed, None, None)
     }
 
     /// The fit without one of its effects: the known one, unless the richer fit as it stands is likelier without that effect already,

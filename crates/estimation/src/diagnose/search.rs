@@ -1,10 +1,11 @@
 //! How a verdict is reached, top to bottom.
 //!
 //! A hypothesis is a set of effects in their forms beside the axis' own parameters. One function, [`Problem::evidence`], says how
-//! well the record speaks for it. One search raises it: from the axis alone and from the best of the textbook's combinations
-//! (bias, Coulomb, viscous and their asymmetry, all of them compared), an effect is added, dropped or exchanged as long as that
-//! helps; then several at once, because of several large causes none helps alone. The verdict is the hypothesis at the end; what it
-//! leaves is the remainder. ([`super::steps`] has the single steps, [`super::moves`] what a step may lead to.)
+//! well the record speaks for it. One search raises it: from the axis alone, or from the several effects that one regression finds at
+//! once where no single one explains it, and from the best of the textbook's combinations (bias, Coulomb, viscous and their asymmetry,
+//! all of them compared), an effect is added, dropped or exchanged as long as that helps; then several at once, because of several large
+//! causes none helps alone. The verdict is the hypothesis at the end; what it leaves is the remainder. ([`super::steps`] has the single
+//! steps, [`super::moves`] what a step may lead to.)
 //!
 //! Held-out data have no part in it.
 
@@ -103,16 +104,15 @@ impl<'a> Ascent<'a> {
             // What it is likelier than must be known.
             search.extended(&parameters, 0, &mut pool);
         }
-        let chosen = search.stepwise(known.unwrap_or_else(|| parameters.clone()), &mut pool);
+        let start = known.unwrap_or_else(|| search.beginning(&given, &parameters, &mut pool));
+        let chosen = search.stepwise(start, &mut pool);
         Self { search, given, parameters, chosen, pool }
     }
 
     /// Where the parameters have gone far, several causes are looked for beside those of the data sheet.
     fn near_the_data_sheet(&mut self) {
         let search = &self.search;
-        // A rigid axis has one inertia, which runs off with no more than a share of any cause.
-        let coupled = search.problem.nominal.structure == Structure::TwoInertia;
-        if !coupled || search.leaves_nothing(&self.chosen) || !search.have_moved(&self.parameters, MOVED) {
+        if !search.is_coupled() || search.leaves_nothing(&self.chosen) || !search.have_moved(&self.parameters, MOVED) {
             return;
         }
         (search.progress)("near the data sheet's parameters");
@@ -220,6 +220,31 @@ impl Search<'_> {
         Baseline { given, parameters, pool }
     }
 
+    /// Where single steps begin: at the parameters alone, or at several effects that are found at once where they are likelier than any
+    /// of them alone. Parameters that are fitted before all large causes are there run off with what these do.
+    fn beginning(&self, given: &Fit, parameters: &Fit, pool: &mut Pool) -> Fit {
+        if !self.is_coupled() || self.leaves_nothing(parameters) {
+            return parameters.clone();
+        }
+        let mut alone = self.extended(parameters, 0, pool);
+        alone.push(parameters.clone());
+        let Some(alone) = self.likeliest_account(&alone).filter(|f| !self.leaves_nothing(f) && !self.is_enough(f))
+        else {
+            return parameters.clone();
+        };
+        (self.progress)("several causes at once");
+        let several = self.several(given);
+        pool.extend(several.iter().cloned());
+        let likelier = self.likeliest_account(&several).filter(|f| self.is_likelier(f, &alone));
+        likelier.map_or_else(|| parameters.clone(), |f| self.pruned(f, pool))
+    }
+
+    #[cfg(test)]
+    pub fn only_begun(&mut self) -> Fit {
+        let Baseline { given, parameters, mut pool } = self.baseline();
+        self.beginning(&given, &parameters, &mut pool)
+    }
+
     #[cfg(test)]
     pub fn only_near_the_data_sheet(&mut self) -> Option<Fit> {
         let baseline = self.baseline();
@@ -239,6 +264,11 @@ impl Search<'_> {
     fn resumed(&self, known: &Fit) -> Option<Fit> {
         let fit = self.problem.fit(&known.model, &known.terms, known.discrepancy, STEPS)?;
         self.problem.deepen(&fit)
+    }
+
+    /// Whether there are two inertias: the one of a rigid axis runs off with no more than a share of any cause.
+    fn is_coupled(&self) -> bool {
+        self.problem.nominal.structure == Structure::TwoInertia
     }
 
     pub fn band(&self) -> &Band {

@@ -28,7 +28,7 @@ impl Problem<'_> {
     }
 
     /// What an effect costs: one of some fifty, at one of so many lines.
-    fn price(&self, (e, v): Term) -> f64 {
+    pub(super) fn price(&self, (e, v): Term) -> f64 {
         let is_of_line =
             |i: &usize| matches!(e.info().parameters[*i].start, Start::Grid(Scale::Order | Scale::Frequency, _));
         let lines = e.is_mode() || e.info().variants[v].free.iter().any(is_of_line);

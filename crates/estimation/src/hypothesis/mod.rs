@@ -5,10 +5,11 @@
 //! lacks changes with each free value and [`secant`] how those are kept from step to step, [`descent`] the way to the likeliest of them and
 //! [`fit`] where it ends; [`evidence`] how well the
 //! record speaks for that, [`scatter`] how well it knows the parameters and [`determined`] which of them it does not, [`scales`] what of an
-//! effect it could show, [`starts`] where a fit with one effect more begins; on a rigid axis such fits are compared along the motion of one
+//! effect it could show, [`candidate`] what one would change and [`starts`] where a fit with one more begins, [`subsets`] where one with several at once does; on a rigid axis such fits are compared along the motion of one
 //! run ([`inverse_dynamics`]). Which hypotheses are compared, and what is concluded from them, is [`crate::diagnose`]'s.
 
 pub(crate) mod band;
+mod candidate;
 mod columns;
 pub(crate) mod descent;
 pub(crate) mod determined;
@@ -26,6 +27,7 @@ pub(crate) mod scatter;
 mod secant;
 mod series;
 pub(crate) mod starts;
+mod subsets;
 pub(crate) mod tracking;
 mod trajectory;
 

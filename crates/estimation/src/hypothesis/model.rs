@@ -197,6 +197,13 @@ impl Coordinate {
         if self.is_base() && self.log { (to - from).exp_m1() } else { to - from }
     }
 
+    /// The x at such a change from another, within its bounds.
+    #[must_use]
+    pub fn changed(&self, from: f64, by: f64) -> f64 {
+        let to = if self.is_base() && self.log { from + by.max(-1.0).ln_1p() } else { from + by };
+        to.clamp(self.bounds[0], self.bounds[1])
+    }
+
     /// d value / d x, for standard errors.
     #[must_use]
     pub fn slope(&self, x: f64) -> f64 {

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::candidate::Candidate;
 use super::descent::{Descent, First};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, PROBE, Term};
@@ -27,6 +28,8 @@ pub struct StartPoint {
     shapes: Settings,
     pub model: Model,
     pub gain: f64,
+    /// What it changes, of any size.
+    pub candidate: Arc<Candidate>,
 }
 
 /// A fit beside which effects are looked for: along the motion as measured, stepped coarsely.
@@ -61,6 +64,11 @@ impl<'a> Screening<'a> {
         let regression = Regression::new(&problem, &fit);
         let looked_at = EFFECTS.iter().map(|_| Mutex::default()).collect();
         Some(Self { problem, trajectory, fit, regression, looked_at })
+    }
+
+    /// The record, stepped coarsely.
+    pub fn problem(&self) -> &Problem<'_> {
+        &self.problem
     }
 
     /// Starts of some forms of an effect beside the fit's, of each the best first.
@@ -394,138 +402,24 @@ impl Screening<'_> {
     fn start_at(
         &self,
         scales: &Scales,
-        (effect, form): Term,
+        term: Term,
         shapes: &Settings,
         rows_of: impl Fn(&Settings) -> Option<Arc<Spectra>>,
     ) -> Option<StartPoint> {
         let (p, fit) = (&self.problem, &self.fit);
-        let info = effect.info();
-        let free = info.variants[form].free;
-        if info.parameters.iter().all(|q| !matches!(q.start, Start::Linear))
+        let (effect, _) = term;
+        if effect.info().parameters.iter().all(|q| !matches!(q.start, Start::Linear))
             && !scales.admit(p.record, &Model { effects: *shapes, ..fit.model }, std::iter::once(effect))
         {
             return None;
         }
-        let difference = |a: &[Vec<C>; 2], b: &[Vec<C>; 2], scale: f64| {
-            [0, 1].map(|e| a[e].iter().zip(&b[e]).map(|(a, b)| (a - b) * scale).collect::<Vec<C>>())
-        };
-        let size =
-            |c: &[Vec<C>; 2]| (c.iter().flatten().map(|c| c.norm_sqr()).sum::<f64>() * 2.0 / p.band.n as f64).sqrt();
-        let target = 0.05 * scales.torque;
-        let sizes: Vec<usize> = free
-            .iter()
-            .copied()
-            .filter(|&i| info.parameters[i].role == Role::Size && matches!(info.parameters[i].start, Start::Linear))
-            .collect();
-        let mut columns: Vec<[Vec<C>; 2]> = Vec::new();
-        let mut signed = Vec::new();
-        let mut trial = Vec::new();
-        let mut at = *shapes;
-        for &i in &sizes {
-            let q = &info.parameters[i];
-            let mut v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
-            let mut column = None;
-            for _ in 0..2 {
-                let v1 = v.clamp(q.min, q.max);
-                let mut s = *shapes;
-                s.of_mut(effect)[i] = v1;
-                let r = rows_of(&s)?;
-                let c = difference(&r, &fit.rows.rows, 1.0);
-                let got = size(&c);
-                if got.is_nan() || got <= 0.0 {
-                    return None;
-                }
-                v = v1;
-                column = Some(c);
-                let ratio = target / got;
-                if ratio > 0.1 && ratio < 10.0 {
-                    break;
-                }
-                v *= ratio;
-            }
-            columns.push(column?);
-            signed.push(q.min < 0.0);
-            trial.push(v.clamp(q.min, q.max));
-            at.of_mut(effect)[i] = v.clamp(q.min, q.max);
-        }
-        if sizes.is_empty() {
-            // The size is among the shapes tried.
-            let r = rows_of(shapes)?;
-            columns.push(difference(&r, &fit.rows.rows, 1.0));
-            signed.push(false);
-        }
-        // Shapes that enter linearly beside the first size.
-        let mut extra = Vec::new();
-        let base = if sizes.len() == 1 { Some(columns[0].clone()) } else { None };
-        for &i in free {
-            let q = &info.parameters[i];
-            let step = match q.start {
-                Start::Share => 0.3,
-                Start::Phase => std::f64::consts::FRAC_PI_2,
-                Start::Linear if q.role == Role::Shape => {
-                    // A damping.
-                    let v = guess(q.unit, scales, usize::from(info.place == Place::Table)) * 0.05;
-                    v.clamp(q.min, q.max)
-                }
-                _ => continue,
-            };
-            let mut s = at;
-            s.of_mut(effect)[i] = q.off + step;
-            let r = rows_of(&s)?;
-            let total = difference(&r, &fit.rows.rows, 1.0);
-            let c = if matches!(q.start, Start::Phase) { total } else { difference(&total, base.as_ref()?, 1.0) };
-            columns.push(c);
-            signed.push(true);
-            extra.push((i, step));
-        }
-        let (c, gain) = self.regression.solve(p, &columns, &signed)?;
+        let candidate = Candidate::new(p, &fit.rows.rows, scales, term, shapes, rows_of)?;
+        let (c, gain) = self.regression.solve(p, &candidate.columns, &candidate.signed)?;
         let mut model = fit.model;
-        let own = model.effects.of_mut(effect);
-        own.copy_from_slice(at.of(effect));
-        if sizes.is_empty() {
-            // Only the first size follows the factor.
-            if let Some(&i) = free.iter().find(|&&i| info.parameters[i].role == Role::Size) {
-                own[i] = (own[i] * c[0].clamp(0.2, 5.0)).clamp(info.parameters[i].min, info.parameters[i].max);
-            }
-        }
-        for (j, &i) in sizes.iter().enumerate() {
-            own[i] = (trial[j] * c[j]).clamp(info.parameters[i].min, info.parameters[i].max);
-        }
-        for (e, &(i, step)) in extra.iter().enumerate() {
-            let b = c[columns.len() - extra.len() + e];
-            let q = &info.parameters[i];
-            if matches!(q.start, Start::Phase) {
-                // a*sin(x) + b*cos(x).
-                let (a0, t) = (c[0], trial[0]);
-                own[sizes[0]] = t * a0.hypot(b);
-                own[i] = b.atan2(a0);
-            } else {
-                own[i] = (q.off + step * b / c[0]).clamp(q.min, q.max);
-                if matches!(q.start, Start::Share) {
-                    own[i] = own[i].clamp(-0.9, 0.9);
-                }
-            }
-        }
+        candidate.put(&c, &mut model.effects);
         if !scales.admit(p.record, &model, std::iter::once(effect)) {
             return None;
         }
-        Some(StartPoint { term: (effect, form), shapes: *shapes, model, gain })
-    }
-}
-
-/// A size that makes about the record's torque, by its unit.
-fn guess(unit: &str, s: &Scales, side: usize) -> f64 {
-    let (t, w, x) = (s.torque, s.speed[side].max(1e-12), s.rotation[side].max(1e-12));
-    match unit {
-        "N.m" => t,
-        "N.m.s/rad" => t / w,
-        "N.m.s2/rad2" => t / (w * w),
-        "N.m/rad" => t / x,
-        "N.m/s" => t / s.length,
-        "1/s" => 1.0 / s.length,
-        "1/rad2" => 1.0 / (s.twist * s.twist),
-        "rad" => s.twist,
-        "1" => 1.0,
-        _ => t,
+        Some(StartPoint { term, shapes: *shapes, model, gain, candidate: Arc::new(candidate) })
     }
 }

@@ -84,34 +84,58 @@ fn a_coupling_that_one_encoder_hardly_shows_is_as_likely_as_it_is() {
     }
 }
 
-#[test]
-fn near_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
-    let paper = Parameters::PAPER;
-    let acts =
-        |t: f64| [(2.1, 0.3), (9.7, 4.1), (31.1, 5.3), (61.0, 1.1)].iter().map(|(w, p)| 0.05 * (w * t + p).sin()).sum();
-    let mut record = moved(paper, with(&[(Effect::CoulombMotor, 0, 0.03)]), &acts, 0);
-    // The drive's torque comes three samples after its command.
-    record.torque = (0..record.torque.len()).map(|k| acts((k as f64 + 3.0) * record.dt)).collect();
-    let nominal = Model::new(paper, Structure::TwoInertia, Settings::default());
+/// A search on a record of the paper's axis with what it begins with.
+fn searched<T>(record: &Record, look: impl Fn(&mut Search<'_>) -> T) -> T {
+    let nominal = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
     let case = Case {
         machine: "axis".to_owned(),
         nominal,
         motion: AxisKind::Rotary,
-        train: &record,
+        train: record,
         noise: &estimate_noise(&record.torque, &[0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref()), None),
         holdout: None,
         suspects: EFFECTS.to_vec(),
     };
-    let (searched, _) = prepared(&record, &nominal, Reach::Shown);
+    let (searched, _) = prepared(record, &nominal, Reach::Shown);
     let suspects =
         EFFECTS.iter().copied().filter(|e| e.may_be_named(Structure::TwoInertia, AxisKind::Rotary)).collect();
-    let mut search = searched.search(&case, suspects, &Work::default(), &|_| ());
-    let fit = search.only_near_the_data_sheet().expect("causes");
+    look(&mut searched.search(&case, suspects, &Work::default(), &|_| ()))
+}
+
+/// Tones under which the paper's axis turns to and fro.
+fn tones(t: f64) -> f64 {
+    [(2.1, 0.3), (9.7, 4.1), (31.1, 5.3), (61.0, 1.1)].iter().map(|(w, p)| 0.05 * (w * t + p).sin()).sum()
+}
+
+#[test]
+fn near_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
+    let paper = Parameters::PAPER;
+    let mut record = moved(paper, with(&[(Effect::CoulombMotor, 0, 0.03)]), &tones, 0);
+    // The drive's torque comes three samples after its command.
+    record.torque = (0..record.torque.len()).map(|k| tones((k as f64 + 3.0) * record.dt)).collect();
+    let fit = searched(&record, |search| search.only_near_the_data_sheet()).expect("causes");
     assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
     assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
     assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
     // Its parameters are free in the end.
     assert!(fit.coordinates.iter().any(|c| c.is_base()) && (fit.model.parameters.i1 / paper.i1 - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn friction_of_both_sides_beside_a_viscous_one_is_found_at_once() {
+    let (motor, table, viscous) = (0.012, 0.016, 4e-4);
+    let effects =
+        with(&[(Effect::CoulombMotor, 0, motor), (Effect::CoulombTable, 0, table), (Effect::ViscousTable, 0, viscous)]);
+    let fit = searched(&moved(Parameters::PAPER, effects, &tones, 0), |search| search.only_begun());
+    for (effect, size) in
+        [(Effect::CoulombMotor, motor), (Effect::CoulombTable, table), (Effect::ViscousTable, viscous)]
+    {
+        // Coulomb friction that gives way a little is the same.
+        let is_like = |e: &Effect| (e.info().family, e.info().place) == (effect.info().family, effect.info().place);
+        let found = fit.effects().into_iter().find(is_like).expect("found");
+        let own = fit.model.effects.of(found);
+        assert!((own[0] / size - 1.0).abs() < 0.1, "{found:?} {own:?} in {:?}", fit.terms);
+    }
 }
 
 /// An open-loop record of two inertias under a few tones, the table's encoder read `late` half samples late.

@@ -8,7 +8,7 @@ use super::assess::{Case, Outcome};
 use super::diagnose;
 use super::diagnosis::{ClosureOf, Site};
 use super::prepared::prepared;
-use super::search::{decide, decide_further};
+use super::search::{Search, decide, decide_further};
 use super::verdict::Verdict;
 use crate::axis::{Axis, AxisKind, Hold, Parameters, Scheme, Structure};
 use crate::conditioning::{NoiseEstimate, Record, estimate_noise};
