@@ -247,12 +247,7 @@ impl<'a> Descent<'a> {
             if self.std.is_empty() || *damping == 0.0 {
                 self.std = errors;
             }
-            let y: Vec<f64> = (0..x.len())
-                .map(|i| {
-                    let to = if coordinates[i].is_base() { x[i] + delta[i].ln_1p() } else { x[i] + delta[i] };
-                    to.clamp(coordinates[i].bounds[0], coordinates[i].bounds[1])
-                })
-                .collect();
+            let y: Vec<f64> = (0..x.len()).map(|i| coordinates[i].changed(x[i], delta[i])).collect();
             let model: Model = at.model.at(coordinates, &y);
             if !problem.admits(&model, self.terms) {
                 // What leaves physics' bounds stays where it is; the others move without it.

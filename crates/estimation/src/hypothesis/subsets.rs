@@ -48,10 +48,10 @@ impl Subset {
 impl Screening<'_> {
     /// The likeliest sets of two to `most` effects in some of their starts, `each` of a size, in its likeliest forms.
     pub fn best_subsets(&self, points: &[StartPoint], most: usize, each: usize) -> Vec<Subset> {
-        let Some(mut found) = self.subsets_at(self.fit.discrepancy, points, most) else { return Vec::new() };
+        let mut found = self.subsets_at(self.fit.discrepancy, points, most);
         // Frequencies that the whole gap hides tell the effects where next to all of it is explained.
         let best = found.iter().max_by(|a, b| a.worth.total_cmp(&b.worth)).map(|s| s.discrepancy);
-        found.extend(best.and_then(|s| self.subsets_at(s, points, most)).into_iter().flatten());
+        found.extend(best.into_iter().flat_map(|s| self.subsets_at(s, points, most)));
         found.sort_by(|a, b| b.worth.total_cmp(&a.worth));
         let mut seen = BTreeSet::new();
         let mut of_size = vec![0; most + 1];
@@ -65,7 +65,7 @@ impl Screening<'_> {
     }
 
     /// The sets that leave least, weighed at a discrepancy.
-    fn subsets_at(&self, s: Discrepancy, points: &[StartPoint], most: usize) -> Option<Vec<Subset>> {
+    fn subsets_at(&self, s: Discrepancy, points: &[StartPoint], most: usize) -> Vec<Subset> {
         let normal = Normal::new(self, points, s);
         let price: Vec<f64> = points.iter().map(|p| self.problem().price(p.term)).collect();
         let effect = |i: usize| points[i].term.0;
@@ -96,7 +96,7 @@ impl Screening<'_> {
             }
             beam = solved.into_iter().map(|(set, _)| set).collect();
         }
-        Some(found)
+        found
     }
 
     /// A set at its sizes; `None` where physics does not let its effects be that.
