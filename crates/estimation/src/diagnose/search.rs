@@ -79,7 +79,6 @@ struct Baseline {
 
 fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> Decision {
     let mut ascent = Ascent::begun(search, baseline, known);
-    ascent.near_the_data_sheet();
     ascent.beside_the_textbook();
     ascent.several_at_once();
     ascent.what_was_passed_by();
@@ -107,21 +106,6 @@ impl<'a> Ascent<'a> {
         let start = known.unwrap_or_else(|| search.beginning(&given, &parameters, &mut pool));
         let chosen = search.stepwise(start, &mut pool);
         Self { search, given, parameters, chosen, pool }
-    }
-
-    /// Where the parameters have gone far, several causes are looked for beside those of the data sheet.
-    fn near_the_data_sheet(&mut self) {
-        let search = &self.search;
-        if !search.is_coupled() || search.leaves_nothing(&self.chosen) || !search.have_moved(&self.parameters, MOVED) {
-            return;
-        }
-        (search.progress)("near the data sheet's parameters");
-        if let Some(other) = search.near_the_data_sheet(&self.given) {
-            self.pool.push(other.clone());
-            if search.is_likelier(&other, &self.chosen) {
-                self.chosen = search.stepwise(other, &mut self.pool);
-            }
-        }
     }
 
     /// All of the textbook's combinations, however long it took so far, and whatever else helps beside the best of them: where nothing is
@@ -243,12 +227,6 @@ impl Search<'_> {
     pub fn only_begun(&mut self) -> Fit {
         let Baseline { given, parameters, mut pool } = self.baseline();
         self.beginning(&given, &parameters, &mut pool)
-    }
-
-    #[cfg(test)]
-    pub fn only_near_the_data_sheet(&mut self) -> Option<Fit> {
-        let baseline = self.baseline();
-        self.near_the_data_sheet(&baseline.given)
     }
 
     /// What the axis' parameters alone are told to be: where they have gone far and that leaves less of the torque, as the motion has them.

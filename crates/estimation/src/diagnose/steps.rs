@@ -1,7 +1,5 @@
 //! The steps of a search: an effect is added, dropped or exchanged, or several are added at once.
 
-use std::sync::atomic::AtomicBool;
-
 use rayon::prelude::*;
 
 use super::moves::PROMISING;
@@ -9,7 +7,7 @@ use super::pool::Pool;
 use super::search::{ALIKE, MOST, Search, is_extension};
 use crate::axis::Structure;
 use crate::hypothesis::determined::is_lost;
-use crate::hypothesis::fit::{Fit, STEPS, Term};
+use crate::hypothesis::fit::{Fit, Term};
 
 /// What one fit is measured against another by: the larger, the better.
 pub type Measure<'m> = &'m dyn Fn(&Fit) -> f64;
@@ -131,25 +129,6 @@ impl Search<'_> {
             }
         }
         likeliest
-    }
-
-    /// Effects added beside parameters near those of the data sheet, and only then these freed: of several causes each shows itself beside the
-    /// true parameters, while free ones run off with what all of them do.
-    pub fn near_the_data_sheet(&self, given: &Fit) -> Option<Fit> {
-        let near = Search {
-            problem: self.problem.near_the_data_sheet(),
-            reference: self.reference,
-            suspects: self.suspects.clone(),
-            gap: self.gap,
-            cut_short: AtomicBool::new(false),
-            progress: self.progress,
-        };
-        let fit = near.forward(given.clone(), &|f| near.evidence(f, 1.0), &mut Pool::default());
-        if fit.terms.is_empty() {
-            return None;
-        }
-        let freed = self.problem.fit(&fit.model, &fit.terms, fit.discrepancy, STEPS)?;
-        self.problem.deepen(&freed)
     }
 
     /// Each effect in turn exchanged for another that explains the record better.

@@ -21,8 +21,11 @@ use super::secant::Secant;
 use super::tracking::Bandwidth;
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
+use crate::trace::machine::NOMINAL_OFF;
 use crate::trace::numerics::dot;
 
+/// Largest factor by which stiffness and damping of a coupling are off: a data sheet seldom has them.
+const COUPLING_OFF: f64 = 10.0;
 /// Steps tried, each shorter than the one before, until one is better.
 const TRIALS: usize = 7;
 /// Steps in which something is held.
@@ -103,7 +106,8 @@ impl First {
 impl<'a> Descent<'a> {
     pub fn new(problem: &'a Problem<'a>, start: &Model, terms: &'a [Term], from: Discrepancy) -> Option<Self> {
         let free = problem.free(terms);
-        let coordinates: Vec<Coordinate> = free.iter().map(|f| bounded(Coordinate::new(*f, start), problem)).collect();
+        let coordinates: Vec<Coordinate> =
+            free.iter().map(|f| bounded(Coordinate::new(*f, start), &problem.nominal)).collect();
         let at = problem.along(start, problem.bandwidth(from))?;
         Some(Self {
             problem,
@@ -555,13 +559,14 @@ impl Normal {
     }
 }
 
-/// The coordinate of a nominal parameter, its logarithm kept as near to the nominal value's as the problem asks.
-fn bounded(c: Coordinate, problem: &Problem<'_>) -> Coordinate {
-    match c.free {
-        Free::Base(p) => {
-            let (at, farthest) = (c.x(&problem.nominal), problem.farthest(p));
-            Coordinate { bounds: [at - farthest, at + farthest], ..c }
-        }
-        Free::Effect(..) | Free::Loop(_) => c,
-    }
+/// The coordinate of a nominal parameter, its logarithm kept as near to the nominal value's as a data sheet has it.
+fn bounded(c: Coordinate, nominal: &Model) -> Coordinate {
+    let farthest = match c.free {
+        // Where much of the torque is not understood yet, as under a drive's control, an inertia of any size follows the motion.
+        Free::Base(BaseParameter::I1 | BaseParameter::I2) => NOMINAL_OFF.ln(),
+        Free::Base(BaseParameter::B | BaseParameter::K) => COUPLING_OFF.ln(),
+        Free::Effect(..) | Free::Loop(_) => return c,
+    };
+    let at = c.x(nominal);
+    Coordinate { bounds: [at - farthest, at + farthest], ..c }
 }

@@ -18,12 +18,7 @@ use super::tracking::{
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
-use crate::trace::machine::NOMINAL_OFF;
 
-/// Largest change of the coupling's stiffness and damping, in its logarithm: a factor of ten. A data sheet seldom has them.
-const FARTHEST: f64 = 2.3;
-/// The same near the data sheet: a tenth. What is further off may be what an effect does; what is held to it exactly makes an effect of its error.
-const NEAR: f64 = 0.1;
 /// Turn of a motion in a sample, rad, up to which a model can be held to it.
 pub const HELD: f64 = 0.5;
 
@@ -49,8 +44,6 @@ pub struct Problem<'a> {
     dynamics: Option<Arc<InverseDynamics>>,
     /// Whether every column is simulated.
     pub(super) exact: bool,
-    /// Largest change of an inertia, and of the coupling's stiffness and damping, in the logarithm.
-    farthest: [f64; 2],
     steps: Work,
 }
 
@@ -86,8 +79,6 @@ impl<'a> Problem<'a> {
             resolution: Resolution::Full,
             dynamics: None,
             exact: false,
-            // Where much of the torque is not understood yet, as under a drive's control, an inertia of any size follows the motion.
-            farthest: [NOMINAL_OFF.ln(), FARTHEST],
             steps: Arc::default(),
         }
     }
@@ -128,20 +119,6 @@ impl Problem<'_> {
     /// The same compared in another band.
     pub(super) fn compared_in<'b>(&'b self, band: &'b Band) -> Problem<'b> {
         Problem { band, ..self.clone() }
-    }
-
-    /// The same with the axis' own parameters near those of its data sheet.
-    #[must_use]
-    pub fn near_the_data_sheet(&self) -> Self {
-        Self { farthest: [NEAR; 2], ..self.clone() }
-    }
-
-    /// Largest change of a nominal parameter, in its logarithm.
-    pub const fn farthest(&self, parameter: BaseParameter) -> f64 {
-        match parameter {
-            BaseParameter::I1 | BaseParameter::I2 => self.farthest[0],
-            BaseParameter::B | BaseParameter::K => self.farthest[1],
-        }
     }
 
     /// Steps simulated so far: of all that runs side by side only once it has ended the same on any number of threads.

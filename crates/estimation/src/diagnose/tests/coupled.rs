@@ -108,17 +108,17 @@ fn tones(t: f64) -> f64 {
 }
 
 #[test]
-fn near_the_data_sheet_a_friction_and_a_delay_are_found_that_run_off_with_free_parameters() {
+fn a_friction_and_a_delay_are_found_whose_parameters_run_off_before_both_are_there() {
     let paper = Parameters::PAPER;
     let mut record = moved(paper, with(&[(Effect::CoulombMotor, 0, 0.03)]), &tones, 0);
     // The drive's torque comes three samples after its command.
     record.torque = (0..record.torque.len()).map(|k| tones((k as f64 + 3.0) * record.dt)).collect();
-    let fit = searched(&record, |search| search.only_near_the_data_sheet()).expect("causes");
-    assert_eq!(fit.effects(), [Effect::CoulombMotor, Effect::Delay], "{:?}", fit.terms);
-    assert!((fit.model.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
-    assert!((fit.model.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
-    // Its parameters are free in the end.
-    assert!(fit.coordinates.iter().any(|c| c.is_base()) && (fit.model.parameters.i1 / paper.i1 - 1.0).abs() < 0.02);
+    let o = diagnosed_as(&record, Structure::TwoInertia, paper);
+    assert_eq!(named(&o), ["delay", "dry_friction"], "{:?}", o.diagnosis.causes);
+    let found = &o.improved;
+    assert!((found.effects.of(Effect::Delay)[0] / (3.0 * record.dt) - 1.0).abs() < 0.02);
+    assert!((found.effects.of(Effect::CoulombMotor)[0] / 0.03 - 1.0).abs() < 0.02);
+    assert!((found.parameters.i1 / paper.i1 - 1.0).abs() < 0.02);
 }
 
 #[test]
