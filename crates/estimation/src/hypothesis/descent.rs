@@ -164,9 +164,8 @@ impl<'a> Descent<'a> {
     /// Steps at lower and lower bandwidths, as long as they end likelier: the likeliest parameters along the measured motion are off by
     /// what its noise does to the effects, and there the model drifts away from the record. At the floor of the noise on request alone.
     pub fn sharpen(&mut self, at_floor: bool) -> Option<()> {
-        let least = self.problem.bandwidth([0.0; 2]);
         while at_floor || !self.problem.band.at_floor(&self.at.rows) {
-            let bandwidth = [0, 1].map(|i| (SHARPER * self.at.bandwidth[i]).max(least[i]));
+            let bandwidth = lowered(self.at.bandwidth, SHARPER, self.problem.loosest(&self.at.model, &self.at.rows));
             if !differ(bandwidth, self.at.bandwidth) {
                 break;
             }
@@ -376,7 +375,7 @@ impl<'a> Descent<'a> {
         if problem.is_without_simulation(&at.model) {
             return false;
         }
-        let least = problem.bandwidth([0.0; 2]);
+        let least = problem.loosest(&at.model, &at.rows);
         let own = problem.band.log_likelihood(&at.rows, at.s);
         let looser = looser(at.bandwidth, least);
         let told = problem.bandwidth(at.s);
@@ -436,7 +435,12 @@ pub fn differ(a: Bandwidth, b: Bandwidth) -> bool {
 
 /// The next bandwidth below another, down to the least.
 pub fn looser(bandwidth: Bandwidth, least: Bandwidth) -> Bandwidth {
-    [0, 1].map(|i| (LOOSER * bandwidth[i]).max(least[i]))
+    lowered(bandwidth, LOOSER, least)
+}
+
+/// A share of a bandwidth, down to the least; one below that stays.
+fn lowered(bandwidth: Bandwidth, share: f64, least: Bandwidth) -> Bandwidth {
+    [0, 1].map(|i| (share * bandwidth[i]).max(least[i]).min(bandwidth[i]))
 }
 
 /// What the stiffness that the equations show has in it, among the coordinates at x: parameters of the axis and of third inertias; which,

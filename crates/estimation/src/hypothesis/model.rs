@@ -225,6 +225,17 @@ impl Model {
         (Self { effects, ..*self }, ahead)
     }
 
+    /// Natural frequency at which its effects hold each side to one place, rad/s.
+    pub fn pull(&self) -> [f64; 2] {
+        let inertia = self.parameters.inertias(self.structure);
+        let mut pull = [0.0_f64; 2];
+        for &effect in self.effects.active().forces() {
+            let side = usize::from(self.structure == Structure::TwoInertia && effect.info().place == Place::Table);
+            pull[side] = pull[side].max(effect.pull(self.effects.of(effect), inertia[side]));
+        }
+        pull
+    }
+
     /// One hundredth of the critical damping.
     fn small_damping(&self) -> f64 {
         let p = &self.parameters;

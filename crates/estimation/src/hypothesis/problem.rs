@@ -9,7 +9,7 @@ use super::descent::{Along, differ, looser};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, Term};
 use super::inverse_dynamics::InverseDynamics;
-use super::likelihood::{Band, MotionSpectra, TorqueResidual};
+use super::likelihood::{Band, MotionSpectra, NEAR_THE_NOISE, TorqueResidual};
 use super::model::{BaseParameter, Free, Model};
 use super::scales::Scales;
 use super::tracking::{
@@ -164,18 +164,32 @@ impl Problem<'_> {
         free
     }
 
+    /// Largest bandwidth of the feedback, rad/s.
+    fn tightest(&self) -> f64 {
+        self.band.omega.last().copied().unwrap_or(1.0).min(HELD / self.record.dt)
+    }
+
     /// Bandwidth of the feedback at a discrepancy.
     pub fn bandwidth(&self, s: Discrepancy) -> Bandwidth {
         let r = self.record;
-        let p = &self.nominal.parameters;
-        let high = self.band.omega.last().copied().unwrap_or(1.0).min(HELD / r.dt);
+        let high = self.tightest();
         let low = (4.0 / (r.len() as f64 * r.dt)).min(high);
-        let inertia =
-            if p.i2 > 0.0 && self.nominal.structure == Structure::TwoInertia { [p.i1, p.i2] } else { [p.i1 + p.i2; 2] };
+        let inertia = self.nominal.parameters.inertias(self.nominal.structure);
         [0, 1].map(|i| {
             let noise = r.noise[2 * i].max(f64::MIN_POSITIVE);
             (s[i].sqrt() / (inertia[i] * noise)).sqrt().clamp(low, high)
         })
+    }
+
+    /// The loosest at which a model that lacks so much follows the record. Far from the noise it is no looser than a weight and a spring hold
+    /// the model to a place of their own: else it stands where these ask for the torque that it got, and lacks next to none.
+    pub fn loosest(&self, model: &Model, rows: &TorqueResidual) -> Bandwidth {
+        let of_noise = self.bandwidth([0.0; 2]);
+        if self.band.noise_multiple(rows) <= NEAR_THE_NOISE {
+            return of_noise;
+        }
+        let pull = model.pull();
+        [0, 1].map(|i| of_noise[i].max(pull[i].min(self.tightest())))
     }
 
     /// Whether physics lets the effects be what they are in a model.

@@ -121,6 +121,15 @@ impl<S: Scalar> Parameters<S> {
         Self { i1: p.i1.into(), i2: p.i2.into(), b: p.b.into(), k: p.k.into(), rho: p.rho.into() }
     }
 
+    /// Inertia that moves with motor and table, kg.m2: with either of a rigid axis all of it.
+    #[must_use]
+    pub fn inertias(&self, structure: Structure) -> [S; 2] {
+        match structure {
+            Structure::Rigid => [self.i1 + self.i2; 2],
+            Structure::TwoInertia => [self.i1, self.i2],
+        }
+    }
+
     /// The same without derivatives.
     #[must_use]
     pub fn primal(&self) -> Parameters<f64> {

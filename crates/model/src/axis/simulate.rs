@@ -80,14 +80,10 @@ pub fn substeps_at_speed(
         rate = rate.max(times * (p.k * p.twist_mobility()).sqrt());
     }
     for &effect in on.forces() {
-        let inertia = match (structure, effect.info().place) {
-            (Structure::Rigid, _) => p.i1 + p.i2,
-            (Structure::TwoInertia, Place::Table) => p.i2,
-            (Structure::TwoInertia, _) => p.i1,
-        };
-        rate = rate.max(effect.rate(effects.of(effect), inertia));
+        let side = usize::from(effect.info().place == Place::Table);
+        rate = rate.max(effect.rate(effects.of(effect), p.inertias(structure)[side]));
         if let Some(order) = effect.order(effects.of(effect)) {
-            rate = rate.max(order * speed[usize::from(effect.info().place == Place::Table)]);
+            rate = rate.max(order * speed[side]);
         }
     }
     ((rate * dt / 0.25).ceil() as usize).clamp(1, 16)

@@ -33,7 +33,7 @@ impl Force for ExternalSpring {
     };
     const STATIC_LOAD: bool = true;
 
-    fn rate(p: &[f64], inertia: f64) -> f64 {
+    fn pull(p: &[f64], inertia: f64) -> f64 {
         natural_frequency(p[0], inertia)
     }
 

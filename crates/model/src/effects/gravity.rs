@@ -5,7 +5,7 @@
 
 use super::family::Family;
 use super::info::{EffectInfo, ParameterInfo, Place, Variant};
-use super::shapes::{Base, Force, Internal, Moment, Reaction};
+use super::shapes::{Base, Force, Internal, Moment, Reaction, natural_frequency};
 use crate::scalar::Scalar;
 
 /// Gravity on a hinge.
@@ -41,8 +41,8 @@ impl Force for Gravity {
     };
     const STATIC_LOAD: bool = true;
 
-    fn rate(p: &[f64], inertia: f64) -> f64 {
-        if inertia > 0.0 { (p[0].hypot(p[1]) * p[2] / inertia).sqrt() } else { 0.0 }
+    fn pull(p: &[f64], inertia: f64) -> f64 {
+        natural_frequency(p[0].hypot(p[1]) * p[2], inertia)
     }
 
     #[inline]

@@ -189,6 +189,14 @@ macro_rules! effects {
                 }
             }
 
+            /// Natural frequency at which it holds an inertia of `inertia` kg.m2 to one place, rad/s: see [`Force::pull`].
+            #[must_use]
+            pub fn pull(self, p: &[f64], inertia: f64) -> f64 {
+                match self {
+                    $(Self::$name => when!(force, $shape, <$law>::pull(p, inertia), { let _ = (p, inertia); 0.0 }),)*
+                }
+            }
+
             /// Fastest vibration that it adds to an inertia of `inertia` kg.m2 at its place, rad/s.
             pub(crate) fn rate(self, p: &[f64], inertia: f64) -> f64 {
                 match self {

@@ -233,9 +233,14 @@ pub trait Force {
     /// The shape without which the effect is a change of the axis' own parameters: a mode of unknown stiffness is an inertia of its place.
     const IDENTIFYING: Option<usize> = None;
 
-    /// Fastest vibration that the effect adds to an inertia of `inertia` kg.m2 at its place, rad/s.
-    fn rate(_p: &[f64], _inertia: f64) -> f64 {
+    /// Natural frequency at which the effect holds an inertia of `inertia` kg.m2 to one place, rad/s; zero of what holds it to none.
+    fn pull(_p: &[f64], _inertia: f64) -> f64 {
         0.0
+    }
+
+    /// Fastest vibration that the effect adds to an inertia of `inertia` kg.m2 at its place, rad/s.
+    fn rate(p: &[f64], inertia: f64) -> f64 {
+        Self::pull(p, inertia)
     }
 
     /// Corrects the internal states that are relative to the speed at its place when that jumps by `jump` rad/s.

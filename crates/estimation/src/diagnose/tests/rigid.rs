@@ -104,6 +104,23 @@ fn gravity_is_told_from_a_spring_where_the_hinge_turns_far_enough() {
 }
 
 #[test]
+fn a_spring_ten_times_too_stiff_lacks_what_it_pulls_too_much_and_rests_nowhere_else() {
+    let (own, wrong) = (40.0, 400.0);
+    let with_spring = |k: f64| with(&[(Effect::ExternalSpring, 0, k)]);
+    let record = logged(with_spring(own), 1.0, 0.02, |_| 0.0, 3);
+    let model = Model::new(parameters(INERTIA), Structure::Rigid, with_spring(wrong));
+    let (searched, _) = prepared(&record, &model, Reach::Ruled);
+    let problem = Problem::new(&searched.record, &searched.band, model);
+    let lacks = |bandwidth| problem.rows(&model, bandwidth, None).expect("followed");
+    let rms = |rows: &TorqueResidual| searched.band.torque_share(searched.band.discrepancy(rows), &searched.record);
+    let tight = lacks(problem.bandwidth([f64::MAX; 2]));
+    let loosest = lacks(problem.loosest(&model, &tight));
+    let free = lacks(problem.bandwidth([0.0; 2]));
+    assert!(rms(&loosest) > 0.5 * rms(&tight), "{} {}", rms(&loosest), rms(&tight));
+    assert!(rms(&free) < 0.1 * rms(&tight), "{} {}", rms(&free), rms(&tight));
+}
+
+#[test]
 fn a_torque_that_the_library_has_no_law_for_is_not_named() {
     // Wanders with the square root of the position's absolute value, of no sign of its own in time.
     let o = diagnosed(
