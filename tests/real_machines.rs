@@ -6,8 +6,13 @@ use eixo::diagnose::{Case, Model, NoiseEstimate, Record, diagnose, estimate_nois
 use eixo::effects::{EFFECTS, Settings};
 use eixo::trace::{Hold, Table};
 
+#[path = "program/run.rs"]
+mod run;
 #[path = "program/skip.rs"]
 mod skip;
+
+use run::answered_in;
+use serde_json::Value;
 
 /// Columns of a file as a record, and its noise.
 fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Record, NoiseEstimate)> {
@@ -38,6 +43,27 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
         },
         noise,
     ))
+}
+
+/// What `diagnose` answers to a measured log, by the axis file that `init` writes of it or by the one given.
+fn told(log: &str, axis: Option<&str>) -> Option<Value> {
+    let log = skip::traces(log)?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = log.to_str().expect("a name in Unicode");
+    match axis {
+        Some(axis) => std::fs::write(folder.path().join("axis.toml"), axis).expect("written"),
+        None => drop(answered_in(folder.path(), &["init", log, "--yes", "-o", "axis.toml"])),
+    }
+    answered_in(folder.path(), &["diagnose", log, "--axis", "axis.toml", "--json", "told.json"]);
+    let told = std::fs::read(folder.path().join("told.json")).expect("an answer");
+    Some(serde_json::from_slice(&told).expect("JSON"))
+}
+
+/// Families of the causes that are told as likely as this or more.
+fn families(told: &Value, least: f64) -> Vec<&str> {
+    let causes = told["causes"].as_array().expect("causes");
+    let is_likely = |c: &&Value| c["probability"].as_f64().expect("a probability") >= least;
+    causes.iter().filter(is_likely).map(|c| c["family"].as_str().expect("a family")).collect()
 }
 
 /// The diagnosis of the bench by both encoders, from the nominal values of an outside analysis.
@@ -127,4 +153,46 @@ fn on_emps_and_on_its_parts_friction_and_viscosity_are_named_with_their_publishe
         });
         assert!(others.map(|c| c.share_of_gap).sum::<f64>() < 0.02, "{}", told());
     }
+}
+
+/// A hobby servo that turns a pendulum: an outside analysis finds its weight, viscous friction and, by the servo's published model, friction
+/// that grows with the load (Rhoban, arXiv 2410.08650). No end stop, no limit of its torque, no flexible mode is part of what is known.
+#[test]
+fn the_weight_of_a_servos_pendulum_is_named_and_nothing_that_it_has_not() {
+    for log in ["lift_and_drop", "sin_sin", "sin_time_square", "up_and_down"] {
+        let Some(told) = told(&format!("bam_xl330/{log}.csv"), None) else { return };
+        assert!(families(&told, 0.5).contains(&"gravity"), "{log}: {}", told["causes"]);
+        let known = ["gravity", "dry_friction", "viscous_friction"];
+        let sure = families(&told, 0.5);
+        assert!(sure.iter().all(|f| known.contains(f)), "{log}: {}", told["causes"]);
+    }
+}
+
+/// The arm of a Quanser QUBE with a free pendulum on it, which the library has no law for: a large remainder, and no mode in its place.
+#[test]
+fn of_an_arm_with_a_free_pendulum_no_mode_is_invented_and_what_is_left_is_told() {
+    for log in ["prbs_1", "prbs_2"] {
+        let Some(told) = told(&format!("qube/{log}.csv"), None) else { return };
+        let friction = ["dry_friction", "viscous_friction"];
+        assert!(families(&told, 0.5).iter().all(|f| friction.contains(f)), "{log}: {}", told["causes"]);
+        assert!(families(&told, 0.9).is_empty(), "{log}: {}", told["causes"]);
+        let left = told["remainder"]["noise_multiple"].as_f64().expect("a number");
+        assert!(left > 30.0, "{log}: {}", told["remainder"]);
+    }
+}
+
+/// The bench by its motor's encoder and a rigid model of both inertias: what is missing is the inertia behind the spring, whose
+/// antiresonance in the record's own lines is at 53 Hz.
+#[test]
+fn a_rigid_model_of_the_bench_lacks_the_inertia_behind_its_coupling() {
+    let axis = "structure = \"rigid\"\n[parameters]\nI1 = 9.6e-3\n[signals]\ntime = \"t_s\"\n\
+                T = { column = \"iq_meas_A\", hold = \"zoh\" }\ntheta1 = \"theta_motor_rad\"\n";
+    let Some(told) = told("two_inertia_bench/schroeder.csv", Some(axis)) else { return };
+    let causes = told["causes"].as_array().expect("causes");
+    let mode = causes.iter().find(|c| ["flexible_mode", "motor_mode"].contains(&c["id"].as_str().expect("an id")));
+    let mode = mode.unwrap_or_else(|| panic!("{causes:?}"));
+    assert!(mode["probability"].as_f64().expect("a probability") >= 0.5, "{mode}");
+    let of = |name: &str| mode["parameters"][name]["value"].as_f64().expect("a value");
+    let own = (of("stiffness") / of("inertia")).sqrt() / std::f64::consts::TAU;
+    assert!((own / 53.0 - 1.0).abs() < 0.05, "{own} Hz: {mode}");
 }
