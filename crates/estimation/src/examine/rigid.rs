@@ -78,8 +78,9 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
         return Some(NominalFit::Consistent);
     }
     if turned <= any {
-        // Another torque on the table enters the momentum of both, but not the motor's equation of motion.
-        let sound = fits_better_as_logged(input, 1.0, -1.0);
+        // Another torque on the table enters the momentum of both, but not the motor's equation of motion; and a drive that holds an axis
+        // against a foreign torque brakes where that pushes, as a friction turned round.
+        let sound = fits_better_as_logged(input, 1.0, -1.0) || has_inertia(input, near);
         return Some(if sound { NominalFit::Consistent } else { NominalFit::Inconsistent(sign_finding(turned, own)) });
     }
     let ratio = mass / inertia;
@@ -133,6 +134,13 @@ pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
         found.unbiased() < MAX_RESIDUAL
             && counts_as_logged(found.friction / found.friction_error, found.mass / found.error)
     })
+}
+
+/// Whether the same equation has an inertia as logged, within bounds, kg.m2 (kg): of a torque turned round it is negative.
+fn has_inertia(input: &Input<'_>, [least, most]: [f64; 2]) -> bool {
+    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
+    let is_near = |f: &TimeDomainFit| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass);
+    at_widths(input, torque, x, Some(noise(x))).iter().any(is_near)
 }
 
 /// Whether a friction and an inertia, in their standard errors, are of a torque that counts as the motion does. Both turn round with it: a

@@ -258,3 +258,29 @@ fn a_motor_that_its_friction_holds_between_slow_moves_is_followed_where_it_moves
     columns.v[0] = (0..own.len()).map(|k| own[(k + 1000) % own.len()]).collect();
     assert!(!rigid::explained_in_time(&columns.motor_only()), "it moves under what held it");
 }
+
+#[test]
+fn a_drive_that_holds_an_axis_against_a_foreign_torque_has_no_torque_turned_round() {
+    // Slow triangles under position loops, and a foreign sine four times the friction.
+    let (inertia, friction, foreign, dt) = (20.0, 5.0, 22.0, 1e-3);
+    for (bandwidth, damping) in [(10.0, 0.7), (20.0, 1.5), (40.0, 1.5)] {
+        let mut e = noise(31, 1e-6);
+        let (mut x, mut v) = (0.0_f64, 0.0_f64);
+        let mut columns = Columns { dt, v: Default::default() };
+        for k in 0..6000 {
+            let t = f64::from(k) * dt;
+            let wanted = 0.1 * (2.0 * (0.5 * t - (0.5 * t + 0.5).floor()).abs());
+            let seen = x + e();
+            let torque = inertia * (bandwidth * bandwidth * (wanted - seen) - 2.0 * damping * bandwidth * v);
+            columns.v[0].push(torque);
+            columns.v[1].push(seen);
+            let taken = friction * (v / 1e-3).tanh() + foreign * (3.0 * t + 2.8).sin();
+            v += dt * (torque - taken) / inertia;
+            x += dt * v;
+        }
+        let parameters = Parameters { i1: inertia, i2: 0.0, b: 0.0, k: 0.0, rho: 1.0 };
+        let nominal = Some(Nominal { structure: Structure::Rigid, parameters });
+        let input = Input { nominal, ..columns.motor_only() };
+        assert_eq!(refused(&input), Vec::<&str>::new(), "{bandwidth} {damping}");
+    }
+}
