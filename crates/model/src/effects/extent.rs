@@ -192,6 +192,17 @@ mod tests {
     }
 
     #[test]
+    fn a_friction_more_than_four_times_as_large_one_way_is_a_torque_of_its_own() {
+        let admits = |asymmetry: f64| {
+            (Effect::CoulombMotor.info().bounds)(
+                &[0.1, 0.0, 1.0, asymmetry, 0.0],
+                &Extent { path: (1.0, 1.0), ..resting() },
+            )
+        };
+        assert!(admits(0.59) && admits(-0.59) && !admits(0.61) && !admits(-0.61));
+    }
+
+    #[test]
     fn a_play_that_is_never_closed_is_none() {
         let twists: Vec<f64> = (-50..=50).map(|i| f64::from(i) * 0.01).collect();
         let extent = |twists| Extent { twist: 0.3, twists, ..resting() };
