@@ -11,10 +11,10 @@
 //! lowest part of the spectrum is it. What grows with the speed ([`super::jitter`]) counts with its mean over the record.
 
 use rayon::prelude::*;
-use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::colour::corner;
 use super::jitter::growth;
+use crate::numerics::spectrum::autocorrelation;
 use crate::trace::floor;
 
 /// Highest order of difference.
@@ -308,17 +308,10 @@ pub fn find_period(torque: &[f64]) -> Option<usize> {
     if power <= 0.0 {
         return None;
     }
-    // Autocorrelation by FFT; a period is a peak of its unbiased form.
-    let size = (2 * n).next_power_of_two();
-    let mut planner = FftPlanner::new();
-    let mut a: Vec<Complex<f64>> = torque.iter().map(|t| Complex::new(t - mean, 0.0)).collect();
-    a.resize(size, Complex::default());
-    planner.plan_fft_forward(size).process(&mut a);
-    for v in &mut a {
-        *v = Complex::new(v.norm_sqr(), 0.0);
-    }
-    planner.plan_fft_inverse(size).process(&mut a);
-    let correlation = |lag: usize| a[lag].re / (size as f64 * (n - lag) as f64 * power);
+    // A period is a peak of the unbiased autocorrelation.
+    let centred: Vec<f64> = torque.iter().map(|t| t - mean).collect();
+    let products = autocorrelation(&centred, n / 2 + 1);
+    let correlation = |lag: usize| products[lag] / ((n - lag) as f64 * power);
     let repeats = |lag: usize| {
         let d = (lag..n).map(|k| (torque[k] - torque[k - lag]).powi(2)).sum::<f64>() / (n - lag) as f64;
         d < 0.05_f64.powi(2) * power

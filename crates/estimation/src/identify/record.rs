@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::joined::Joined;
 use crate::axis::Hold;
+use crate::numerics::spectrum::autocorrelation;
 use crate::trace::{Signal, Trace, TraceError};
 
 /// Twist offset, in standard deviations of the twist, from which the encoders' zeros are taken to differ.
@@ -240,24 +241,13 @@ pub struct Row {
 /// autocorrelation, if that is above 0.9 and no multiple of a shorter one.
 #[must_use]
 pub fn period(values: &[f64]) -> Option<usize> {
-    use rustfft::FftPlanner;
-    use rustfft::num_complex::Complex;
     let n = values.len();
     if n < 64 {
         return None;
     }
     let mean = values.iter().sum::<f64>() / n as f64;
-    let size = (2 * n).next_power_of_two();
-    let mut buffer = vec![Complex::new(0.0, 0.0); size];
-    for (b, v) in buffer.iter_mut().zip(values) {
-        b.re = v - mean;
-    }
-    let mut planner = FftPlanner::new();
-    planner.plan_fft_forward(size).process(&mut buffer);
-    for b in &mut buffer {
-        *b = Complex::new(b.norm_sqr(), 0.0);
-    }
-    planner.plan_fft_inverse(size).process(&mut buffer);
+    let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
+    let products = autocorrelation(&centred, n / 2 + 1);
     // Normalised by the energy of the two overlapping parts.
     let mut energy = vec![0.0; n + 1];
     for (k, v) in values.iter().enumerate() {
@@ -265,7 +255,7 @@ pub fn period(values: &[f64]) -> Option<usize> {
     }
     let correlation = |lag: usize| {
         let both = (energy[n - lag] * (energy[n] - energy[lag])).sqrt();
-        if both > 0.0 { buffer[lag].re / size as f64 / both } else { 0.0 }
+        if both > 0.0 { products[lag] / both } else { 0.0 }
     };
     // Behind the first zero, so that the peak at lag zero is not taken.
     let first = (1..n / 2).find(|lag| correlation(*lag) < 0.0)?;
