@@ -128,9 +128,7 @@ fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
 /// noise. It is asked where the axis moves beyond the noise of its encoder: at rest friction balances any torque below breakaway, and has
 /// no sign.
 pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
-    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    let found = at_widths(input, torque, x, Some(noise(x)));
-    found.into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(|found| {
+    in_time(input).into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(|found| {
         found.unbiased() < MAX_RESIDUAL
             && counts_as_logged(found.friction / found.friction_error, found.mass / found.error)
     })
@@ -138,9 +136,13 @@ pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
 
 /// Whether the same equation has an inertia as logged, within bounds, kg.m2 (kg): of a torque turned round it is negative.
 fn has_inertia(input: &Input<'_>, [least, most]: [f64; 2]) -> bool {
-    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    let is_near = |f: &TimeDomainFit| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass);
-    at_widths(input, torque, x, Some(noise(x))).iter().any(is_near)
+    in_time(input).iter().any(|f| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass))
+}
+
+/// The fits in the time domain at all widths; none without torque and position.
+fn in_time(input: &Input<'_>) -> Vec<TimeDomainFit> {
+    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return Vec::new() };
+    at_widths(input, torque, x, Some(noise(x)))
 }
 
 /// Whether a friction and an inertia, in their standard errors, are of a torque that counts as the motion does. Both turn round with it: a

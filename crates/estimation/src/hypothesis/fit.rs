@@ -18,6 +18,14 @@ pub const PROBE: usize = 5;
 /// An effect in one of its forms.
 pub type Term = (Effect, usize);
 
+/// Their effects in the order of the list, in whatever forms and however they were found.
+#[must_use]
+pub fn effects_of(terms: &[Term]) -> Vec<Effect> {
+    let mut effects: Vec<Effect> = terms.iter().map(|t| t.0).collect();
+    effects.sort_unstable();
+    effects
+}
+
 /// A hypothesis fitted.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -60,12 +68,10 @@ impl Fit {
         }
     }
 
-    /// Its effects in the order of the list, in whatever forms and however they were found.
+    /// Its effects ([`effects_of`]).
     #[must_use]
     pub fn effects(&self) -> Vec<Effect> {
-        let mut effects: Vec<Effect> = self.terms.iter().map(|t| t.0).collect();
-        effects.sort_unstable();
-        effects
+        effects_of(&self.terms)
     }
 
     /// Whether it is the same hypothesis as another, every free value within a standard error of both.

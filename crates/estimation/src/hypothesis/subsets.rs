@@ -13,11 +13,10 @@ use rayon::prelude::*;
 
 use super::discrepancy::Discrepancy;
 use super::evidence::PRIOR;
-use super::fit::Term;
+use super::fit::{Term, effects_of};
 use super::likelihood::C;
 use super::model::{Coordinate, Model};
 use super::starts::{Screening, StartPoint};
-use crate::effects::Effect;
 use crate::trace::numerics::dot;
 
 /// Sets of one size to which each further effect is added.
@@ -37,14 +36,6 @@ pub struct Subset {
     pub discrepancy: Discrepancy,
 }
 
-impl Subset {
-    fn effects(&self) -> Vec<Effect> {
-        let mut effects: Vec<Effect> = self.terms.iter().map(|t| t.0).collect();
-        effects.sort_unstable();
-        effects
-    }
-}
-
 impl Screening<'_> {
     /// The likeliest sets of two to `most` effects in some of their starts, `each` of a size, in its likeliest forms.
     pub fn best_subsets(&self, points: &[StartPoint], most: usize, each: usize) -> Vec<Subset> {
@@ -57,7 +48,7 @@ impl Screening<'_> {
         let mut of_size = vec![0; most + 1];
         found.retain(|subset| {
             let size = subset.terms.len();
-            let is_told = of_size[size] < each && seen.insert(subset.effects());
+            let is_told = of_size[size] < each && seen.insert(effects_of(&subset.terms));
             of_size[size] += usize::from(is_told);
             is_told
         });
