@@ -73,11 +73,16 @@ impl Search<'_> {
         let (before, after) = (plain.discrepancy, rich.discrepancy);
         let share = if plain.terms.is_empty() { FIRST } else { MATERIAL };
         let explained = [0, 1].map(|i| (before[i] - after[i]).max(0.0));
-        let is_next_to_all = |i: usize| after[i] <= NEXT_TO_ALL * before[i];
         self.band().torque_rms(explained) >= self.negligible()
             && (0..self.band().equations()).any(|i| {
-                after[i] <= (1.0 - share) * before[i] && (explained[i] >= MINOR * self.gap[i] || is_next_to_all(i))
+                after[i] <= (1.0 - share) * before[i]
+                    && (explained[i] >= MINOR * self.gap[i] || is_next_to_none(after[i], before[i]))
             })
+    }
+
+    /// Whether a fit leaves next to none of what another does.
+    pub fn explains_next_to_all(&self, other: &Fit, fit: &Fit) -> bool {
+        (0..self.band().equations()).all(|i| is_next_to_none(fit.discrepancy[i], other.discrepancy[i]))
     }
 
     /// What causes are measured by: what the axis lacks with its parameters alone, but no more than the torque itself, and without a
@@ -92,6 +97,10 @@ impl Search<'_> {
         }
         gap
     }
+}
+
+fn is_next_to_none(power: f64, of: f64) -> bool {
+    power <= NEXT_TO_ALL * of
 }
 
 /// Whether a power is materially less than another.

@@ -13,7 +13,7 @@ use super::conclusion::Decision;
 use super::diagnosis::ClosureOf;
 use super::gap::{self, Gaps};
 use super::location::without_offset;
-use super::material::{NEGLIGIBLE, is_materially_less};
+use super::material::{DISTINCT, NEGLIGIBLE, is_materially_less};
 use super::prepared::{Prepared, prepared};
 use super::quantisation;
 use super::residual::located;
@@ -90,10 +90,12 @@ impl<'a> Looks<'a> {
         self.further_on(train, &searched, &decision.chosen).unwrap_or((searched, decision))
     }
 
-    /// What leaves so little that the error of the band's rate counts is settled at the record's own.
+    /// What leaves so little that the error of the band's rate counts is settled at the record's own: that error is a share of the torque, of
+    /// which fine encoders show hundreds of noises.
     fn at_own_rate(&self, searched: Prepared, own: Option<Prepared>, decision: Decision) -> (Prepared, Decision) {
-        let is_near =
-            !decision.chosen.terms.is_empty() && searched.band.noise_multiple(&decision.chosen.rows) < NEAR_THE_NOISE;
+        let chosen = &decision.chosen;
+        let is_near = !chosen.terms.is_empty()
+            && (searched.band.noise_multiple(&chosen.rows) < NEAR_THE_NOISE || searched.left(chosen) < DISTINCT);
         let Some(own) = own.filter(|_| is_near) else { return (searched, decision) };
         (self.progress)("at the record's own rate");
         let search = own.search(self.case, likely(&decision), &self.work, self.progress);

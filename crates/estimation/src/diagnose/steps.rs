@@ -55,13 +55,19 @@ impl Search<'_> {
 
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
     pub fn better_in_pool(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
-        if self.leaves_nothing(chosen) {
+        if self.at_floor(chosen) {
             return None;
         }
         let share = self.independent([chosen]);
         let most = self.longest_rival(chosen);
-        // A longer account is believed, as several at once are, where it explains the torque.
-        let is_rival = |f: &&Fit| !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f));
+        let is_rival = |f: &&Fit| {
+            // What a torque is not true to tells no two accounts apart, unless one explains it.
+            if self.is_negligible(chosen) {
+                return f.terms.len() <= chosen.terms.len() && self.explains_next_to_all(chosen, f);
+            }
+            // A longer account is believed, as several at once are, where it explains the torque.
+            !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f))
+        };
         let rivals: Vec<Fit> = pool.fits().iter().filter(is_rival).cloned().collect();
         let best = self.best(&rivals, share)?;
         (self.evidence(best, share) > self.evidence(chosen, share) + ALIKE).then(|| best.clone())
