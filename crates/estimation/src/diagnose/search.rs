@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::conclusion::Decision;
-use super::moves::MOVED;
+use super::moves::{MOVED, MOVED_WITH_EFFECTS};
 use super::pool::Pool;
 use super::steps::Measure;
 use crate::axis::Structure;
@@ -205,9 +205,12 @@ impl Search<'_> {
     }
 
     /// Where single steps begin: at the parameters alone, or at several effects that are found at once where they are likelier than any
-    /// of them alone. Parameters that are fitted before all large causes are there run off with what these do.
+    /// of them alone. Parameters that are fitted before all large causes are there run off with what these do, those of two inertias
+    /// farther than each of them shows.
     fn beginning(&self, given: &Fit, parameters: &Fit, pool: &mut Pool) -> Fit {
-        if !self.is_coupled() || self.leaves_nothing(parameters) {
+        let is_coupled = self.problem.nominal.structure == Structure::TwoInertia;
+        let run_off = is_coupled || self.have_moved(parameters, MOVED_WITH_EFFECTS);
+        if !run_off || self.leaves_nothing(parameters) {
             return parameters.clone();
         }
         let mut alone = self.extended(parameters, 0, pool);
@@ -242,11 +245,6 @@ impl Search<'_> {
     fn resumed(&self, known: &Fit) -> Option<Fit> {
         let fit = self.problem.fit(&known.model, &known.terms, known.discrepancy, STEPS)?;
         self.problem.deepen(&fit)
-    }
-
-    /// Whether there are two inertias: the one of a rigid axis runs off with no more than a share of any cause.
-    fn is_coupled(&self) -> bool {
-        self.problem.nominal.structure == Structure::TwoInertia
     }
 
     pub fn band(&self) -> &Band {

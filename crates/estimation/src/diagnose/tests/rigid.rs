@@ -37,6 +37,31 @@ fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torq
     assert_eq!(named(&o), ["dry_friction"], "{:?}", ranking(&o));
 }
 
+#[test]
+fn causes_before_all_of_which_the_inertia_runs_off_are_found_at_once() {
+    // Once to and fro at a constant speed: friction either way, a load and a ripple are nearly all of the torque.
+    let way = |t: f64| 0.03 * (3.0 * t).sin().asin();
+    let effects = with(&[
+        (Effect::CoulombMotor, 0, 1.0),
+        (Effect::ViscousMotor, 0, 75.0),
+        (Effect::ViscousMotor, 1, -0.475),
+        (Effect::LoadMotor, 0, -1.9),
+        (Effect::TorqueRipple, 0, 0.55),
+        (Effect::TorqueRipple, 1, 1800.0),
+    ]);
+    for seed in 0..2 {
+        let o = diagnosed(&led(800, way, effects, 1e-4, |t| 0.01 * (31.0 * t).sin(), seed), INERTIA);
+        assert_eq!(
+            named(&o),
+            ["dry_friction", "load_torque", "torque_ripple", "viscous_friction"],
+            "{:?}",
+            ranking(&o)
+        );
+        let off = o.models[2].parameters.i1 / INERTIA;
+        assert!((off - 1.0).abs() < 0.01, "{off}");
+    }
+}
+
 /// A log of a constant torque, by a load or by friction, along a way on and on, beside a torque that wanders slowly and is small beside it.
 fn onwards(effect: Effect, wander: f64) -> Record {
     let way = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin();
