@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::diagnosis::Undecided;
 use super::material::{MATERIAL, MINOR};
-use super::moves::{MOVED, MOVED_WITH_EFFECTS};
+use super::moves::{MOVED, MOVED_FAR};
 use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
 use super::verdict::Verdict;
@@ -120,7 +120,7 @@ impl Search<'_> {
             let without = self.concluded_without(&chosen, least, refitted, ranking, [&given, &parameters], independent);
             // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
             let others = weighing.likely();
-            let is_its_own = inertia_off(&chosen, nominal) < MOVED_WITH_EFFECTS;
+            let is_its_own = inertia_off(&chosen, nominal) < MOVED_FAR;
             if others + 1 < chosen.terms.len() || !is_understood || !is_its_own || without.named() >= others {
                 return without;
             }

@@ -99,6 +99,7 @@ impl Search<'_> {
     }
 }
 
+/// Whether a power is next to none of another.
 fn is_next_to_none(power: f64, of: f64) -> bool {
     power <= NEXT_TO_ALL * of
 }
@@ -116,5 +117,10 @@ mod tests {
     fn materially_less_is_less_than_three_quarters_of_the_power() {
         assert!(is_materially_less(0.74, 1.0) && !is_materially_less(0.76, 1.0));
         assert!(!is_materially_less(0.1, 0.1));
+    }
+
+    #[test]
+    fn next_to_none_is_three_hundredths_of_the_power() {
+        assert!(is_next_to_none(0.029, 1.0) && !is_next_to_none(0.031, 1.0) && is_next_to_none(0.0, 0.0));
     }
 }

@@ -21,8 +21,8 @@ const OF_A_SIZE: usize = 3;
 const GOING_ON: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 pub const MOVED: f64 = 0.2;
-/// The same beside effects, which let most parameters be what they are: a factor of two.
-pub const MOVED_WITH_EFFECTS: f64 = 0.7;
+/// The same beside effects, which let most parameters be what they are, and from which one inertia has taken what they do: a factor of two.
+pub const MOVED_FAR: f64 = 0.7;
 
 impl Search<'_> {
     /// Every combination of the textbook's effects at the motor, each from its own regression.
@@ -86,7 +86,7 @@ impl Search<'_> {
     /// an effect does, and free beside it take it again.
     fn put_back(&self, fit: &Fit) -> Vec<Fit> {
         let nominal = &self.problem.nominal;
-        if !self.have_moved(fit, if fit.terms.is_empty() { MOVED } else { MOVED_WITH_EFFECTS }) {
+        if !self.have_moved(fit, if fit.terms.is_empty() { MOVED } else { MOVED_FAR }) {
             return Vec::new();
         }
         let back = self.problem.given(&Model { parameters: nominal.parameters, ..fit.model });

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::conclusion::Decision;
-use super::moves::{MOVED, MOVED_WITH_EFFECTS};
+use super::moves::{MOVED, MOVED_FAR};
 use super::pool::Pool;
 use super::steps::Measure;
 use crate::axis::Structure;
@@ -205,11 +205,11 @@ impl Search<'_> {
     }
 
     /// Where single steps begin: at the parameters alone, or at several effects that are found at once where they are likelier than any
-    /// of them alone. Parameters that are fitted before all large causes are there run off with what these do, those of two inertias
-    /// farther than each of them shows.
+    /// of them alone. Parameters that are fitted before all large causes are there run off with what these do: those of two inertias along
+    /// valleys in which none has gone far, the one of a rigid axis where it has.
     fn beginning(&self, given: &Fit, parameters: &Fit, pool: &mut Pool) -> Fit {
         let is_coupled = self.problem.nominal.structure == Structure::TwoInertia;
-        let run_off = is_coupled || self.have_moved(parameters, MOVED_WITH_EFFECTS);
+        let run_off = is_coupled || self.have_moved(parameters, MOVED_FAR);
         if !run_off || self.leaves_nothing(parameters) {
             return parameters.clone();
         }

@@ -3,20 +3,33 @@
 use super::*;
 use crate::hypothesis::scales::Scales;
 
-/// A soft belt that a slow controller moves on and on, its motor's encoder alone read.
-fn of_a_belt(belt: Parameters, seed: u64) -> Record {
-    let axis = Axis::new(belt, Structure::TwoInertia, Settings::default(), Scheme::Exact, DT);
+/// Two inertias that a controller of gains for position and speed, 1/s2 and 1/s, moves along a way, the motor's encoder alone read `n` times.
+fn of_the_motor(
+    parameters: Parameters,
+    effects: Settings,
+    (n, dt): (u32, f64),
+    [position, speed]: [f64; 2],
+    wanted: impl Fn(f64) -> f64,
+    seed: u64,
+) -> Record {
+    let axis = Axis::new(parameters, Structure::TwoInertia, effects, Scheme::Exact, dt);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut torque, mut theta) = (Vec::new(), Vec::new());
-    for k in 0..3000 {
-        let t = f64::from(k) * DT;
-        let wanted = 2.0 * t - 1.8 * (0.9 * t).sin() + 0.2 * (7.0 * t).sin();
+    for k in 0..n {
+        let t = f64::from(k) * dt;
         theta.push(state.theta1() + noise(&mut rng, 1e-6));
-        torque.push((belt.i1 + belt.i2) * (100.0 * (wanted - state.theta1()) - 14.0 * state.omega1()));
-        state = axis.advance(&state, Ramp { start: torque[k as usize], end: torque[k as usize] }, t);
+        let acts = (parameters.i1 + parameters.i2) * (position * (wanted(t) - state.theta1()) - speed * state.omega1());
+        torque.push(acts);
+        state = axis.advance(&state, Ramp { start: acts, end: acts }, t);
     }
-    of_one_encoder(0.0, torque, theta)
+    Record { dt, ..of_one_encoder(0.0, torque, theta) }
+}
+
+/// A soft belt that a slow controller moves on and on.
+fn of_a_belt(belt: Parameters, seed: u64) -> Record {
+    let way = |t: f64| 2.0 * t - 1.8 * (0.9 * t).sin() + 0.2 * (7.0 * t).sin();
+    of_the_motor(belt, Settings::default(), (3000, DT), [100.0, 14.0], way, seed)
 }
 
 const BELT: Parameters = Parameters { i1: 1.26e-3, i2: 9.3e-4, b: 5.8e-4, k: 1.52, rho: 1.0 };
@@ -380,21 +393,11 @@ fn a_friction_of_a_side_that_is_not_measured_may_take_what_its_own_motion_lets_i
 
 const SCREW: Parameters = Parameters { i1: 1.3446e-3, i2: 4.45e-4, b: 3.66e-2, k: 225.0, rho: 1.0 };
 
-/// A ball screw under control whose motor has a friction, by the motor's own encoder.
+/// A ball screw whose motor has a friction.
 fn of_a_screw() -> Record {
-    let (dt, friction) = (3.6e-4, with(&[(Effect::CoulombMotor, 0, 0.1926), (Effect::CoulombMotor, 3, 0.256)]));
-    let axis = Axis::new(SCREW, Structure::TwoInertia, friction, Scheme::Exact, dt);
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
-    let (mut torque, mut theta) = (Vec::new(), Vec::new());
-    for k in 0..5600 {
-        let t = f64::from(k) * dt;
-        let wanted = 4.0 * (1.0 - (5.1 * t).cos()) + 1.3 * (14.0 * t).sin() + 0.03 * (70.0 * t).sin();
-        theta.push(state.theta1() + noise(&mut rng, 1e-6));
-        torque.push((SCREW.i1 + SCREW.i2) * (3600.0 * (wanted - state.theta1()) - 84.0 * state.omega1()));
-        state = axis.advance(&state, Ramp { start: torque[k as usize], end: torque[k as usize] }, t);
-    }
-    Record { dt, ..of_one_encoder(0.0, torque, theta) }
+    let friction = with(&[(Effect::CoulombMotor, 0, 0.1926), (Effect::CoulombMotor, 3, 0.256)]);
+    let way = |t: f64| 4.0 * (1.0 - (5.1 * t).cos()) + 1.3 * (14.0 * t).sin() + 0.03 * (70.0 * t).sin();
+    of_the_motor(SCREW, friction, (5600, 3.6e-4), [3600.0, 84.0], way, 3)
 }
 
 #[test]
