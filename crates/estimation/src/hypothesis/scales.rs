@@ -193,6 +193,7 @@ impl Scales {
             let side = side(e);
             let extent = Extent {
                 torque: self.peak,
+                torque_deviation: self.torque,
                 positions: &self.positions[side],
                 speed: self.speed[side],
                 fastest: self.fastest[side],

@@ -5,6 +5,8 @@
 pub struct Extent<'a> {
     /// Largest torque, N.m.
     pub torque: f64,
+    /// Standard deviation of the torque over the record, N.m.
+    pub torque_deviation: f64,
     /// Positions of the effect's side, rad, sorted.
     pub positions: &'a [f64],
     /// Rms speed of that side, rad/s.
@@ -58,6 +60,13 @@ impl Extent<'_> {
     #[must_use]
     pub fn has_amplitude(&self, torque: f64) -> bool {
         (KNOWN * self.torque..=self.torque).contains(&torque.abs())
+    }
+
+    /// Whether a drive that gives no more than a torque, N.m, is limited, and no mere switch: the command passes that torque, and does not
+    /// deviate by twice as much. How far its peaks pass it says nothing, of a command that a step or the encoder's noise makes.
+    #[must_use]
+    pub fn limits(&self, torque: f64) -> bool {
+        (0.5 * self.torque_deviation..self.torque).contains(&torque)
     }
 
     /// Travel of the effect's side, rad.
@@ -149,6 +158,7 @@ mod tests {
     fn resting() -> Extent<'static> {
         Extent {
             torque: 1.0,
+            torque_deviation: 0.5,
             positions: &[0.0, 1.0],
             speed: 1.0,
             fastest: 1.0,
@@ -200,6 +210,12 @@ mod tests {
             )
         };
         assert!(admits(0.59) && admits(-0.59) && !admits(0.61) && !admits(-0.61));
+    }
+
+    #[test]
+    fn a_torque_limit_is_passed_by_the_command_and_is_no_switch() {
+        let admits = |limit: f64| (Effect::Saturation.info().bounds)(&[limit], &resting());
+        assert!(admits(0.26) && !admits(0.24) && admits(0.99) && !admits(1.0));
     }
 
     #[test]

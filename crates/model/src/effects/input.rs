@@ -247,7 +247,7 @@ impl Input for Saturation {
         named: true,
         textbook: false,
         odds: 0.1,
-        bounds: |p, x| p[0] >= 0.3 * x.torque && p[0] < x.torque,
+        bounds: |p, x| x.limits(p[0]),
         example: &[0.02],
         variants: &[Variant { name: "", free: &[0] }],
     };
