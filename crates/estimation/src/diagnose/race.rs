@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::search::{ALIKE, Search};
+use crate::effects::Effect;
 use crate::hypothesis::fit::{Fit, STEPS};
 
 /// Fits that go on.
@@ -25,7 +26,8 @@ impl Search<'_> {
         let likeliest = || fits.iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)));
         let best = rival.or_else(likeliest).map_or([0.0; 2], |f| f.discrepancy);
         let is_out = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > OUT_OF_RACE * best[i]);
-        let mut racing: Vec<usize> = (0..fits.len().min(RACING)).filter(|i| !is_out(&fits[*i])).collect();
+        let mut racing: Vec<usize> =
+            first_of_each(&fits).into_iter().take(RACING).filter(|i| !is_out(&fits[*i])).collect();
         let mut first = fits.iter().filter(|f| idle(f)).chain(rival).map(evidence).fold(f64::NEG_INFINITY, f64::max);
         for _ in 0..STEPS / ROUND {
             let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);
@@ -56,6 +58,22 @@ impl Search<'_> {
     }
 }
 
+/// Fits, best first: the first of each set of effects, then the others. Several starts of one effect leave the others their places.
+fn first_of_each(fits: &[Fit]) -> Vec<usize> {
+    let mut seen: Vec<Vec<Effect>> = Vec::new();
+    let is_first = |i: &usize| {
+        let effects = fits[*i].effects();
+        let new = !seen.contains(&effects);
+        if new {
+            seen.push(effects);
+        }
+        new
+    };
+    let (mut first, others): (Vec<usize>, Vec<usize>) = (0..fits.len()).partition(is_first);
+    first.extend(others);
+    first
+}
+
 /// Whether a fit has come back to the one that it has in it. One that is less likely than that has not: it ends no lower.
 fn has_come_back(fit: &Fit, nested: &Fit) -> bool {
     (fit.log_likelihood - nested.log_likelihood).abs() < ALIKE
@@ -76,7 +94,7 @@ fn apart(racing: &[usize], fits: &[Fit]) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::axis::{Parameters, Structure};
-    use crate::effects::{Effect, Settings};
+    use crate::effects::Settings;
     use crate::hypothesis::model::Model;
 
     #[test]
@@ -88,6 +106,22 @@ mod tests {
         let nested = at(14117.1);
         assert!(has_come_back(&at(14116.2), &nested) && has_come_back(&at(14119.3), &nested));
         assert!(!has_come_back(&at(14024.3), &nested) && !has_come_back(&at(14197.1), &nested));
+    }
+
+    #[test]
+    fn starts_of_one_effect_leave_the_others_their_places() {
+        let of = |effect: Effect, form: usize| {
+            let model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
+            Fit::of_likelihood(model, &[(effect, form)], 0.0)
+        };
+        let fits = [
+            of(Effect::CoulombMotor, 1),
+            of(Effect::CoulombMotor, 0),
+            of(Effect::Delay, 0),
+            of(Effect::Delay, 0),
+            of(Effect::MotorMode, 0),
+        ];
+        assert_eq!(first_of_each(&fits), [0, 2, 4, 1, 3]);
     }
 
     #[test]
