@@ -194,7 +194,7 @@ impl Search<'_> {
     pub fn with_another(&self, fit: &Fit, i: usize, other: Term) -> Option<Fit> {
         let screening = self.screening_without(fit, i)?;
         let start = screening.best_start(other)?;
-        self.problem.deepen(&screening.fitted(&start, i, fit.discrepancy)?)
+        self.problem.deepen(&screening.fitted(&start, i, screening.fit.discrepancy)?)
     }
 
     /// The fit with one of its effects in each form that frees more, everything else from where it stands: what the plain form lacks the
@@ -251,8 +251,7 @@ fn gone_on_from<P>(starts: Vec<P>, effect: impl Fn(&P) -> Effect) -> Vec<P> {
 /// Forms of an effect: those that free all that an earlier one does and more, or the others.
 fn forms(effect: Effect, richer: bool) -> Vec<usize> {
     let info = effect.info();
-    let frees_more = |v: usize| (0..v).any(|plain| info.frees_more(v, plain));
-    (0..info.variants.len()).filter(|v| frees_more(*v) == richer).collect()
+    (0..info.variants.len()).filter(|v| info.is_richer(*v) == richer).collect()
 }
 
 #[cfg(test)]

@@ -113,13 +113,16 @@ impl<'a> Ascent<'a> {
     fn beside_the_textbook(&mut self) {
         let (search, chosen) = (&self.search, &self.chosen);
         let leaves_nothing = search.leaves_nothing(chosen);
-        // One effect that leaves nothing needs no rival, several of the textbook's own are one of them.
-        if leaves_nothing && (chosen.terms.len() == 1 || chosen.terms.iter().all(|t| t.0.info().textbook)) {
+        // One effect that leaves nothing needs no rival, several of the textbook's own are one of them; a form that says two things at once
+        // has one by two effects.
+        let is_plain = chosen.terms.iter().all(|(e, form)| !e.info().is_richer(*form));
+        let is_textbook = chosen.terms.iter().all(|t| t.0.info().textbook);
+        if leaves_nothing && is_plain && (chosen.terms.len() == 1 || is_textbook) {
             return;
         }
         (search.progress)("the textbook's friction");
         // Of accounts that leave next to nothing the shorter is told: a lone effect that does has no rival of two.
-        let most = if chosen.terms.len() == 1 { search.longest_rival(chosen) } else { MOST };
+        let most = if chosen.terms.len() == 1 && is_plain { search.longest_rival(chosen) } else { MOST };
         let textbook = search.textbook(&self.parameters, chosen);
         self.pool.extend(textbook.iter().cloned());
         let share = search.independent(&textbook);

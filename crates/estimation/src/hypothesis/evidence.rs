@@ -32,8 +32,7 @@ impl Problem<'_> {
         let is_of_line =
             |i: &usize| matches!(e.info().parameters[*i].start, Start::Grid(Scale::Order | Scale::Frequency, _));
         let lines = e.is_mode() || e.info().variants[v].free.iter().any(is_of_line);
-        let richer = (0..v).any(|plain| e.info().frees_more(v, plain));
-        PRICE * if richer { RICHER } else { 1.0 } - e.info().odds.ln()
+        PRICE * if e.info().is_richer(v) { RICHER } else { 1.0 } - e.info().odds.ln()
             + if lines { (self.band.omega.len() as f64).ln() } else { 0.0 }
     }
 

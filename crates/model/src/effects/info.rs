@@ -129,6 +129,12 @@ impl EffectInfo {
     pub fn frees_more(&self, form: usize, than: usize) -> bool {
         form != than && self.variants[than].free.iter().all(|i| self.variants[form].free.contains(i))
     }
+
+    /// Whether a form frees all that an earlier one does, and more: it says two things at once.
+    #[must_use]
+    pub fn is_richer(&self, form: usize) -> bool {
+        (0..form).any(|plain| self.frees_more(form, plain))
+    }
 }
 
 impl ParameterInfo {
