@@ -55,15 +55,15 @@ impl Search<'_> {
 
     /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
     pub fn better_in_pool(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
-        if self.at_floor(chosen) {
-            return None;
-        }
         let share = self.independent([chosen]);
         let most = self.longest_rival(chosen);
+        let [at_floor, leaves_nothing] = [self.at_floor(chosen), self.leaves_nothing(chosen)];
         let is_rival = |f: &&Fit| {
-            // What a torque is not true to tells no two accounts apart, unless one explains it.
-            if self.is_negligible(chosen) {
-                return f.terms.len() <= chosen.terms.len() && self.explains_next_to_all(chosen, f);
+            // Noise tells no two accounts of one length apart, and what a torque is not true to does where one explains it alone.
+            if leaves_nothing {
+                let is_as_long = f.terms.len() == chosen.terms.len();
+                return f.terms.len() < chosen.terms.len()
+                    || is_as_long && !at_floor && self.explains_next_to_all(chosen, f);
             }
             // A longer account is believed, as several at once are, where it explains the torque.
             !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f))
@@ -105,17 +105,27 @@ impl Search<'_> {
     }
 
     /// Looks for one effect more beside the likeliest hypotheses that the chosen way passed by, as long as that is cheap: two causes that
-    /// are each a poor account alone are found beside one another only.
+    /// are each a poor account alone are found beside one another only. Where nothing is left, beside parts of the chosen one, too: one effect
+    /// may leave nothing in the place of several.
     pub fn extend_rivals(&self, chosen: &Fit, pool: &mut Pool) {
-        if self.leaves_nothing(chosen) {
-            return;
-        }
         let share = self.independent([chosen]);
+        let leaves_nothing = self.leaves_nothing(chosen);
         // Of one inertia a further cause costs little, and of many small ones none helps much before the others are there.
         let rigid = self.problem.nominal.structure == Structure::Rigid;
-        let deepest = if rigid && !self.is_exact(chosen) { MOST - 1 } else { chosen.terms.len().max(1) };
+        let deepest = if leaves_nothing {
+            chosen.terms.len().saturating_sub(2)
+        } else if rigid && !self.is_exact(chosen) {
+            MOST - 1
+        } else {
+            chosen.terms.len().max(1)
+        };
+        let is_part = |f: &Fit| f.terms.iter().all(|t| chosen.terms.iter().any(|of| of.0 == t.0));
         for size in 1..=deepest {
-            for fit in self.likeliest(size, share, pool) {
+            let mut from = self.likeliest(size, share, pool, |_| true);
+            if leaves_nothing {
+                from.extend(self.likeliest(size, share, pool, is_part));
+            }
+            for fit in from {
                 if self.is_over_half_of_budget() {
                     return;
                 }
@@ -124,9 +134,10 @@ impl Search<'_> {
         }
     }
 
-    /// The likeliest hypotheses of so many effects, in one form each.
-    fn likeliest(&self, size: usize, share: f64, pool: &Pool) -> Vec<Fit> {
-        let mut of_size: Vec<&Fit> = pool.fits().iter().filter(|f| f.terms.len() == size && !f.at_bound).collect();
+    /// The likeliest hypotheses of so many effects that may be gone on from, in one form each.
+    fn likeliest(&self, size: usize, share: f64, pool: &Pool, may: impl Fn(&Fit) -> bool) -> Vec<Fit> {
+        let is_of_size = |f: &&Fit| f.terms.len() == size && !f.at_bound && may(f);
+        let mut of_size: Vec<&Fit> = pool.fits().iter().filter(is_of_size).collect();
         of_size.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
         let mut likeliest: Vec<Fit> = Vec::new();
         for fit in of_size {

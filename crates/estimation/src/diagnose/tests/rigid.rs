@@ -1,6 +1,7 @@
 //! Rigid axes: what is named, and what is not.
 
 use super::*;
+use crate::effects::TorqueHistory;
 use crate::hypothesis::descent::Descent;
 use crate::hypothesis::fit::STEPS;
 
@@ -126,6 +127,37 @@ fn gravity_is_told_from_a_spring_where_the_hinge_turns_far_enough() {
     let o = diagnosed(&logged(with(&hidden), 1.2, 0.02, |_| 0.0, 3), INERTIA);
     assert_eq!(named(&o), ["dry_friction", "gravity"]);
     assert!((o.improved.effects.of(Effect::Gravity)[0] / 6.0 - 1.0).abs() < 0.02);
+}
+
+/// A record of an axis that is driven by a torque, with no controller.
+fn driven(n: u32, torque: impl Fn(f64) -> f64, effects: Settings, seed: u64) -> Record {
+    let axis = Axis::new(parameters(INERTIA), Structure::Rigid, effects, Scheme::Exact, DT);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut state = axis.state(0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut history = TorqueHistory::constant(0.0);
+    let (mut given, mut theta) = (Vec::new(), Vec::new());
+    for k in 0..n {
+        let t = f64::from(k) * DT;
+        given.push(torque(t));
+        theta.push(state.theta1() + noise(&mut rng, 1e-6));
+        let logged = Ramp { start: torque(t), end: torque(t) };
+        let acts = effects.transform_input(axis.on(), logged, DT, &mut history);
+        state = axis.advance(&state, acts, t);
+    }
+    of_one_encoder(0.0, given, theta)
+}
+
+#[test]
+fn two_causes_are_told_where_three_others_leave_nothing_either() {
+    // A weight on a hinge nearly follows a spring that rests elsewhere, and a load beside it does the rest.
+    let effects =
+        with(&[(Effect::DeadZone, 0, 2.5), (Effect::ExternalSpring, 0, 20.0), (Effect::ExternalSpring, 1, 0.8)]);
+    for phase in [0.0, 3.0] {
+        let sine = |t: f64, j: f64| 3.0 * (3.0 * j * t + phase + 0.4 * j * j).sin();
+        let torque = |t: f64| (1..9).map(|j| sine(t, f64::from(j))).sum();
+        let o = diagnosed(&driven(512, torque, effects, 3), INERTIA);
+        assert_eq!(named(&o), ["dead_zone", "external_spring"], "{:?}", ranking(&o));
+    }
 }
 
 #[test]
