@@ -266,21 +266,27 @@ impl Search<'_> {
         (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, plain)
     }
 
-    /// The constant torque that a friction may be as well, where the motion never goes back: there the law without any shape is one, and
-    /// a shape may follow what else happens as the axis starts, unless it explains next to all that the constant torque leaves.
+    /// The constant torque that a friction may be as well: where the motion hardly goes back the law without any shape is one, and a shape
+    /// may follow what else happens as the axis starts, unless it explains next to all that the constant torque leaves.
     fn constant_instead(&self, chosen: &Fit, i: usize, pool: &[Fit], independent: f64) -> Option<Confusable> {
         let (effect, _) = chosen.terms[i];
         let is_dry = |e: Effect| e.info().family == Family::DryFriction;
-        if !is_dry(effect) || self.problem.scales.as_ref()?.goes_back(effect) {
-            return None;
-        }
         let at_its_place = || self.suspects.iter().copied().filter(|e| e.info().place == effect.info().place);
         let shapeless = at_its_place().find(|e| is_dry(*e) && e.simpler_at_zero().is_none())?;
         let constant = at_its_place().find(|e| e.is_bias())?;
+        if !is_dry(effect) || chosen.terms.iter().any(|t| t.0 == constant) {
+            return None;
+        }
+        // What the search has of it may have ended elsewhere before the others were there.
         let with = |e: Effect| {
+            if chosen.terms[i] == (e, 0) {
+                return Some(chosen.clone());
+            }
             let mut terms = chosen.terms.clone();
             terms[i] = (e, 0);
-            likeliest_of(&terms, pool).cloned().or_else(|| self.with_another(chosen, i, (e, 0)))
+            let known = likeliest_of(&terms, pool).cloned();
+            let all = known.into_iter().chain(self.with_another(chosen, i, (e, 0)));
+            all.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
         };
         let load = with(constant)?;
         let next_to_all = (0..self.band().equations()).all(|e| chosen.discrepancy[e] < MINOR * load.discrepancy[e]);

@@ -44,10 +44,6 @@ pub struct Scales {
 
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
-/// Share of the travel by which the path is longer where the motion goes back at all: the hundredth from which the examination of a
-/// record counts a direction as one.
-const BACK: f64 = 0.01;
-
 /// Share of the path on which a torque that goes with the position must be in the band for it to be seen, where that is less than the
 /// periods that make a frequency.
 const SEEN: f64 = 0.2;
@@ -224,12 +220,6 @@ impl Scales {
     /// Whether the travel shows an effect of a model again, where it is one that repeats.
     pub fn repeats(&self, effect: Effect, model: &Model) -> bool {
         effect.repeats(model.effects.of(effect), self.travel_of(side(effect)))
-    }
-
-    /// Whether the side of an effect moves both ways: where it does not, friction is a constant torque.
-    pub fn goes_back(&self, effect: Effect) -> bool {
-        let side = side(effect);
-        self.paths[side].0 > (1.0 + BACK) * self.travel_of(side)
     }
 
     /// Travel of a side, rad.
