@@ -92,7 +92,7 @@ impl Search<'_> {
         let is_off = self.evidence(&parameters, independent) > self.evidence(&given, independent);
         let plain = if is_off { parameters.clone() } else { given.clone() };
         let chosen = if chosen.terms.is_empty() || is_run_off(&chosen, nominal) { plain.clone() } else { chosen };
-        self.retain_rivals(&chosen, &mut pool);
+        self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
             return self.conclude(given, parameters, simple, pool);
@@ -162,10 +162,16 @@ impl Search<'_> {
     }
 
     /// Keeps the hypotheses that a chosen one is weighed against. What it lacks no material part of is no rival of it, only itself and
-    /// something small; of accounts that leave next to nothing of the gap the shorter is told.
-    fn retain_rivals(&self, chosen: &Fit, pool: &mut Vec<Fit>) {
+    /// something small; of accounts that leave next to nothing of the gap the shorter is told. A longer account doubts nothing in it where
+    /// the chosen one with as many effects beside its own is likelier.
+    fn retain_rivals(&self, chosen: &Fit, pool: &mut Vec<Fit>, independent: f64) {
         let most = self.longest_rival(chosen);
-        pool.retain(|f| !is_extension(f, chosen) && f.terms.len() <= most);
+        let evidence = |f: &Fit| self.evidence(f, independent);
+        let (more, mut others): (Vec<Fit>, Vec<Fit>) = pool.drain(..).partition(|f| is_extension(f, chosen));
+        let likelier =
+            |f: &Fit| more.iter().any(|m| !m.at_bound && m.terms.len() <= f.terms.len() && evidence(m) > evidence(f));
+        others.retain(|f| f.terms.len() <= most && !(f.terms.len() > chosen.terms.len() && likelier(f)));
+        *pool = others;
     }
 
     /// What the record says for each effect of a chosen hypothesis, which is `finished` along its own motion.
