@@ -9,7 +9,7 @@ use super::problem::Problem;
 use crate::axis::Structure;
 use crate::conditioning::Record;
 use crate::effects::{Effect, Extent, PERIODS, Place, Scale, TorqueHistory};
-use crate::numerics::level::deviation;
+use crate::numerics::level::{self, deviation};
 
 #[derive(Clone)]
 pub struct Scales {
@@ -31,7 +31,7 @@ pub struct Scales {
     twists: Vec<f64>,
     /// Work of the logged torque, J.
     work: f64,
-    /// What weights and springs of no more than its peak can have given between the record's ends, J.
+    /// What weights and springs that it held can have given between the record's ends, J: they show in its rms.
     given: f64,
     /// Way of the driven side from sample to sample, rad.
     moved: Arc<[f64]>,
@@ -42,6 +42,8 @@ pub struct Scales {
     structure: Structure,
 }
 
+/// Least rms of the torque that acts on an axis, over the deviation of the logged one: an amplifier that swallows nearly all is none.
+const ACTS: f64 = 0.1;
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
 /// Share of the path on which a torque that goes with the position must be in the band for it to be seen, where that is less than the
@@ -100,23 +102,26 @@ fn is_as_logged(model: &Model) -> bool {
     ahead == 0.0 && on_time.effects.active().inputs().is_empty()
 }
 
-/// Work of the torque that acts in a model along a motion, J: what comes late, through a lag or cut off did other work than what was
-/// logged, where the motion swings as fast as that even of the other sign. `moved`: path from sample to sample, rad.
-fn work_of(model: &Model, record: &Record, moved: &[f64]) -> f64 {
+/// Work of the torque that acts in a model along a motion, J, and the rms of that torque, N.m: what comes late, through a lag or cut off did
+/// other work than what was logged, where the motion swings as fast as that even of the other sign. `moved`: path from sample to sample,
+/// rad.
+fn acting(model: &Model, record: &Record, moved: &[f64]) -> (f64, f64) {
     let (model, ahead) = model.on_time();
     let per = record.instants();
     let h = record.dt / per as f64;
     let on = model.effects.active();
     let mut history = TorqueHistory::constant(record.torque[0]);
-    let mut work = 0.0;
+    let (mut work, mut square) = (0.0, 0.0);
     for (k, path) in moved.iter().enumerate() {
         for j in 0..per {
             let logged = record.ramp(k, j, per, ahead);
             let acts = model.effects.transform_input(&on, logged, h, &mut history);
-            work += 0.5 * (acts.start + acts.end) * path / per as f64;
+            let mean = 0.5 * (acts.start + acts.end);
+            work += mean * path / per as f64;
+            square += mean * mean;
         }
     }
-    work
+    (work, (square / (per * moved.len().max(1)) as f64).sqrt())
 }
 
 impl Scales {
@@ -137,7 +142,7 @@ impl Scales {
         let driven = usize::from(p.record.channels[0].is_none() && p.record.channels[1].is_none());
         let moved: Arc<[f64]> = t.motion.windows(2).map(|m| m[1][2 * driven] - m[0][2 * driven]).collect();
         let last = t.motion.len() - 1;
-        let work = work_of(&p.nominal, p.record, &moved);
+        let (work, _) = acting(&p.nominal, p.record, &moved);
         let shifted = (t.motion[last][2 * driven] - t.motion[0][2 * driven]).abs();
         let peak = p.peak;
         let top = p.band.omega.last().copied().unwrap_or(1.0);
@@ -159,7 +164,7 @@ impl Scales {
             torque: deviation(torque),
             peak,
             work,
-            given: peak * shifted,
+            given: level::rms(torque) * shifted,
             moved,
             begins: t.motion[0][2 * driven + 1].powi(2),
             paths,
@@ -183,7 +188,12 @@ impl Scales {
         let rigid = self.structure == Structure::Rigid;
         let p = &model.parameters;
         let all = p.i1 + p.i2;
-        let work = if is_as_logged(model) { self.work } else { work_of(model, record, &self.moved) };
+        let (work, acts) =
+            if is_as_logged(model) { (self.work, self.torque) } else { acting(model, record, &self.moved) };
+        // A dead zone as wide as the limit beside it explains any motion by none of the torque.
+        if acts < ACTS * self.torque {
+            return false;
+        }
         effects.into_iter().all(|e| {
             let info = e.info();
             let side = side(e);
@@ -292,8 +302,10 @@ mod tests {
         assert!(is_as_logged(&model));
         for delay in [0.0, 0.021, 0.05, 0.09] {
             model.effects.of_mut(Effect::Delay)[0] = delay;
-            let power = work_of(&model, &record, &moved) / (f64::from(n) * dt);
+            let (work, rms) = acting(&model, &record, &moved);
+            let power = work / (f64::from(n) * dt);
             assert!((power - 0.5 * (w * delay).cos()).abs() < 5e-3, "{delay} {power}");
+            assert!((rms - 0.5_f64.sqrt()).abs() < 5e-3, "{delay} {rms}");
         }
         assert!(!is_as_logged(&model));
     }
