@@ -1,6 +1,7 @@
 """Draws the second edition: axes, loops, logs and their troubles as dimensions; a third of the axes healthy. README.md has the tables.
 
-    .venv/bin/python scripts/blind/conditions.py --out DIR [--cases 600] [--seed 1] [--half both|tuning|scoring] [--machines]
+    .venv/bin/python scripts/blind/conditions.py --out DIR [--cases 600] [--seed 1] [--half both|tuning|scoring]
+        [--machines] [--group GROUP]
 
 The same folders as generate.py's: run.py diagnoses and scores them.
 """
@@ -465,7 +466,10 @@ def main(argv=None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--half", choices=["both", "tuning", "scoring"], default="both", help="mark every case as of this half")
     parser.add_argument("--machines", action="store_true", help="axes like real machines alone, of every kind")
+    parser.add_argument("--group", choices=sorted(GROUPS), help="cases of this group alone, on every kind of axis")
     args = parser.parse_args(argv)
+    if args.group:
+        ORDER[:], GROUPS[args.group] = [args.group] * len(ORDER), len(ORDER)
     for sub in ("cases", "seals"):
         if (args.out / sub).exists():
             shutil.rmtree(args.out / sub)

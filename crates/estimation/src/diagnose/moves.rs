@@ -10,6 +10,7 @@ use super::search::{MOST, Search};
 use crate::effects::Effect;
 use crate::hypothesis::determined::is_simpler;
 use crate::hypothesis::fit::{Fit, PROBE, Term};
+use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::model::{Coordinate, Model};
 use crate::hypothesis::starts::{Screening, StartPoint};
 
@@ -190,10 +191,15 @@ impl Search<'_> {
         Screening::of(&self.problem, &self.problem.freed(&held)?)
     }
 
-    /// The fit with another effect in the place of one of its own.
+    /// The fit with another effect in the place of one of its own; `None` where that leaves far more from the start.
     pub fn with_another(&self, fit: &Fit, i: usize, other: Term) -> Option<Fit> {
         let screening = self.screening_without(fit, i)?;
         let start = screening.best_start(other)?;
+        let at = self.problem.along(&start.model, screening.fit.bandwidth)?;
+        let [begins, own] = [&at.rows, &fit.rows].map(|rows| self.band().noise_multiple(rows));
+        if begins > NEAR_THE_NOISE * own.max(1.0) {
+            return None;
+        }
         self.problem.deepen(&screening.fitted(&start, i, screening.fit.discrepancy)?)
     }
 
