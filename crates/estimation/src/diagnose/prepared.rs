@@ -9,9 +9,9 @@ use super::gap::Gap;
 use super::overlay::Overlay;
 use super::search::Search;
 use crate::axis::Structure;
-use crate::conditioning::{Record, TORQUE};
+use crate::conditioning::{Rate, Record, TORQUE, decimate, smooth};
 use crate::effects::Effect;
-use crate::hypothesis::band::{self, Rate, Reach};
+use crate::hypothesis::band::{self, Reach};
 use crate::hypothesis::discrepancy::Discrepancy;
 use crate::hypothesis::fit::{Fit, STEPS};
 use crate::hypothesis::likelihood::{Band, NEAR_THE_NOISE};
@@ -40,7 +40,7 @@ pub struct Prepared {
 /// The record in the band of its motion, as fast as it can be searched; and as exact as it can be, where accounts near the noise are
 /// settled, if that is something else.
 pub fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Option<Prepared>) {
-    let whole = record.part(0..band::smooth(record.len()));
+    let whole = record.part(0..smooth(record.len()));
     let limit = band::limit(&whole, &band::mask(&whole, nominal.structure), reach);
     let [exact, fast] = match nominal.structure {
         Structure::Rigid => [false, true].map(|straight| Rate { longest: f64::INFINITY, straight }),
@@ -51,8 +51,8 @@ pub fn prepared(record: &Record, nominal: &Model, reach: Reach) -> (Prepared, Op
     };
     let peak = largest(&record.torque);
     let at = |rate: Rate| {
-        let r = band::decimate(&whole, limit, rate);
-        r.part(0..band::smooth(r.len().min(SEARCHED)))
+        let r = decimate(&whole, limit, rate);
+        r.part(0..smooth(r.len().min(SEARCHED)))
     };
     let [own, slow] = [exact, fast].map(at);
     let alike = slow.len() == own.len() && slow.instants() == own.instants();
@@ -132,12 +132,12 @@ impl Prepared {
     /// Another record in the same band, its noise seen through a model.
     pub fn alike(&self, record: &Record, model: &Model) -> Self {
         let slow = self.at_its_rate(record);
-        self.of_another(slow.part(0..band::smooth(slow.len())), model)
+        self.of_another(slow.part(0..smooth(slow.len())), model)
     }
 
     /// Another record at the rate of this one.
     fn at_its_rate(&self, record: &Record) -> Record {
-        band::decimate(&record.part(0..band::smooth(record.len())), self.limit, self.rate)
+        decimate(&record.part(0..smooth(record.len())), self.limit, self.rate)
     }
 
     /// A record at the same rate and in the same band. A torque that stands there is no measure of what is lacking.
