@@ -34,6 +34,7 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
             hold: Hold::Zoh,
             torque,
             between: None,
+            logged: None,
             channels,
             noise: std,
             corner: noise.corner.map(|c| c / dt),

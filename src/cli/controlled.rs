@@ -27,6 +27,7 @@ fn logged(trace: &Trace) -> Record {
         hold: trace.hold,
         torque: channel(Signal::T).unwrap_or_default(),
         between: None,
+        logged: None,
         channels: [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(channel),
         noise: [0.0; 4],
         corner: [0.0; 2],

@@ -363,6 +363,7 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
         hold: trace.hold,
         torque,
         between: None,
+        logged: None,
         channels,
         noise: std,
         corner: noise.corner.map(|c| c / trace.dt),

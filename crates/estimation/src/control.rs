@@ -160,6 +160,7 @@ mod tests {
                 hold: Hold::Zoh,
                 torque: silent(3000),
                 between: None,
+                logged: None,
                 channels: [Some(silent(3000)), None, Some(silent(3000)), None],
                 noise: [1e-9; 4],
                 corner: [0.0; 2],

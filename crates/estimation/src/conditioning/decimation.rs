@@ -1,26 +1,31 @@
 //! A record at a lower rate: in a band of frequencies, as if it had been logged in it.
 
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::f64::consts::PI;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::record::Record;
 use crate::axis::Hold;
+use crate::effects::{ActiveEffects, Effect, Ramp, Settings, TorqueHistory};
 
 /// The largest number up to `n` of factors 2, 3 and 5 alone.
 pub fn smooth(n: usize) -> usize {
-    (1..=n)
-        .rev()
-        .find(|&m| {
-            let mut m = m;
-            for f in [2, 3, 5] {
-                while m % f == 0 {
-                    m /= f;
-                }
-            }
-            m == 1
-        })
-        .unwrap_or(n)
+    (1..=n).rev().find(|&m| is_smooth(m)).unwrap_or(n)
+}
+
+fn is_smooth(m: usize) -> bool {
+    let without = |mut m: usize, f: usize| {
+        while m.is_multiple_of(f) {
+            m /= f;
+        }
+        m
+    };
+    [2, 3, 5].into_iter().fold(m, without) == 1
 }
 
 /// Periods of the band's upper end within which a filtered record shows that it went on otherwise beyond its ends.
@@ -96,26 +101,72 @@ fn tangent(y: &[f64], samples: usize, last: bool) -> [f64; 2] {
 /// What a filter makes of a frequency in Hz.
 type Response<'r> = &'r (dyn Fn(f64) -> Complex<f64> + Sync);
 
-/// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
-/// the band it is the one that acted.
-pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
-    let (every, instants) =
-        thinning(((1.0 / (KEPT * limit)).min(rate.longest) / record.dt).floor() as usize, rate.straight);
-    let n = record.len();
-    if every < 2 || n < 64 {
-        return record.clone();
+/// Parts of a sample that a torque is averaged over before it is filtered, at least: sixteen means to a period of the band's end, of what
+/// lies beyond them a fifteenth comes into it.
+const PARTS: usize = 2;
+/// Samples by which a record is mirrored beyond its ends.
+const PADDED: usize = 4096;
+
+thread_local! { static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new()); }
+
+/// How a record came to a lower rate.
+#[derive(Debug, Clone, PartialEq)]
+struct Decimation {
+    /// Upper end of the band that is left as it is, Hz.
+    limit: f64,
+    /// Sampling interval before, s.
+    dt: f64,
+    /// Every how many samples one is kept.
+    every: usize,
+    /// Instants of the torque in each of those.
+    instants: usize,
+}
+
+/// A series at even steps.
+struct Series<'a> {
+    values: &'a [f64],
+    /// Step, s.
+    dt: f64,
+    beyond: Beyond,
+}
+
+impl Decimation {
+    /// Samples from one instant of the torque to the next.
+    const fn step(&self) -> usize {
+        self.every / self.instants
     }
-    let dt = record.dt;
-    let slow = dt * every as f64;
-    let step = every / instants;
-    let pad = n.min(4096).max(every * 8).min(n - 1);
-    let total = smooth_up(n + 2 * pad);
-    let mut planner = FftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(total), planner.plan_fft_inverse(total));
-    // Within half of that a tangent of the motion is told: over longer stretches its parabola is none.
-    let near = ((0.5 * SETTLING / (limit * dt)) as usize).clamp(4, n / 4);
-    // What passes `late` samples late does so with the line that is taken out of it, too.
-    let filter = |y: &[f64], beyond: Beyond, every: usize, late: f64, response: Response<'_>| -> Vec<f64> {
+
+    /// What is left of a frequency in Hz.
+    fn low(&self, f: f64) -> f64 {
+        let x = (f.abs() / self.limit - 1.3) / 0.9;
+        if x <= 0.0 {
+            1.0
+        } else if x >= 1.0 {
+            0.0
+        } else {
+            0.5 * (1.0 + (PI * x).cos())
+        }
+    }
+
+    /// The same of a torque, which then runs straight from instant to instant: raised so that within the band it is the one that acted, as
+    /// a series of it was `made`.
+    fn shaped(&self, f: f64, made: impl Fn(f64) -> Complex<f64>) -> Complex<f64> {
+        let low = self.low(f);
+        if low == 0.0 {
+            return Complex::default();
+        }
+        made(f) * (low / sinc(f * self.dt * self.step() as f64).powi(2))
+    }
+
+    /// Every so manieth value of a series behind a filter. What passes `late` steps late does so with the line that is taken out of it, too.
+    fn filtered(&self, series: &Series<'_>, every: usize, late: f64, response: Response<'_>) -> Vec<f64> {
+        let &Series { values: y, dt, beyond } = series;
+        let n = y.len();
+        // Within half of that a tangent of the motion is told: over longer stretches its parabola is none.
+        let near = ((0.5 * SETTLING / (self.limit * dt)) as usize).clamp(4, n / 4);
+        let padded = (PADDED as f64 * self.dt / dt) as usize;
+        let pad = n.min(padded).max(every * 8).min(n - 1);
+        let total = smooth_up(n + 2 * pad);
         let ends = [tangent(y, near, false), tangent(y, near, true)];
         let at = |i: isize| -> f64 {
             let last = n as isize - 1;
@@ -132,6 +183,8 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         let line = |at: f64| first + (end - first) * at / (total as f64 - 1.0);
         let mut z: Vec<Complex<f64>> =
             (0..total).map(|k| Complex::new(at(k as isize - pad as isize) - line(k as f64), 0.0)).collect();
+        let [forward, inverse] =
+            PLANNER.with_borrow_mut(|planner| [planner.plan_fft_forward(total), planner.plan_fft_inverse(total)]);
         forward.process(&mut z);
         for (m, v) in z.iter_mut().enumerate() {
             let f = if 2 * m <= total { m as f64 } else { m as f64 - total as f64 } / (total as f64 * dt);
@@ -139,38 +192,115 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
         }
         inverse.process(&mut z);
         (0..n).step_by(every).map(|k| z[k + pad].re + line((k + pad) as f64 - late)).collect()
-    };
-    let low = |f: f64| {
-        let x = (f.abs() / limit - 1.3) / 0.9;
-        if x <= 0.0 {
-            1.0
-        } else if x >= 1.0 {
-            0.0
-        } else {
-            0.5 * (1.0 + (std::f64::consts::PI * x).cos())
-        }
-    };
-    let sinc =
-        |x: f64| if x.abs() < 1e-9 { 1.0 } else { (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x) };
-    let zoh = record.hold == Hold::Zoh;
-    let shape = |f: f64| {
-        if low(f) == 0.0 {
-            return Complex::default();
-        }
-        let held = if zoh {
-            Complex::from_polar(sinc(f * dt), -std::f64::consts::PI * f * dt)
-        } else {
-            Complex::new(sinc(f * dt).powi(2), 0.0)
+    }
+
+    /// A channel at the lower rate.
+    fn channel(&self, values: &[f64], beyond: Beyond) -> Vec<f64> {
+        let series = Series { values, dt: self.dt, beyond };
+        self.filtered(&series, self.every, 0.0, &|f| Complex::new(self.low(f), 0.0))
+    }
+
+    /// A torque at the instants.
+    fn torque(&self, values: &[f64], hold: Hold) -> Vec<f64> {
+        let (dt, beyond) = (self.dt, Beyond::Even);
+        let made = |f: f64| match hold {
+            Hold::Zoh => Complex::from_polar(sinc(f * dt), -PI * f * dt),
+            Hold::Linear => Complex::new(sinc(f * dt).powi(2), 0.0),
         };
-        held * (low(f) / sinc(f * dt * step as f64).powi(2))
-    };
+        let late = if hold == Hold::Zoh { 0.5 } else { 0.0 };
+        self.filtered(&Series { values, dt, beyond }, self.step(), late, &|f| self.shaped(f, made))
+    }
+
+    /// A torque at the instants, of which the mean over every sample is known.
+    fn torque_of_means(&self, means: &[f64]) -> Vec<f64> {
+        let step = self.step();
+        // As few as the band needs are filtered.
+        let part = (1..=step).rev().find(|part| step.is_multiple_of(*part) && PARTS * part <= self.every).unwrap_or(1);
+        let values: Vec<f64> = means.chunks(part).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
+        let (dt, beyond) = (self.dt * part as f64, Beyond::Even);
+        let made = |f: f64| Complex::from_polar(1.0 / sinc(f * dt), -PI * f * dt);
+        self.filtered(&Series { values: &values, dt, beyond }, step / part, 0.5, &|f| self.shaped(f, made))
+    }
+}
+
+fn sinc(x: f64) -> f64 {
+    if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) }
+}
+
+/// The torque of a log behind that of a record at a lower rate. What cuts a torque off does so at the log's rate: peaks that are too short
+/// for the lower one, too.
+#[derive(Debug)]
+pub struct LoggedTorque {
+    values: Vec<f64>,
+    hold: Hold,
+    decimation: Decimation,
+    /// What was asked for last, by the effects on the way in and their parameters: most looks change others.
+    known: Mutex<VecDeque<Kept>>,
+}
+
+/// What effects keep of a torque, by them and their parameters.
+type Kept = (Vec<(Effect, Vec<f64>)>, Arc<[f64]>);
+
+/// Looks that are remembered.
+const REMEMBERED: usize = 16;
+
+impl PartialEq for LoggedTorque {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.values, self.hold, &self.decimation) == (&other.values, other.hold, &other.decimation)
+    }
+}
+
+impl LoggedTorque {
+    /// What settings keep of the torque on its way in, N.m, at the instants of the lower rate; `None` where they ask for a torque from
+    /// longer ago than is remembered at the log's rate.
+    pub fn kept(&self, effects: &Settings) -> Option<Arc<[f64]>> {
+        let on = effects.active();
+        let asked: Vec<(Effect, Vec<f64>)> = on.inputs().iter().map(|e| (*e, effects.of(*e).to_vec())).collect();
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, kept)) = known().iter().find(|(of, _)| *of == asked) {
+            return Some(kept.clone());
+        }
+        let kept: Arc<[f64]> = self.kept_by(effects, &on)?.into();
+        let mut known = known();
+        known.truncate(REMEMBERED - 1);
+        known.push_front((asked, kept.clone()));
+        Some(kept)
+    }
+
+    fn kept_by(&self, effects: &Settings, on: &ActiveEffects) -> Option<Vec<f64>> {
+        let dt = self.decimation.dt;
+        let mut history = TorqueHistory::constant(*self.values.first()?);
+        let late = |e: &Effect| e.delay_parameter().map_or(0.0, |i| effects.of(*e)[i]);
+        if !history.covers(on.inputs().iter().map(late).sum(), dt) {
+            return None;
+        }
+        let last = self.values.len() - 1;
+        let kept = |k: usize| {
+            let end = if self.hold == Hold::Zoh { k } else { (k + 1).min(last) };
+            let logged = Ramp { start: self.values[k], end: self.values[end] };
+            let arrived = effects.transform_input(on, logged, dt, &mut history);
+            0.5 * (logged.start + logged.end - arrived.start - arrived.end)
+        };
+        let means: Vec<f64> = (0..=last).map(kept).collect();
+        Some(self.decimation.torque_of_means(&means))
+    }
+}
+
+/// The record at the lower rate that its band needs; its torque then runs straight from instant to instant, raised so that within
+/// the band it is the one that acted.
+pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
+    let (every, instants) =
+        thinning(((1.0 / (KEPT * limit)).min(rate.longest) / record.dt).floor() as usize, rate.straight);
+    let n = record.len();
+    if every < 2 || n < 64 {
+        return record.clone();
+    }
+    let decimation = Decimation { limit, dt: record.dt, every, instants };
     // As long as it may be, a record is filtered on all cores.
-    let passed = |c: usize| {
-        record.channels[c].as_ref().map(|y| filter(y, Beyond::of(c), every, 0.0, &|f| Complex::new(low(f), 0.0)))
-    };
+    let passed = |c: usize| record.channels[c].as_ref().map(|y| decimation.channel(y, Beyond::of(c)));
     let mut channels = [const { None }; 4];
     let (fine, ()) = rayon::join(
-        || filter(&record.torque, Beyond::Even, step, if zoh { 0.5 } else { 0.0 }, &shape),
+        || decimation.torque(&record.torque, record.hold),
         || channels.par_iter_mut().enumerate().for_each(|(c, channel)| *channel = passed(c)),
     );
     let torque: Vec<f64> = fine.iter().copied().step_by(instants).collect();
@@ -179,13 +309,14 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
     let noise = record.noise.map(|s| s / (every as f64).sqrt());
     let common_noise = record.common_noise / every as f64;
     let idle = record.idle.iter().map(|r| r.start / every..r.end / every).collect();
-    let between = Some((instants, between));
+    let logged = LoggedTorque { values: record.torque.clone(), hold: record.hold, decimation, known: Mutex::default() };
     let out = Record {
         start: record.start,
-        dt: slow,
+        dt: record.dt * every as f64,
         hold: Hold::Linear,
         torque,
-        between,
+        between: Some((instants, between)),
+        logged: Some((logged.into(), 0)),
         channels,
         noise,
         corner: record.corner,
@@ -198,7 +329,7 @@ pub fn decimate(record: &Record, limit: f64, rate: Rate) -> Record {
 }
 
 fn smooth_up(n: usize) -> usize {
-    (n..).find(|&m| smooth(m) == m).unwrap_or(n)
+    (n..).find(|&m| is_smooth(m)).unwrap_or(n)
 }
 
 #[cfg(test)]
@@ -218,23 +349,29 @@ mod tests {
         assert_eq!(thinning(11, true), (11, 1));
     }
 
-    #[test]
-    fn a_motion_within_the_band_is_the_same_at_the_lower_rate() {
-        let n = 6000;
-        let position = |k: usize| (0.01 * k as f64).sin() + 1e-3 * k as f64;
-        let record = Record {
+    fn record(hold: Hold, torque: Vec<f64>, position: Option<Vec<f64>>) -> Record {
+        Record {
             start: 0.0,
             dt: 1e-3,
-            hold: Hold::Linear,
-            torque: (0..n).map(|k| (0.01 * k as f64).cos()).collect(),
+            hold,
+            torque,
             between: None,
-            channels: [Some((0..n).map(position).collect()), None, None, None],
+            logged: None,
+            channels: [position, None, None, None],
             noise: [1e-6; 4],
             corner: [0.0; 2],
             common_noise: 0.0,
             settling: 0.0,
             idle: Vec::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn a_motion_within_the_band_is_the_same_at_the_lower_rate() {
+        let n = 6000;
+        let position = |k: usize| (0.01 * k as f64).sin() + 1e-3 * k as f64;
+        let torque = (0..n).map(|k| (0.01 * k as f64).cos()).collect();
+        let record = record(Hold::Linear, torque, Some((0..n).map(position).collect()));
         // 10 rad/s are 1.6 Hz.
         let slow = decimate(&record, 4.0, Rate { longest: f64::INFINITY, straight: false });
         let every = (slow.dt / record.dt).round() as usize;
@@ -243,6 +380,45 @@ mod tests {
         let far = y.len() / 4..y.len() * 3 / 4;
         for k in far {
             assert!((y[k] - position(k * every)).abs() < 1e-5, "{k} {} {}", y[k], position(k * every));
+        }
+    }
+
+    #[test]
+    fn what_bends_a_torque_bends_it_at_the_rate_of_the_log() {
+        // A slow sine with a dither that changes its sign every other sample: no lower rate has any of that.
+        let n = 6000;
+        let torque = |k: usize| 2.0 * (0.01 * k as f64).sin() + if k % 4 < 2 { 0.8 } else { -0.8 };
+        let mut effects = Settings::default();
+        let (width, limit) = (0.5, 2.2);
+        effects.of_mut(Effect::DeadZone)[0] = width;
+        effects.of_mut(Effect::Saturation)[0] = limit;
+        let bent = |t: f64| {
+            let t = t.clamp(-limit, limit);
+            t - t.clamp(-width, width)
+        };
+        for straight in [false, true] {
+            let at = |torque: Vec<f64>| {
+                let rate = Rate { longest: f64::INFINITY, straight };
+                decimate(&record(Hold::Zoh, torque, None), 4.0, rate)
+            };
+            let logged = at((0..n).map(torque).collect());
+            let through = logged.through(&effects).expect("bent");
+            let expected = at((0..n).map(|k| bent(torque(k))).collect());
+            let rms = |a: &[f64], b: &[f64]| {
+                let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+                (square / a.len() as f64).sqrt()
+            };
+            let error = rms(&through.torque, &expected.torque);
+            let slow: Vec<f64> = logged.torque.iter().map(|t| bent(*t)).collect();
+            assert!(error < 1e-3 && rms(&slow, &expected.torque) > 0.1, "{error}");
+            // A part of it goes through as that part of the whole does.
+            let part = logged.part(20..40).through(&effects).expect("bent");
+            assert_eq!(part.torque, through.torque[20..40]);
+            effects.of_mut(Effect::DeadZone)[0] = 0.0;
+            effects.of_mut(Effect::Saturation)[0] = 1e9;
+            assert!(logged.through(&effects).is_none());
+            effects.of_mut(Effect::DeadZone)[0] = width;
+            effects.of_mut(Effect::Saturation)[0] = limit;
         }
     }
 }

@@ -1,7 +1,10 @@
 //! The record that the diagnosis works on: torque, the measured channels and the noise of each.
 
+use std::sync::Arc;
+
+use super::decimation::LoggedTorque;
 use crate::axis::Hold;
-use crate::effects::Ramp;
+use crate::effects::{Ramp, Settings};
 
 /// Names of the channels, in the order of [`Record::channels`].
 pub const CHANNELS: [&str; 4] = ["theta1", "omega1", "theta2", "omega2"];
@@ -26,6 +29,8 @@ pub struct Record {
     /// The torque where it is known more often than the motion: how many times a sample, at even steps from the sample's own time on, and
     /// its values at those times, N.m.
     pub between: Option<(usize, Vec<f64>)>,
+    /// The torque as it was logged, where this record is one at a lower rate, and the sample of that rate that this record begins with.
+    pub logged: Option<(Arc<LoggedTorque>, usize)>,
     /// `[theta1, omega1, theta2, omega2]`, rad and rad/s, as long as the torque; what was not measured is `None`.
     pub channels: [Option<Vec<f64>>; 4],
     /// Standard deviation of the noise of each channel, in its unit; without meaning where the channel is `None`.
@@ -56,6 +61,7 @@ impl Record {
             hold: self.hold,
             torque: self.torque[range.clone()].to_vec(),
             between: (self.between.as_ref()).map(|(m, t)| (*m, t[m * range.start..m * range.end].to_vec())),
+            logged: (self.logged.as_ref()).map(|(logged, first)| (logged.clone(), first + range.start)),
             channels: std::array::from_fn(|c| self.channels[c].as_ref().map(|v| v[range.clone()].to_vec())),
             noise: self.noise,
             corner: self.corner,
@@ -94,6 +100,32 @@ impl Record {
         };
         let (motor, table) = (of(0), of(1));
         [motor.or(table), table.or(motor)].map(Option::unwrap_or_default)
+    }
+
+    /// The record with the torque that settings let through at the rate of the log, without any channel; `None` where it is at that rate, or
+    /// where they do at any rate what they do at that.
+    #[must_use]
+    pub fn through(&self, effects: &Settings) -> Option<Self> {
+        let (logged, first) = self.logged.as_ref()?;
+        if !effects.active().inputs().iter().any(|e| e.bends_torque()) {
+            return None;
+        }
+        let kept = logged.kept(effects)?;
+        let (instants, mut between) = self.between.clone()?;
+        let last = kept.len() - 1;
+        for (torque, i) in between.iter_mut().zip(first * instants..) {
+            *torque -= kept[i.min(last)];
+        }
+        let torque = between.iter().copied().step_by(instants).collect();
+        let idle = Vec::new();
+        Some(Self {
+            torque,
+            between: Some((instants, between)),
+            logged: None,
+            channels: [const { None }; 4],
+            idle,
+            ..*self
+        })
     }
 
     /// The torque over part `j` of the `parts` equal ones of the interval that begins `ahead` seconds after sample `k`, N.m: of one that
@@ -162,6 +194,7 @@ mod tests {
             hold,
             torque: torque.to_vec(),
             between: None,
+            logged: None,
             channels: [const { None }; 4],
             noise: [0.0; 4],
             corner: [0.0; 2],

@@ -39,6 +39,7 @@ mod tests {
             hold: Hold::Zoh,
             torque: vec![0.0; 4096],
             between: None,
+            logged: None,
             channels: [Some(y), None, None, None],
             noise: [NOISE, 0.0, 0.0, 0.0],
             corner: [0.0; 2],

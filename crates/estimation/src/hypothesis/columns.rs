@@ -53,7 +53,7 @@ impl Problem<'_> {
             return None;
         }
         let h = self.step_within(c, &at.model);
-        let own = trajectory.resisted(&at.model, effects.iter().copied());
+        let own = trajectory.resisted(&at.model, self.record, effects.iter().copied());
         Some(self.change_along(trajectory, &own, &moved(&at.model, c, h), &effects, 1.0 / h))
     }
 
@@ -66,7 +66,7 @@ impl Problem<'_> {
         of: &[Effect],
         factor: f64,
     ) -> [Vec<C>; 2] {
-        let mut change = trajectory.resisted(to, of.iter().copied());
+        let mut change = trajectory.resisted(to, self.record, of.iter().copied());
         for (change, own) in change.iter_mut().zip(own) {
             change.iter_mut().zip(own).for_each(|(c, o)| *c -= o);
         }

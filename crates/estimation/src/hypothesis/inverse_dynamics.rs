@@ -62,7 +62,7 @@ impl InverseDynamics {
     /// What a model lacks, on motor and table, N.m.
     pub fn torque(&self, model: &Model, record: &Record) -> Torques {
         let acts = |e: &Effect| model.effects.is_on(*e) && !e.is_mode();
-        let mut torque = self.trajectory.resisted(model, EFFECTS.iter().copied().filter(acts));
+        let mut torque = self.trajectory.resisted(model, record, EFFECTS.iter().copied().filter(acts));
         add_linear(model, record, &self.measured, &mut torque);
         for (torque, rest) in torque.iter_mut().zip(&self.rest) {
             torque.iter_mut().zip(rest).for_each(|(t, r)| *t += r);

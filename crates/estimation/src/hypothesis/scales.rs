@@ -3,12 +3,13 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use super::arriving::Arriving;
 use super::fit::Fit;
 use super::model::Model;
 use super::problem::Problem;
 use crate::axis::Structure;
 use crate::conditioning::Record;
-use crate::effects::{Effect, Extent, PERIODS, Place, Scale, TorqueHistory};
+use crate::effects::{Effect, Extent, PERIODS, Place, Scale};
 use crate::numerics::level::{self, deviation};
 
 #[derive(Clone)]
@@ -108,14 +109,11 @@ fn is_as_logged(model: &Model) -> bool {
 fn acting(model: &Model, record: &Record, moved: &[f64]) -> (f64, f64) {
     let (model, ahead) = model.on_time();
     let per = record.instants();
-    let h = record.dt / per as f64;
-    let on = model.effects.active();
-    let mut history = TorqueHistory::constant(record.torque[0]);
+    let mut arriving = Arriving::new(&model, record, per, ahead, 0);
     let (mut work, mut square) = (0.0, 0.0);
     for (k, path) in moved.iter().enumerate() {
         for j in 0..per {
-            let logged = record.ramp(k, j, per, ahead);
-            let acts = model.effects.transform_input(&on, logged, h, &mut history);
+            let acts = arriving.over(k, j);
             let mean = 0.5 * (acts.start + acts.end);
             work += mean * path / per as f64;
             square += mean * mean;
@@ -289,6 +287,7 @@ mod tests {
             hold: Hold::Linear,
             torque: (0..=n).map(|k| (w * dt * f64::from(k)).cos()).collect(),
             between: None,
+            logged: None,
             channels: [None, None, None, None],
             noise: [0.0; 4],
             corner: [0.0; 2],

@@ -386,7 +386,7 @@ impl Screening<'_> {
     fn foremost(&self, scales: &Scales, term: Term, grid: Vec<Settings>) -> Vec<Settings> {
         let is_seen_there = term.0.info().place != Place::Sensor;
         let Some(along) = self.trajectory.as_ref().filter(|_| is_seen_there && grid.len() > RUN) else { return grid };
-        let own = along.resisted(&self.fit.model, [term.0]);
+        let own = along.resisted(&self.fit.model, self.problem.record, [term.0]);
         let rows_of = |s: &Settings| Some(Arc::new(self.rows_along(along, &own, term.0, s)));
         let first = self.starts_at(scales, term, &grid, rows_of);
         if first.len() < RUN { grid } else { first.into_iter().take(RUN).map(|s| s.shapes).collect() }

@@ -13,12 +13,13 @@
 //! ([`super::hidden`]). The bandwidth only says along which motion the effects act: the model's own (low: output error) or the measured one
 //! (high: inverse dynamics). It follows from the ratio of discrepancy and noise, as the gain of a Kalman filter does.
 
+use super::arriving::Arriving;
 use super::hidden::Hidden;
 use super::model::Model;
 use super::trajectory::Trajectory;
 use crate::axis::{Axis, Scheme, Structure, substeps_at_speed};
 use crate::conditioning::Record;
-use crate::effects::{Memory, TorqueHistory};
+use crate::effects::Memory;
 
 /// Torques at motor and table, N.m, one a sample each.
 pub type Torques = [Vec<f64>; 2];
@@ -115,6 +116,9 @@ impl Held<'_> {
         let (model, ahead) = &model.on_time();
         let mut memories = Vec::with_capacity(kept.len());
         let n = record.len();
+        if n == 0 {
+            return None;
+        }
         let dt = record.dt;
         let rigid = model.structure == Structure::Rigid;
         let h = dt / per as f64;
@@ -134,7 +138,7 @@ impl Held<'_> {
         };
         let first = initial(record);
         let mut state = axis.resume(first, &model.memory, record.start + ahead);
-        let mut inputs = TorqueHistory::constant(*record.torque.first()?);
+        let mut arriving = Arriving::new(model, record, per, *ahead, 0);
         let sensed = !axis.on().sensors().is_empty();
         let mut history = sensed.then(|| model.effects.initial_readings(axis.on(), state.reading(), dt));
         let mut error = [vec![0.0; n], vec![0.0; n]];
@@ -184,16 +188,10 @@ impl Held<'_> {
                 break;
             }
             for j in 0..per {
-                let logged = record.ramp(k, j, per, *ahead);
-                let ramp = if axis.on().inputs().is_empty() {
-                    logged
-                } else {
-                    model.effects.transform_input(axis.on(), logged, h, &mut inputs)
-                };
                 let begin = time + j as f64 * h;
-                let next = axis.advance(&state, ramp, begin);
+                let next = axis.advance(&state, arriving.over(k, j), begin);
                 if let Some(trajectory) = &mut trajectory {
-                    trajectory.push(&axis, [&state, &next], logged, begin + h);
+                    trajectory.push(&axis, [&state, &next], begin + h);
                 }
                 state = next;
             }
@@ -368,14 +366,10 @@ impl FreeRun {
         let mut state = axis.resume(motion, &self.memory, record.time(range.start) + ahead);
         // What the torque's way in remembers comes from the samples before.
         let warm = range.start.saturating_sub(WARM);
-        let mut inputs = TorqueHistory::constant(record.torque[warm]);
-        let torque = |k: usize, inputs: &mut TorqueHistory<f64>, j: usize| {
-            let ramp = record.ramp(k, j, per, *ahead);
-            if axis.on().inputs().is_empty() { ramp } else { model.effects.transform_input(axis.on(), ramp, h, inputs) }
-        };
+        let mut arriving = Arriving::new(model, record, per, *ahead, warm);
         for k in warm..range.start {
             for j in 0..per {
-                torque(k, &mut inputs, j);
+                arriving.over(k, j);
             }
         }
         let sensed = !axis.on().sensors().is_empty();
@@ -388,8 +382,7 @@ impl FreeRun {
             };
             out.push([r.theta1, r.omega1, r.theta2, r.omega2]);
             for j in 0..per {
-                let ramp = torque(k, &mut inputs, j);
-                state = axis.advance(&state, ramp, record.time(k) + ahead + j as f64 * h);
+                state = axis.advance(&state, arriving.over(k, j), record.time(k) + ahead + j as f64 * h);
             }
             if let Some(history) = &mut history {
                 model.effects.push_sensors(axis.on(), history, state.reading());

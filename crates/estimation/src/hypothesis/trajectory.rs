@@ -3,11 +3,12 @@
 //! A change of an effect's torque changes the motion, too, and by that the effects' torques. Where the model is held to a measured motion,
 //! that is of second order.
 
+use super::arriving::Arriving;
 use super::model::Model;
 use super::tracking::Torques;
 use crate::axis::{Axis, Course, State};
 use crate::conditioning::Record;
-use crate::effects::{Effect, Place, Ramp, TorqueHistory};
+use crate::effects::{Effect, Place};
 
 /// The motion of a run, step by step.
 #[derive(Debug)]
@@ -15,8 +16,6 @@ pub struct Trajectory {
     course: Course,
     /// Inertias that dry friction holds at the end of each step: all that changes is taken by it.
     held: Vec<[bool; 2]>,
-    /// Torque of the log over each step, N.m.
-    logged: Vec<Ramp<f64>>,
     samples: usize,
     /// Steps a sample.
     per: usize,
@@ -31,23 +30,21 @@ impl Trajectory {
         Self {
             course: Course::with_capacity(steps),
             held: Vec::with_capacity(steps),
-            logged: Vec::with_capacity(steps),
             samples: record.len(),
             per,
             h: record.dt / per as f64,
         }
     }
 
-    /// Adds a step between two states, which ends at `time` s, under the torque of the log.
-    pub fn push(&mut self, axis: &Axis, states: [&State; 2], logged: Ramp<f64>, time: f64) {
+    /// Adds a step between two states, which ends at `time` s.
+    pub fn push(&mut self, axis: &Axis, states: [&State; 2], time: f64) {
         self.course.push(states, self.h, time);
         self.held.push(axis.holds(states[1]));
-        self.logged.push(logged);
     }
 
-    /// What some effects of a model resist the motion with, on motor and table, N.m, what they keep of the torque on its way in among it:
-    /// at each sample as the hat function over its neighbours weighs it, which is what an impulse there would be.
-    pub fn resisted(&self, model: &Model, of: impl IntoIterator<Item = Effect>) -> Torques {
+    /// What some effects of a model resist the motion with, on motor and table, N.m, what they keep of the record's torque on its way in among
+    /// it: at each sample as the hat function over its neighbours weighs it, which is what an impulse there would be.
+    pub fn resisted(&self, model: &Model, record: &Record, of: impl IntoIterator<Item = Effect>) -> Torques {
         let mut resisted = [vec![0.0; self.samples], vec![0.0; self.samples]];
         let mut changes_input = false;
         for effect in of {
@@ -62,11 +59,11 @@ impl Trajectory {
             self.add(&mut resisted, push, |i| 0.5 * (std::mem::replace(&mut last, torques[i]) + torques[i]));
         }
         if changes_input {
-            let on = model.effects.active();
-            let mut history = TorqueHistory::constant(self.logged.first().map_or(0.0, |r| r.start));
+            let (model, ahead) = &model.on_time();
+            let mut arriving = Arriving::new(model, record, self.per, *ahead, 0);
             self.add(&mut resisted, [1.0, 0.0], |i| {
-                let logged = self.logged[i];
-                let arrived = model.effects.transform_input(&on, logged, self.h, &mut history);
+                let (k, j) = (i / self.per, i % self.per);
+                let (logged, arrived) = (record.ramp(k, j, self.per, *ahead), arriving.over(k, j));
                 0.5 * (logged.start + logged.end - arrived.start - arrived.end)
             });
         }

@@ -57,6 +57,7 @@ impl Input for DeadZone {
         example: &[5e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
+    const BENDS: bool = true;
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
         let Ramp { start: a, end: b } = ramp;

@@ -251,6 +251,7 @@ impl Input for Saturation {
         example: &[0.02],
         variants: &[Variant { name: "", free: &[0] }],
     };
+    const BENDS: bool = true;
 
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, _h: S, _history: &mut TorqueHistory<S>) -> Ramp<S> {
         Ramp { start: clip(ramp.start, p[0]), end: clip(ramp.end, p[0]) }

@@ -181,6 +181,14 @@ macro_rules! effects {
                 }
             }
 
+            /// Whether it makes of a mean torque another one than the mean of what it makes of each: see [`Input::BENDS`].
+            #[must_use]
+            pub const fn bends_torque(self) -> bool {
+                match self {
+                    $(Self::$name => when!(input, $shape, <$law as Input>::BENDS, false),)*
+                }
+            }
+
             /// The parameter that is the step of a rounding: see [`Sensor::STEP`].
             #[must_use]
             pub const fn step_parameter(self) -> Option<usize> {

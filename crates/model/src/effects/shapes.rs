@@ -269,6 +269,8 @@ pub trait Input {
     const GAIN: Option<usize> = None;
     /// The parameter that is how long ago it looks, s, which the history of torques must cover.
     const DELAY: Option<usize> = None;
+    /// Whether it is no linear filter: what it makes of a mean torque is not the mean of what it makes of each.
+    const BENDS: bool = false;
 
     /// The torque over a step of length `h`, from the torque commanded over it.
     fn transform<S: Scalar>(p: &[S], ramp: Ramp<S>, h: S, history: &mut TorqueHistory<S>) -> Ramp<S>;

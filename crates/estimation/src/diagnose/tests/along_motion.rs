@@ -28,7 +28,7 @@ fn what_a_parameter_changes_along_the_motion_is_what_it_changes_in_a_simulation(
         let mut other = model;
         let value = &mut other.effects.of_mut(effect)[i];
         *value += 0.02 * value.abs().max(effect.info().parameters[i].nominal);
-        let [with, without] = [&other, &model].map(|m| trajectory.resisted(m, [effect]));
+        let [with, without] = [&other, &model].map(|m| trajectory.resisted(m, &record, [effect]));
         let along = |k: usize| with[0][k] + with[1][k] - without[0][k] - without[1][k];
         // As a hat over some samples sees both: where friction turns they differ by a sample.
         let smooth = |y: &dyn Fn(usize) -> f64| -> Vec<f64> {

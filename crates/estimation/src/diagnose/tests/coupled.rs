@@ -196,6 +196,7 @@ fn moved(parameters: Parameters, effects: Settings, acts: &dyn Fn(f64) -> f64, l
         hold: Hold::Zoh,
         torque,
         between: None,
+        logged: None,
         channels,
         noise: [1e-5; 4],
         corner: [0.0; 2],

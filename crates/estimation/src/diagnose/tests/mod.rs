@@ -44,6 +44,7 @@ fn of_one_encoder(start: f64, torque: Vec<f64>, theta: Vec<f64>) -> Record {
         hold: Hold::Zoh,
         torque,
         between: None,
+        logged: None,
         channels: [Some(theta), None, None, None],
         noise: [1e-6; 4],
         corner: [0.0; 2],

@@ -148,6 +148,20 @@ fn driven(n: u32, torque: impl Fn(f64) -> f64, effects: Settings, seed: u64) -> 
 }
 
 #[test]
+fn a_dead_zone_is_told_as_wide_as_it_is_from_a_command_that_changes_faster_than_the_motion() {
+    let width = 1.0;
+    let effects = with(&[(Effect::DeadZone, 0, width), (Effect::ActuatorLag, 0, 6e-3)]);
+    let torque = |t: f64| {
+        let slow: f64 = [(2.0, 3.0), (1.5, 7.1), (1.0, 12.3)].iter().map(|(a, w)| a * (w * t).sin()).sum();
+        slow + if (t / DT).round() as i64 % 4 < 2 { 0.7 } else { -0.7 }
+    };
+    let o = diagnosed(&driven(SAMPLES, torque, effects, 5), INERTIA);
+    assert!(named(&o).contains(&"dead_zone"), "{:?}", ranking(&o));
+    let found = o.improved.effects.of(Effect::DeadZone)[0];
+    assert!((found / width - 1.0).abs() < 0.01 && o.diagnosis.remainder.share < 1e-3, "{found} {:?}", ranking(&o));
+}
+
+#[test]
 fn two_causes_are_told_where_three_others_leave_nothing_either() {
     // A weight on a hinge nearly follows a spring that rests elsewhere, and a load beside it does the rest.
     let effects =
@@ -301,6 +315,7 @@ fn a_log_read_early_is_followed_with_the_torque_to_come() {
         hold: Hold::Zoh,
         torque: (0..n).map(torque).collect(),
         between: None,
+        logged: None,
         channels: [Some(theta), None, None, None],
         noise: [1e-9; 4],
         corner: [0.0; 2],
