@@ -53,7 +53,8 @@ impl Search<'_> {
         if self.leaves_little(chosen) { chosen.terms.len() } else { MOST }
     }
 
-    /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it.
+    /// The hypothesis of largest evidence, where it is another than the chosen one and not that with something small beside it: several effects
+    /// may each be worth nothing without the others, and together explain next to all that it leaves.
     pub fn better_in_pool(&self, chosen: &Fit, pool: &Pool) -> Option<Fit> {
         let share = self.independent([chosen]);
         let most = self.longest_rival(chosen);
@@ -66,7 +67,8 @@ impl Search<'_> {
                     || is_as_long && !at_floor && self.explains_next_to_all(chosen, f);
             }
             // A longer account is believed, as several at once are, where it explains the torque.
-            !is_extension(f, chosen) && (f.terms.len() <= most || self.is_exact(f))
+            let is_another = !is_extension(f, chosen) || self.explains_next_to_all(chosen, f);
+            is_another && (f.terms.len() <= most || self.is_exact(f))
         };
         let rivals: Vec<Fit> = pool.fits().iter().filter(is_rival).cloned().collect();
         let best = self.best(&rivals, share)?;

@@ -246,13 +246,16 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_whose_peak_reaches_into_the_band_is_one() {
-        // Against an inertia of 1 kg.m2; the band ends at 1000 rad/s.
+    fn a_mode_that_swings_twice_as_far_as_its_place_within_the_band_is_one() {
+        // Against an inertia of 1 kg.m2; the band ends at 1000 rad/s. Undamped it swings by 1/(1 - (w/omega)^2) of its place.
         let admits = |omega: f64, ratio: f64| {
             let (inertia, damping) = (0.5, 2.0 * ratio * 0.5 * omega);
             (Effect::FlexibleMode.info().bounds)(&[inertia, inertia * omega * omega, damping], &resting())
         };
-        assert!(admits(990.0, 0.01) && admits(1040.0, 0.06) && !admits(1040.0, 0.01) && !admits(1200.0, 0.06));
+        let twice = 1000.0 * 2.0_f64.sqrt();
+        assert!(admits(990.0, 0.01) && admits(twice, 0.01) && !admits(1.02 * twice, 0.01));
+        // As far as the half-power width of its peak reaches.
+        assert!(admits(1.05 * twice, 0.06) && !admits(1.1 * twice, 0.06));
         // Three periods of it are in a record of a second, however wide its peak is.
         let three = 3.0 * std::f64::consts::TAU;
         assert!(admits(1.01 * three, 0.2) && !admits(0.99 * three, 0.01));

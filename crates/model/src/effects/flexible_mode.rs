@@ -17,7 +17,11 @@ use crate::scalar::Scalar;
 /// Least damping ratio of a mode: that of bare steel. An undamped mode would vibrate on for the whole record from its start.
 const UNDAMPED: f64 = 1e-3;
 
-/// The half-power band of the mode's peak reaches into the excited band, computed against the inertia that the mode is attached to, the
+/// Frequency of a mode, over the end of the excited band, up to which it is one: there it swings twice as far as what it is attached to. One
+/// far beyond follows that, and is a part of its inertia.
+const BEYOND: f64 = std::f64::consts::SQRT_2;
+
+/// The half-power band of the mode's peak comes that near to the excited band, computed against the inertia that the mode is attached to, the
 /// record has periods of it, and the mode is damped, but not overdamped.
 fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
     let (inertia, stiffness, damping) = (p[0], p[1], p[2]);
@@ -25,7 +29,7 @@ fn is_a_mode(p: &[f64], x: &Extent<'_>) -> bool {
     let own = (stiffness / inertia).sqrt();
     inertia > 0.0
         && inertia <= 4.0 * x.inertia[1]
-        && own - 0.5 * damping / inertia <= x.band
+        && own - 0.5 * damping / inertia <= BEYOND * x.band
         && x.has_periods(own)
         && coupled <= 2.0 * x.band
         && (2.0 * UNDAMPED..=0.5).contains(&(damping / (inertia * stiffness).sqrt()))
