@@ -153,21 +153,18 @@ impl<'a> Ascent<'a> {
         }
     }
 
-    /// What was fitted along the way, and is likelier than where the way led, is gone on from.
+    /// What was fitted along the way, and is likelier than where the way led, is gone on from: where no work is left, to its end alone.
     fn what_was_passed_by(&mut self) {
         let (search, pool) = (&self.search, &mut self.pool);
         for _ in 0..MOST {
-            if search.is_over_budget() {
-                break;
+            let has_work_left = !search.is_over_budget();
+            if has_work_left {
+                search.extend_rivals(&self.chosen, pool);
             }
-            search.extend_rivals(&self.chosen, pool);
             let Some(better) = search.better_in_pool(&self.chosen, pool) else { break };
             let terms = better.terms.clone();
             let better = search.pruned(better, pool);
-            let other = search.stepwise(better, pool);
-            if other.terms == self.chosen.terms {
-                break;
-            }
+            let other = if has_work_left { search.stepwise(better, pool) } else { better };
             if search.is_likelier_by(search.independent([&self.chosen]), &other, &self.chosen) {
                 self.chosen = other;
             } else {
