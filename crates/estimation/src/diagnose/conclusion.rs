@@ -118,10 +118,12 @@ impl Search<'_> {
             let left = self.left(&refitted);
             let ranking = &weighing.ranking;
             let without = self.concluded_without(&chosen, least, refitted, ranking, [&given, &parameters], independent);
-            // Beside what it leaves the others may be lost, which beside it are likely: then it stays, and is not named.
+            // Beside what it leaves the others may be lost, which beside it are likely, or others take a part of that: then it stays, and is
+            // not named.
             let others = weighing.likely();
             let is_its_own = inertia_off(&chosen, nominal) < MOVED_FAR;
-            if others + 1 < chosen.terms.len() || !is_understood || !is_its_own || without.named() >= others {
+            let keeps_the_others = without.named() >= others && is_extension(&chosen, &without.chosen);
+            if others + 1 < chosen.terms.len() || !is_understood || !is_its_own || keeps_the_others {
                 return without;
             }
             // What is not named explains nothing: the others are beside what is left without it.

@@ -8,6 +8,8 @@ use crate::hypothesis::fit::{Fit, STEPS};
 
 /// Fits that go on.
 pub const RACING: usize = 6;
+/// Others that do because their last step promises the most.
+const PROMISED: usize = 2;
 /// Variance of what a few steps leave, over that of the best, from which no further ones are made.
 const OUT_OF_RACE: f64 = 30.0;
 /// Steps between two looks at how a fit stands beside the others.
@@ -26,8 +28,13 @@ impl Search<'_> {
         let likeliest = || fits.iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)));
         let best = rival.or_else(likeliest).map_or([0.0; 2], |f| f.discrepancy);
         let is_out = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > OUT_OF_RACE * best[i]);
-        let mut racing: Vec<usize> =
-            first_of_each(&fits).into_iter().take(RACING).filter(|i| !is_out(&fits[*i])).collect();
+        // Where a round would bring it at the pace of its last step: from far behind, too.
+        let promise = |i: &usize| evidence(&fits[*i]) + ROUND as f64 * share * fits[*i].gained.max(0.0);
+        let mut racing = first_of_each(&fits);
+        let mut others = racing.split_off(RACING.min(racing.len()));
+        others.sort_by(|a, b| promise(b).total_cmp(&promise(a)));
+        racing.extend(others.into_iter().take(PROMISED));
+        racing.retain(|i| !is_out(&fits[*i]));
         let mut first = fits.iter().filter(|f| idle(f)).chain(rival).map(evidence).fold(f64::NEG_INFINITY, f64::max);
         for _ in 0..STEPS / ROUND {
             let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);

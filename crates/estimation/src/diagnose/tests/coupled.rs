@@ -437,3 +437,16 @@ fn of_accounts_of_one_length_that_leave_next_to_nothing_the_likelier_is_told_and
         assert!(search.better_in_pool(&motor, &pool).is_none());
     });
 }
+
+#[test]
+fn a_start_that_is_behind_and_gains_the_most_goes_on() {
+    let mode = [(Effect::FlexibleMode, 0, 3e-6), (Effect::FlexibleMode, 1, 3.3e-3), (Effect::FlexibleMode, 2, 1.2e-5)];
+    let sine = [(Effect::Disturbance, 0, 0.022), (Effect::Disturbance, 1, 5.03), (Effect::Disturbance, 2, -2.5)];
+    let effects = with(&[&mode[..], &sine, &[(Effect::LoadMotor, 0, 0.06)]].concat());
+    let sweep = |t: f64| {
+        let tone = |j: i32| 0.015 * (4.3 * f64::from(j) * t + 0.16 * f64::from(j * j)).sin();
+        0.06 + (1..20).map(tone).sum::<f64>()
+    };
+    let o = diagnosed_as(&moved(Parameters::PAPER, effects, &sweep, 0), Structure::TwoInertia, Parameters::PAPER);
+    assert_eq!(named(&o), ["disturbance", "flexible_mode", "load_torque"], "{:#?}", ranking(&o));
+}
