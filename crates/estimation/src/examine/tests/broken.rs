@@ -86,6 +86,8 @@ fn broken() -> Vec<(&'static str, Columns, &'static [&'static str])> {
     add("theta1 within a turn", &mut |c| c.v[1].iter_mut().for_each(|v| *v = v.rem_euclid(1.0)), &["wrapped"]);
     add("torque late", &mut |c| c.v[0].rotate_right(12), &["misaligned"]);
     add("1e308", &mut |c| c.v[1][17] = 1e308, &["magnitude"]);
+    add("1e-300", &mut |c| c.v[1][17] = 1e-300, &["magnitude"]);
+    add("1e-300 for a while", &mut |c| c.v[1][17..40].fill(1e-300), &["magnitude"]);
     add("dt of 1e300", &mut |c| c.dt = 1e300, &["interval"]);
     add(
         "the motor's encoder twice, the second time a cycle later and in another unit",

@@ -98,3 +98,9 @@ fn real_records_are_sound() {
         assert!(!found.refuses(), "{file}");
     }
 }
+
+#[test]
+fn a_torque_that_dies_away_to_nothing_is_no_mark_of_a_missing_value() {
+    let dying: Vec<f64> = (0..1500).map(|k| 0.9_f64.powi(k)).collect();
+    assert!(dying[1499] < 1e-68 && (0..1500).all(|k| !super::super::is_no_reading(&dying, k)));
+}
