@@ -439,7 +439,7 @@ fn of_accounts_of_one_length_that_leave_next_to_nothing_the_likelier_is_told_and
 }
 
 #[test]
-fn a_start_that_is_behind_and_gains_the_most_goes_on() {
+fn a_mode_of_the_table_is_found_beside_a_sine_and_a_load() {
     let mode = [(Effect::FlexibleMode, 0, 3e-6), (Effect::FlexibleMode, 1, 3.3e-3), (Effect::FlexibleMode, 2, 1.2e-5)];
     let sine = [(Effect::Disturbance, 0, 0.022), (Effect::Disturbance, 1, 5.03), (Effect::Disturbance, 2, -2.5)];
     let effects = with(&[&mode[..], &sine, &[(Effect::LoadMotor, 0, 0.06)]].concat());
