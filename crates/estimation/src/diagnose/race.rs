@@ -8,8 +8,6 @@ use crate::hypothesis::fit::{Fit, STEPS};
 
 /// Fits that go on.
 pub const RACING: usize = 6;
-/// Others that do because their last step promises the most.
-const PROMISED: usize = 2;
 /// Variance of what a few steps leave, over that of the best, from which no further ones are made.
 const OUT_OF_RACE: f64 = 30.0;
 /// Steps between two looks at how a fit stands beside the others.
@@ -28,10 +26,8 @@ impl Search<'_> {
         let likeliest = || fits.iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)));
         let best = rival.or_else(likeliest).map_or([0.0; 2], |f| f.discrepancy);
         let is_out = |f: &Fit| (0..self.band().equations()).all(|i| f.discrepancy[i] > OUT_OF_RACE * best[i]);
-        // Where a round would bring it at the pace of its last step: from far behind, too.
-        let promise = |i: usize| evidence(&fits[i]) + ROUND as f64 * share * fits[i].gained.max(0.0);
-        let mut racing = with_a_place(first_of_each(&fits), promise);
-        racing.retain(|i| !is_out(&fits[*i]));
+        let mut racing: Vec<usize> =
+            first_of_each(&fits).into_iter().take(RACING).filter(|i| !is_out(&fits[*i])).collect();
         let mut first = fits.iter().filter(|f| idle(f)).chain(rival).map(evidence).fold(f64::NEG_INFINITY, f64::max);
         for _ in 0..STEPS / ROUND {
             let on = |f: &Fit| self.problem.fit(&f.model, &f.terms, f.discrepancy, ROUND);
@@ -76,14 +72,6 @@ fn first_of_each(fits: &[Fit]) -> Vec<usize> {
     let (mut first, others): (Vec<usize>, Vec<usize>) = (0..fits.len()).partition(is_first);
     first.extend(others);
     first
-}
-
-/// The first of an order that go on, and those of the others that promise the most.
-fn with_a_place(mut order: Vec<usize>, promise: impl Fn(usize) -> f64) -> Vec<usize> {
-    let mut others = order.split_off(RACING.min(order.len()));
-    others.sort_by(|a, b| promise(*b).total_cmp(&promise(*a)));
-    order.extend(others.into_iter().take(PROMISED));
-    order
 }
 
 /// Whether a fit has come back to the one that it has in it. One that is less likely than that has not: it ends no lower.
@@ -134,14 +122,6 @@ mod tests {
             of(Effect::MotorMode, 0),
         ];
         assert_eq!(first_of_each(&fits), [0, 2, 4, 1, 3]);
-    }
-
-    #[test]
-    fn of_those_without_a_place_the_two_go_on_that_promise_the_most() {
-        let order = vec![3, 0, 1, 2, 4, 5, 6, 7, 8];
-        let promise = [0.0, 9.0, 0.0, -5.0, 0.0, 0.0, -3.0, 1.0, 20.0];
-        assert_eq!(with_a_place(order, |i| promise[i]), [3, 0, 1, 2, 4, 5, 8, 7]);
-        assert_eq!(with_a_place(vec![1, 0], |i| promise[i]), [1, 0]);
     }
 
     #[test]

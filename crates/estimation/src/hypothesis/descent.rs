@@ -69,8 +69,6 @@ pub struct Descent<'a> {
     std: Vec<f64>,
     columns: Vec<[Vec<C>; 2]>,
     iterations: usize,
-    /// What the last step gained in log likelihood, with what followed it.
-    gained: f64,
     /// Whether the last step would have taken an effect out of what physics lets it be.
     leaves: bool,
     /// What is held in the first steps.
@@ -119,7 +117,6 @@ impl<'a> Descent<'a> {
             std: Vec::new(),
             columns: Vec::new(),
             iterations: 0,
-            gained: 0.0,
             leaves: false,
             first: First::Sizes,
             tight: None,
@@ -145,7 +142,6 @@ impl<'a> Descent<'a> {
             std: fit.std.clone(),
             columns: fit.columns.clone(),
             iterations: fit.iterations,
-            gained: fit.gained,
             leaves: fit.at_bound,
             first: First::Sizes,
             tight: None,
@@ -210,7 +206,6 @@ impl<'a> Descent<'a> {
         let mut damping = 0.0;
         for i in 0..effort {
             self.iterations += 1;
-            let before = self.log_likelihood();
             let gained = self.step(&mut damping, i < FIRST_STEPS || self.first == First::Inertias)?;
             let found = band.discrepancy(&self.at.rows);
             let likelier = band.log_likelihood(&self.at.rows, found) > self.log_likelihood();
@@ -220,7 +215,6 @@ impl<'a> Descent<'a> {
             self.at.s = [s[0].max(least[0]), s[1].max(least[1])];
             band.weigh(&mut self.at.rows, self.at.s);
             let adapted = adapts && self.adapt_bandwidth();
-            self.gained = self.log_likelihood() - before;
             if converged && !adapted && gained.is_none_or(|g| g < WORTH) {
                 if !(self.is_by_secant && self.problem.exact) {
                     break;
@@ -422,7 +416,6 @@ impl<'a> Descent<'a> {
             bandwidth: self.at.bandwidth,
             rows: self.at.rows,
             iterations: self.iterations,
-            gained: self.gained,
             converged: false,
             at_bound,
         }

@@ -51,8 +51,6 @@ pub struct Fit {
     pub log_prior: f64,
     /// Steps that the fit took.
     pub iterations: usize,
-    /// What the last of them gained in log likelihood.
-    pub gained: f64,
     /// Whether it was made to its end.
     pub converged: bool,
     /// Whether an effect stands where physics would not let it go on to where the record wants it: at the limit where it is another.
@@ -145,7 +143,6 @@ impl Problem<'_> {
             log_prior: 0.0,
             rows: at.rows,
             iterations: 0,
-            gained: 0.0,
             converged: false,
             at_bound: false,
         }
@@ -199,7 +196,6 @@ impl Fit {
             log_likelihood,
             log_prior: 0.0,
             iterations: 1,
-            gained: 0.0,
             converged: true,
             at_bound: false,
         }
