@@ -9,9 +9,10 @@ use crate::effects::{ActiveEffects, Ramp, TorqueHistory};
 /// The torque that arrives at the motor, part by part of the samples.
 pub struct Arriving<'a> {
     model: &'a Model,
-    /// The effects that are on; of those on the torque's way in none where the record's own torque has passed them.
+    /// The effects that are on.
     on: ActiveEffects,
     record: Cow<'a, Record>,
+    /// Whether the record's torque has passed those on its way in, or there are none.
     has_passed: bool,
     history: TorqueHistory<f64>,
     /// Parts of a sample.

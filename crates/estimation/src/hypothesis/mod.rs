@@ -1,8 +1,8 @@
 //! A hypothesis, a set of effects beside the axis' own parameters, fitted to a record; and its evidence.
 //!
 //! One likelihood ([`likelihood`]) with the sensors' noise and the model's own discrepancy in it: of the torque that a model lacks to
-//! follow the record ([`tracking`]; [`arriving`] is the torque that drives it), in the band of its motion ([`band`]). [`problem`] is a record so compared, [`columns`] how what a model
-//! lacks changes with each free value and [`secant`] how those are kept from step to step, [`descent`] the way to the likeliest of them and
+//! follow the record ([`tracking`]; [`arriving`] is the torque that drives it), in the band of its motion ([`band`]). [`problem`] is a
+//! record so compared, [`columns`] how what a model lacks changes with each free value and [`secant`] how those are kept from step to step, [`descent`] the way to the likeliest of them and
 //! [`fit`] where it ends; [`evidence`] how well the
 //! record speaks for that, [`scatter`] how well it knows the parameters and [`determined`] which of them it does not, [`scales`] what of an
 //! effect it could show, [`candidate`] what one would change and [`starts`] where a fit with one more begins, [`subsets`] where one with several at once does; on a rigid axis such fits are compared along the motion of one
