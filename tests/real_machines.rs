@@ -27,23 +27,9 @@ fn record(file: &str, torque: &str, channels: [Option<&str>; 4]) -> Option<(Reco
     let channels = channels.map(|c| c.map(column));
     let noise = estimate_noise(&torque, &[0, 1, 2, 3].map(|c: usize| channels[c].as_deref()), None);
     let std = noise.std.map(|s| s.max(1e-12));
-    Some((
-        Record {
-            start: time[0],
-            dt,
-            hold: Hold::Zoh,
-            torque,
-            between: None,
-            logged: None,
-            channels,
-            noise: std,
-            corner: noise.corner.map(|c| c / dt),
-            common_noise: noise.common,
-            settling: 0.0,
-            idle: Vec::new(),
-        },
-        noise,
-    ))
+    let plain = Record::new(dt, Hold::Zoh, torque, channels);
+    let corner = noise.corner.map(|c| c / dt);
+    Some((Record { start: time[0], noise: std, corner, common_noise: noise.common, ..plain }, noise))
 }
 
 /// What `diagnose` answers to a measured log, by the axis file that `init` writes of it or by the one given.

@@ -21,20 +21,9 @@ fn model(machine: &Machine) -> Model {
 /// A trace as the loop sees it: what the drive controls, without noise.
 fn logged(trace: &Trace) -> Record {
     let channel = |s| trace.get(s).map(<[f64]>::to_vec);
-    Record {
-        start: trace.start,
-        dt: trace.dt,
-        hold: trace.hold,
-        torque: channel(Signal::T).unwrap_or_default(),
-        between: None,
-        logged: None,
-        channels: [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(channel),
-        noise: [0.0; 4],
-        corner: [0.0; 2],
-        common_noise: 0.0,
-        settling: 0.0,
-        idle: Vec::new(),
-    }
+    let channels = [Signal::Theta1, Signal::Omega1, Signal::Theta2, Signal::Omega2].map(channel);
+    let torque = channel(Signal::T).unwrap_or_default();
+    Record { start: trace.start, ..Record::new(trace.dt, trace.hold, torque, channels) }
 }
 
 /// The machine with parameters set by the names that the FMU has for them.

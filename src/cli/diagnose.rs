@@ -359,17 +359,11 @@ pub(super) fn record(path: &Path, machine: &Machine, believed: Believed) -> anyh
     });
     let record = Record {
         start: trace.start,
-        dt: trace.dt,
-        hold: trace.hold,
-        torque,
-        between: None,
-        logged: None,
-        channels,
         noise: std,
         corner: noise.corner.map(|c| c / trace.dt),
         common_noise: noise.common,
-        settling: 0.0,
         idle,
+        ..Record::new(trace.dt, trace.hold, torque, channels)
     };
     let [reference, command] = [Signal::Reference, Signal::Command].map(|s| trace.get(s).map(<[f64]>::to_vec));
     Ok(Recorded { record, noise, warnings, reference, command, driven })

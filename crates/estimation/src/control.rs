@@ -154,20 +154,8 @@ mod tests {
             let gains = if table { Gains { kp: 4.0, ..gains } } else { gains };
             let controller = Controller { gains, delay, measured_speed, table };
             let silent = |n: usize| vec![0.0; n];
-            let mut record = Record {
-                start: 0.0,
-                dt,
-                hold: Hold::Zoh,
-                torque: silent(3000),
-                between: None,
-                logged: None,
-                channels: [Some(silent(3000)), None, Some(silent(3000)), None],
-                noise: [1e-9; 4],
-                corner: [0.0; 2],
-                common_noise: 0.0,
-                settling: 0.0,
-                idle: Vec::new(),
-            };
+            let channels = [Some(silent(3000)), None, Some(silent(3000)), None];
+            let mut record = Record { noise: [1e-9; 4], ..Record::new(dt, Hold::Zoh, silent(3000), channels) };
             let nothing = silent(3000);
             let made =
                 UnderControl { record: &record, reference: &reference, command: &nothing, controller: &controller };

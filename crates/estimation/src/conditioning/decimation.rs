@@ -350,20 +350,7 @@ mod tests {
     }
 
     fn record(hold: Hold, torque: Vec<f64>, position: Option<Vec<f64>>) -> Record {
-        Record {
-            start: 0.0,
-            dt: 1e-3,
-            hold,
-            torque,
-            between: None,
-            logged: None,
-            channels: [position, None, None, None],
-            noise: [1e-6; 4],
-            corner: [0.0; 2],
-            common_noise: 0.0,
-            settling: 0.0,
-            idle: Vec::new(),
-        }
+        Record { noise: [1e-6; 4], ..Record::new(1e-3, hold, torque, [position, None, None, None]) }
     }
 
     #[test]

@@ -46,6 +46,25 @@ pub struct Record {
 }
 
 impl Record {
+    /// A record from the time zero on, without noise: its torque, N.m, and its channels, each as long.
+    #[must_use]
+    pub fn new(dt: f64, hold: Hold, torque: Vec<f64>, channels: [Option<Vec<f64>>; 4]) -> Self {
+        Self {
+            start: 0.0,
+            dt,
+            hold,
+            torque,
+            between: None,
+            logged: None,
+            channels,
+            noise: [0.0; 4],
+            corner: [0.0; 2],
+            common_noise: 0.0,
+            settling: 0.0,
+            idle: Vec::new(),
+        }
+    }
+
     /// Number of samples.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -188,20 +207,7 @@ mod tests {
     use super::*;
 
     fn record(hold: Hold, torque: &[f64]) -> Record {
-        Record {
-            start: 0.0,
-            dt: 0.5,
-            hold,
-            torque: torque.to_vec(),
-            between: None,
-            logged: None,
-            channels: [const { None }; 4],
-            noise: [0.0; 4],
-            corner: [0.0; 2],
-            common_noise: 0.0,
-            settling: 0.0,
-            idle: Vec::new(),
-        }
+        Record::new(0.5, hold, torque.to_vec(), [const { None }; 4])
     }
 
     #[test]

@@ -33,20 +33,8 @@ mod tests {
                 position(k) + NOISE * e
             })
             .collect();
-        Record {
-            start: 0.0,
-            dt: 1e-3,
-            hold: Hold::Zoh,
-            torque: vec![0.0; 4096],
-            between: None,
-            logged: None,
-            channels: [Some(y), None, None, None],
-            noise: [NOISE, 0.0, 0.0, 0.0],
-            corner: [0.0; 2],
-            common_noise: 0.0,
-            settling: 0.0,
-            idle: Vec::new(),
-        }
+        let plain = Record::new(1e-3, Hold::Zoh, vec![0.0; 4096], [Some(y), None, None, None]);
+        Record { noise: [NOISE, 0.0, 0.0, 0.0], ..plain }
     }
 
     fn motion(k: usize) -> f64 {

@@ -281,20 +281,8 @@ mod tests {
     fn a_torque_that_comes_late_works_as_much_as_its_phase_at_the_motion_says() {
         // T = cos(w (t - delay)) along theta' = cos(w t): a mean power of cos(w delay)/2.
         let (n, dt, w) = (20_000, 1e-3, 25.0);
-        let record = Record {
-            start: 0.0,
-            dt,
-            hold: Hold::Linear,
-            torque: (0..=n).map(|k| (w * dt * f64::from(k)).cos()).collect(),
-            between: None,
-            logged: None,
-            channels: [None, None, None, None],
-            noise: [0.0; 4],
-            corner: [0.0; 2],
-            common_noise: 0.0,
-            settling: 0.0,
-            idle: Vec::new(),
-        };
+        let torque = (0..=n).map(|k| (w * dt * f64::from(k)).cos()).collect();
+        let record = Record::new(dt, Hold::Linear, torque, [const { None }; 4]);
         let angle = |k: i32| (w * dt * f64::from(k)).sin() / w;
         let moved: Vec<f64> = (0..n).map(|k| angle(k + 1) - angle(k)).collect();
         let mut model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());

@@ -189,21 +189,7 @@ fn moved(parameters: Parameters, effects: Settings, acts: &dyn Fn(f64) -> f64, l
     for theta in motor.iter_mut().chain(&mut table) {
         *theta += noise(&mut rng, 1e-5);
     }
-    let channels = [Some(motor), None, Some(table), None];
-    Record {
-        start: 0.0,
-        dt,
-        hold: Hold::Zoh,
-        torque,
-        between: None,
-        logged: None,
-        channels,
-        noise: [1e-5; 4],
-        corner: [0.0; 2],
-        common_noise: 0.0,
-        settling: 0.0,
-        idle: Vec::new(),
-    }
+    Record { noise: [1e-5; 4], ..Record::new(dt, Hold::Zoh, torque, [Some(motor), None, Some(table), None]) }
 }
 
 #[test]

@@ -38,20 +38,7 @@ fn noise(rng: &mut ChaCha8Rng, size: f64) -> f64 {
 
 /// A record of one encoder with a noise of 1e-6 rad.
 fn of_one_encoder(start: f64, torque: Vec<f64>, theta: Vec<f64>) -> Record {
-    Record {
-        start,
-        dt: DT,
-        hold: Hold::Zoh,
-        torque,
-        between: None,
-        logged: None,
-        channels: [Some(theta), None, None, None],
-        noise: [1e-6; 4],
-        corner: [0.0; 2],
-        common_noise: 0.0,
-        settling: 0.0,
-        idle: Vec::new(),
-    }
+    Record { start, noise: [1e-6; 4], ..Record::new(DT, Hold::Zoh, torque, [Some(theta), None, None, None]) }
 }
 
 /// A record of moves to and fro under a position controller; `foreign` is a torque that no model knows of.

@@ -309,20 +309,7 @@ fn a_log_read_early_is_followed_with_the_torque_to_come() {
         theta.push(read.theta1());
         state = on.advance(&read, held(k + 1), 0.0);
     }
-    let record = Record {
-        start: 0.0,
-        dt: DT,
-        hold: Hold::Zoh,
-        torque: (0..n).map(torque).collect(),
-        between: None,
-        logged: None,
-        channels: [Some(theta), None, None, None],
-        noise: [1e-9; 4],
-        corner: [0.0; 2],
-        common_noise: 0.0,
-        settling: 0.0,
-        idle: Vec::new(),
-    };
+    let record = Record { noise: [1e-9; 4], ..of_one_encoder(0.0, (0..n).map(torque).collect(), theta) };
     let lacks = |delay: f64| {
         let latch = with(&[(Effect::Latch, 0, delay)]);
         let model = Model::new(parameters(INERTIA), Structure::Rigid, latch);
