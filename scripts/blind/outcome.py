@@ -95,6 +95,19 @@ def judge(seal: dict, answer: dict | None, seconds: float | None, memory: float 
     }
 
 
+def to_withhold(seal: dict, turn: int) -> dict:
+    """The effect of a case whose family is taken out of the library: by turns, so that each of several comes up."""
+    return seal["effects"][turn % len(seal["effects"])]
+
+
+def withheld(rows: list[dict]) -> dict:
+    """Figures of answers by a library that lacks a cause: what is then named beside those that are there is false."""
+    told = [r for r in rows if r["outcome"] != "failed"]
+    return {"nothing_false": share(told, lambda r: not r["false"]), "confidently_wrong": share(told, lambda r: r["confidently_wrong"]),
+            "unexplained": share(told, lambda r: r["outcome"] == "unexplained"),
+            "calibration": reliability.table([p for r in told for p in r["probabilities"]])}
+
+
 def share(rows, test) -> dict:
     hits, n = sum(bool(test(r)) for r in rows), len(rows)
     return {"hits": hits, "n": n, "share": hits / n if n else None, "wilson": list(wilson(hits, n))}
@@ -153,6 +166,10 @@ AIMS = (("right", "all conditions together right", ">= 90 %"), ("sick_right", "o
         ("intervals", "95 % intervals of parameters that hold the truth", "85 to 99 %"))
 
 
+WITHHELD = (("nothing_false", "nothing false named"), ("confidently_wrong", f"a false cause at {SURE:g} or more"),
+            ("unexplained", "verdict unexplained"))
+
+
 def check(need: str, s: dict) -> str | None:
     """The threshold `name=value` missed, in words, or None."""
     name, _, text = need.partition("=")
@@ -180,11 +197,13 @@ def markdown(s: dict, rows: list[dict], title: str, picture: str) -> str:
     lines += [f"| {text} | {percent(s[key])} | {aim} |" for key, text, aim in AIMS]
     for key, text, aim in (("calibration", "calibration error of the causes named", "<= 5 %"),
                            ("calibration_of_suspects", "the same with suspects under `unexplained`", "")):
-        e = s[key]["ece"]
-        lines.append(f"| {text} | {'-' if e is None else f'{100 * e:.1f} %'} ({s[key]['n']} causes) | {aim} |")
+        lines.append(f"| {text} | {reliability.percent_of(s[key])} | {aim} |")
     for key, text, aim in (("seconds", "seconds a case", "20 s"), ("memory_mb", "MB a case, peak", "")):
         if s[key]:
             lines.append(f"| {text}: median, largest | {s[key]['median']:.1f}, {s[key]['max']:.1f} | {aim} |")
+    if w := s.get("withheld"):
+        lines += [f"| a family withheld: {text} | {percent(w[key])} | |" for key, text in WITHHELD]
+        lines.append(f"| a family withheld: calibration error of the causes named | {reliability.percent_of(w['calibration'])} | |")
     lines += ["", "Right with remainder: every required cause, nothing false, and what stays is stated. Incomplete: nothing false, a required",
               "cause is missing. Extra: all required and a false one. Wrong: a false one, and a required one is missing. Missed: an effect that is there, and",
               "the verdict is no gap or parameters.", "", "## By group", "", *rows_of(s["by"]["group"] | {"all": s["all"]})]

@@ -21,6 +21,12 @@ def table(pairs) -> dict:
     return {"n": len(pairs), "ece": error / len(pairs) if pairs else None, "bins": bins}
 
 
+def percent_of(t: dict) -> str:
+    """The calibration error of a table, and of how many causes it is."""
+    error = t["ece"]
+    return f"{'-' if error is None else f'{100 * error:.1f} %'} ({t['n']} causes)"
+
+
 def markdown(t: dict) -> list[str]:
     lines = ["| told between | causes | mean told | right | 95 % interval |", "|---|---|---|---|---|"]
     lines += [f"| {b['from']:g} and {b['to']:g} | {b['n']} | {100 * b['told']:.1f} % | {100 * b['right']:.1f} % | "

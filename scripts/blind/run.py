@@ -107,6 +107,8 @@ def main(argv=None) -> int:
     parser.add_argument("--conditions", help="second edition: only cases with one of these conditions, comma-separated, as in the tables")
     parser.add_argument("--only", help="only these cases, comma-separated")
     parser.add_argument("--no-without", action="store_true", help="skip the abstention run (half of the time)")
+    parser.add_argument("--withheld", action="store_true",
+                        help="second edition: each case with causes again, the family of one of them out of the library")
     parser.add_argument("--rescore", action="store_true", help="score the answers that are there; run only what is missing")
     parser.add_argument("--timeout", type=float, default=300.0, help="seconds a case")
     parser.add_argument("--need", action="append", default=[], help="threshold, e.g. family=0.98; repeatable")
@@ -141,6 +143,14 @@ def main(argv=None) -> int:
     def task(name, out, without=()):
         return lambda: diagnose(eixo, cases[name], out, threads, args.timeout, without)
 
+    def run_without(families: dict) -> dict:
+        """Diagnoses with a family of effects out of the library; families: {case: family}; answers by case."""
+        out = {n: answers / f"{n}.without.json" for n in families}
+        of_family = lambda family: [e for e, (f, _) in effects.KNOWN.items() if f == family]
+        todo = {n: task(n, out[n], of_family(f)) for n, f in families.items() if not (args.rescore and out[n].exists())}
+        run_all(todo, args.jobs, "diagnosed without the cause")
+        return {n: load(path) for n, path in out.items()}
+
     todo = {n: task(n, answers / f"{n}.json") for n in picked if not (args.rescore and (answers / f"{n}.json").exists())}
     spent = {}
     for what in ("seconds", "memory_mb"):
@@ -156,23 +166,17 @@ def main(argv=None) -> int:
     if second:
         rows = [outcome.judge(seals[n], load(answers / f"{n}.json"), times.get(n), spent["memory_mb"].get(n)) for n in picked]
         figures = outcome.summary(rows)
+        if args.withheld:
+            of = [n for n in picked if seals[n]["effects"]]
+            told = run_without({n: outcome.to_withhold(seals[n], k)["family"] for k, n in enumerate(of)})
+            figures["withheld"] = outcome.withheld([outcome.judge(seals[n], told[n], None) for n in of])
         (args.cases / "reliability.svg").write_text(reliability.svg(figures["calibration"]))
         title = f"Withheld-effect check, second edition: {len(rows)} cases, half: {args.half}"
         return finish(args, {"figures": figures, "cases": rows}, outcome.markdown(figures, rows, title, "reliability.svg"), True)
     without = []
     if not args.no_without:
-        todo, singles = {}, []
-        for n, seal in seals.items():
-            if len(seal["effects"]) != 1 or seal["effects"][0]["id"] in effects.ABSORBED:
-                continue
-            singles.append(n)
-            out = answers / f"{n}.without.json"
-            family = seal["effects"][0]["family"]
-            if not (args.rescore and out.exists()):
-                todo[n] = task(n, out, [e for e, (f, _) in effects.FAMILY.items() if f == family])
-        run_all(todo, args.jobs, "diagnosed without the cause")
-        for n in singles:
-            answer = load(answers / f"{n}.without.json")
+        of = {n: seal["effects"][0] for n, seal in seals.items() if len(seal["effects"]) == 1}
+        for n, answer in run_without({n: e["family"] for n, e in of.items() if e["id"] not in effects.ABSORBED}).items():
             without.append({"case": n, "class": seals[n]["class"], "outcome": score.abstained(seals[n], answer),
                             "told": score.named(answer)[2], "closure": score.closure(answer)})
     rows = [score.judge(seals[n], load(answers / f"{n}.json"), times.get(n)) for n in picked]

@@ -118,6 +118,15 @@ def test_the_summary_counts_and_the_tables_show_it():
         outcome.check("nothing=1", s)
 
 
+def test_with_a_family_withheld_what_is_named_in_its_place_is_false_and_the_others_are_right():
+    two = seal("two", ("coulomb_motor", "gravity"))
+    assert [outcome.to_withhold(two, turn)["id"] for turn in range(3)] == ["coulomb_motor", "gravity", "coulomb_motor"]
+    answers = (answer(cause("gravity", 0.9)), answer(cause("gravity", 0.8), cause("viscous_motor", 0.95)), answer(verdict="unexplained"), None)
+    w = outcome.withheld([outcome.judge(two, a, None) for a in answers])
+    assert [w[key]["hits"] for key in ("nothing_false", "confidently_wrong", "unexplained")] == [2, 1, 1]
+    assert w["nothing_false"]["n"] == 3 and w["calibration"]["n"] == 3
+
+
 def test_the_calibration_error_is_the_weighted_distance_from_the_diagonal():
     pairs = [(0.92, True)] * 9 + [(0.92, False)] + [(0.55, True)] * 2 + [(0.55, False)] * 8 + [(1.0, True)] * 5
     t = reliability.table(pairs)
@@ -161,6 +170,12 @@ def test_draw_run_and_score_with_a_stand_in(tmp_path, capsys):
     cut = next(r for r in result["cases"] if r["case"] == slow)
     assert cut["seconds"] is None and "cut off" in (tmp_path / "answers" / f"{slow}.err").read_text()
     assert all(r["memory_mb"] > 1 for r in result["cases"]) and (tmp_path / "reliability.svg").exists()
+    # The stand-in names the cause however much of the library is taken away: then it has an answer of its own for each case with causes.
+    assert run.main(argv + ["--withheld", "--rescore"]) == 0
+    of = [n for n in index if json.loads((tmp_path / "seals" / f"{n}.json").read_text())["effects"]]
+    assert sorted(p.name.split(".")[0] for p in (tmp_path / "answers").glob("*.without.json")) == sorted(of)
+    assert json.loads((tmp_path / "result.json").read_text())["figures"]["withheld"]["unexplained"]["n"] == len(of)
+    assert "a family withheld: nothing false named" in (tmp_path / "result.md").read_text()
     some = index[slow]["conditions"][0]
     assert run.main(argv[:-2] + ["--rescore", "--timeout", "1", "--axes", index[slow]["axis"], "--conditions", some, "--need", "right=1"]) == 1
     assert run.main(argv + ["--only", "nothing"]) == 2
