@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use itertools::Itertools;
 use rayon::prelude::*;
 
 use super::pool::Pool;
@@ -108,12 +109,7 @@ impl Search<'_> {
         // Forms that free more than another are looked at where that other is among the best.
         let mut points = of(&suspects, false);
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let mut promising: Vec<Effect> = Vec::new();
-        for p in &points {
-            if promising.len() < PROMISING && !promising.contains(&p.term.0) {
-                promising.push(p.term.0);
-            }
-        }
+        let promising: Vec<Effect> = points.iter().map(|p| p.term.0).unique().take(PROMISING).collect();
         points.extend(of(&promising, true));
         points.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let points = gone_on_from(points, |p| p.term.0);
@@ -242,15 +238,8 @@ impl Search<'_> {
 /// Of starts, best first, two for each place in the race, and the first of every promising effect beside those: what a regression promises
 /// of the forms of one friction differs by less than what the fits come to.
 fn gone_on_from<P>(starts: Vec<P>, effect: impl Fn(&P) -> Effect) -> Vec<P> {
-    let mut seen: Vec<Effect> = Vec::new();
-    let is_gone_on_from = |(at, start): (usize, P)| {
-        let own = effect(&start);
-        let is_first = !seen.contains(&own);
-        if is_first {
-            seen.push(own);
-        }
-        (at < 2 * RACING || is_first && seen.len() <= 2 * PROMISING).then_some(start)
-    };
+    let first: Vec<usize> = (0..starts.len()).unique_by(|&at| effect(&starts[at])).take(2 * PROMISING).collect();
+    let is_gone_on_from = |(at, start): (usize, P)| (at < 2 * RACING || first.contains(&at)).then_some(start);
     starts.into_iter().enumerate().filter_map(is_gone_on_from).collect()
 }
 

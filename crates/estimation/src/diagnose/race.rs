@@ -1,9 +1,9 @@
 //! Fits of a few steps go on side by side, and those that fall behind are given up.
 
+use itertools::Itertools;
 use rayon::prelude::*;
 
 use super::search::{ALIKE, Search};
-use crate::effects::Effect;
 use crate::hypothesis::fit::{Fit, STEPS};
 
 /// Fits that go on.
@@ -60,18 +60,8 @@ impl Search<'_> {
 
 /// Fits, best first: the first of each set of effects, then the others. Several starts of one effect leave the others their places.
 fn first_of_each(fits: &[Fit]) -> Vec<usize> {
-    let mut seen: Vec<Vec<Effect>> = Vec::new();
-    let is_first = |i: &usize| {
-        let effects = fits[*i].effects();
-        let new = !seen.contains(&effects);
-        if new {
-            seen.push(effects);
-        }
-        new
-    };
-    let (mut first, others): (Vec<usize>, Vec<usize>) = (0..fits.len()).partition(is_first);
-    first.extend(others);
-    first
+    let first: Vec<usize> = (0..fits.len()).unique_by(|&i| fits[i].effects()).collect();
+    first.iter().copied().chain((0..fits.len()).filter(|i| !first.contains(i))).collect()
 }
 
 /// Whether a fit has come back to the one that it has in it. One that is less likely than that has not: it ends no lower.
@@ -94,7 +84,7 @@ fn apart(racing: &[usize], fits: &[Fit]) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::axis::{Parameters, Structure};
-    use crate::effects::Settings;
+    use crate::effects::{Effect, Settings};
     use crate::hypothesis::model::Model;
 
     #[test]

@@ -1,5 +1,6 @@
 //! The steps of a search: an effect is added, dropped or exchanged, or several are added at once.
 
+use itertools::Itertools;
 use rayon::prelude::*;
 
 use super::moves::PROMISING;
@@ -141,13 +142,7 @@ impl Search<'_> {
         let is_of_size = |f: &&Fit| f.terms.len() == size && !f.at_bound && may(f);
         let mut of_size: Vec<&Fit> = pool.fits().iter().filter(is_of_size).collect();
         of_size.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
-        let mut likeliest: Vec<Fit> = Vec::new();
-        for fit in of_size {
-            if likeliest.len() < PROMISING && likeliest.iter().all(|l| l.effects() != fit.effects()) {
-                likeliest.push(fit.clone());
-            }
-        }
-        likeliest
+        of_size.into_iter().unique_by(|f| f.effects()).take(PROMISING).cloned().collect()
     }
 
     /// Each effect in turn exchanged for another that explains the record better.
