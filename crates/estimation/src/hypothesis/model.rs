@@ -95,6 +95,8 @@ pub enum Free {
 
 /// Smallest share of its start that a size may shrink to.
 const NOTHING: f64 = 1e-9;
+/// Distance in x within which a value is its bound.
+const ROUNDING: f64 = 1e-9;
 
 /// How a free number is moved: `value = exp(x)*unit` or `value = x*unit`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -173,6 +175,13 @@ impl Coordinate {
         } else {
             value / self.unit
         }
+    }
+
+    /// Whether the model's present value is as far off as it may be.
+    #[must_use]
+    pub fn is_at_bound(&self, model: &Model) -> bool {
+        let [least, most] = self.bounds;
+        !(least + ROUNDING..most - ROUNDING).contains(&self.x(model))
     }
 
     /// The model's present value.
@@ -254,5 +263,23 @@ impl Model {
             }
         }
         model
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Parameters, Structure};
+    use crate::effects::Settings;
+
+    #[test]
+    fn a_value_within_rounding_of_its_bound_is_at_it() {
+        let mut model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
+        let own = Coordinate::new(Free::Base(BaseParameter::I1), &model);
+        let coordinate = Coordinate { bounds: [0.2_f64.ln(), 5.0_f64.ln()], ..own };
+        for (times, is_at) in [(1.0, false), (4.999, false), (5.0, true), (7.0, true), (0.2, true), (0.201, false)] {
+            model.parameters.i1 = times * Parameters::PAPER.i1;
+            assert_eq!(coordinate.is_at_bound(&model), is_at, "{times}");
+        }
     }
 }

@@ -6,14 +6,14 @@ mod rigid;
 
 use super::assess::{Case, Outcome};
 use super::diagnose;
-use super::diagnosis::{ClosureOf, Site};
+use super::diagnosis::{ClosureOf, Diagnosis, Site};
 use super::pool::Pool;
 use super::prepared::prepared;
 use super::search::{Search, decide, decide_further};
 use super::verdict::Verdict;
 use crate::axis::{Axis, AxisKind, Hold, Parameters, Scheme, Structure};
 use crate::conditioning::{NoiseEstimate, Record, estimate_noise};
-use crate::effects::{EFFECTS, Effect, Ramp, Settings};
+use crate::effects::{EFFECTS, Effect, Family, Ramp, Settings};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::{Fit, STEPS, Term};
 use crate::hypothesis::likelihood::{C, TorqueResidual};
@@ -86,10 +86,12 @@ fn case<'a>(record: &'a Record, nominal: Model, noise: &'a NoiseEstimate) -> Cas
     }
 }
 
-fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> Outcome {
+/// The diagnosis by the library without the effects of these families.
+fn diagnosed_without(families: &[Family], record: &Record, structure: Structure, nominal: Parameters) -> Outcome {
     let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
     let noise = estimate_noise(&record.torque, &channels, None);
-    let case = case(record, Model::new(nominal, structure, Settings::default()), &noise);
+    let mut case = case(record, Model::new(nominal, structure, Settings::default()), &noise);
+    case.suspects.retain(|e| !families.contains(&e.info().family));
     let o = diagnose(&case, &|_| ());
     // What stays open is not named as a cause.
     if let Some(open) = &o.diagnosis.undecided {
@@ -97,6 +99,10 @@ fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> O
         assert!(!open.effects.is_empty() && !is_named, "{:?} beside {:?}", open.effects, named(&o));
     }
     o
+}
+
+fn diagnosed_as(record: &Record, structure: Structure, nominal: Parameters) -> Outcome {
+    diagnosed_without(&[], record, structure, nominal)
 }
 
 fn diagnosed(record: &Record, inertia: f64) -> Outcome {
