@@ -170,12 +170,10 @@ impl Search<'_> {
         }
     }
 
-    /// Whether the parameters alone are likelier than the nominal ones, and account for what these lack: with none as far off as it may be,
-    /// and no more left than beside a cause that is told.
+    /// Whether the parameters alone are likelier than the nominal ones, with none as far off as it may be: one that is is not known.
     fn are_off(&self, given: &Fit, parameters: &Fit, independent: f64) -> bool {
         !parameters.coordinates.iter().any(|c| c.is_at_bound(&parameters.model))
             && self.evidence(parameters, independent) > self.evidence(given, independent)
-            && is_likely(&self.confidence(given, parameters))
     }
 
     /// Keeps the hypotheses that a chosen one is weighed against. What it lacks no material part of is no rival of it, only itself and
@@ -223,11 +221,11 @@ impl Search<'_> {
         Weighing { nested, standing, twins, ranking, probabilities }
     }
 
-    /// Confidence in what a hypothesis has that a plain one lacks, beside what neither explains.
-    fn confidence(&self, plain: &Fit, chosen: &Fit) -> f64 {
+    /// Confidence in the causes of a hypothesis beside what none of them explains.
+    fn confidence(&self, parameters: &Fit, chosen: &Fit) -> f64 {
         let is_noise = || self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
         let is_complete = self.at_floor(chosen) || is_noise();
-        let [left, before] = [chosen, plain].map(|fit| self.left(fit));
+        let [left, before] = [chosen, parameters].map(|fit| self.left(fit));
         let unexplained = if is_complete { 0.0 } else { (left / before.max(f64::MIN_POSITIVE)).powi(2) };
         confidence_beside(left) * confidence_in_whole(unexplained)
     }

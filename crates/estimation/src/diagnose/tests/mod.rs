@@ -6,7 +6,7 @@ mod rigid;
 
 use super::assess::{Case, Outcome};
 use super::diagnose;
-use super::diagnosis::{ClosureOf, Diagnosis, Site};
+use super::diagnosis::{ClosureOf, Site};
 use super::pool::Pool;
 use super::prepared::prepared;
 use super::search::{Search, decide, decide_further};
