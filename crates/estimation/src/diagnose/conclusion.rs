@@ -28,12 +28,17 @@ const DOUBT: f64 = 0.35;
 /// Share of the gap's power that no cause explains beside which a cause is as likely none: where the library lacks what a machine has, what
 /// does a part of the same is found in its place (the same sets).
 const PART: f64 = 0.2;
-/// Share of the torque that may be left where no cause is named, white or not: the error of a measured current (one to five per cent).
+/// Share of the torque that may be left white where no cause is named: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
+/// The same of any colour: what does not come and go as noise does has a cause, known or not. Of 200 healthy axes one leaves more.
+const COLOURED: f64 = 0.01;
 /// Hypotheses that are told, each with its own run over the held-out data.
 pub const REPORTED: usize = 12;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.8;
+/// The same where next to nothing is left to explain, beside an encoder's noise of another colour: of healthy axes it was 0.65 and more,
+/// of those with a cause that the library lacks up to 0.5.
+const HARDLY_COLOURED: f64 = 0.6;
 
 /// The decision.
 #[derive(Debug, Clone)]
@@ -223,8 +228,7 @@ impl Search<'_> {
 
     /// Confidence in the causes of a hypothesis beside what none of them explains.
     fn confidence(&self, parameters: &Fit, chosen: &Fit) -> f64 {
-        let is_noise = || self.band().independent(&chosen.rows, chosen.discrepancy) > WHITE;
-        let is_complete = self.at_floor(chosen) || is_noise();
+        let is_complete = self.at_floor(chosen) || self.independent([chosen]) > WHITE;
         let [left, before] = [chosen, parameters].map(|fit| self.left(fit));
         let unexplained = if is_complete { 0.0 } else { (left / before.max(f64::MIN_POSITIVE)).powi(2) };
         confidence_beside(left) * confidence_in_whole(unexplained)
@@ -274,7 +278,9 @@ impl Search<'_> {
     fn needs_no_cause(&self, fit: &Fit) -> bool {
         let left = self.left(fit);
         let of_noise = self.band().torque_share([0, 1].map(|i| self.band().noise_power(i)), self.problem.record);
-        left <= UNCAUSED || left <= of_noise && self.band().noise_multiple(&fit.rows) < NEAR_THE_NOISE
+        left <= COLOURED
+            || left <= UNCAUSED && self.independent([fit]) > HARDLY_COLOURED
+            || left <= of_noise && self.band().noise_multiple(&fit.rows) < NEAR_THE_NOISE
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted

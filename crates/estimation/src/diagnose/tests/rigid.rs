@@ -1,9 +1,12 @@
 //! Rigid axes: what is named, and what is not.
 
+use std::f64::consts::SQRT_2;
+
 use super::*;
 use crate::effects::TorqueHistory;
 use crate::hypothesis::descent::Descent;
 use crate::hypothesis::fit::STEPS;
+use crate::numerics::level::rms;
 
 #[test]
 fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
@@ -107,6 +110,30 @@ fn a_stage_with_nothing_hidden_has_no_cause_whatever_the_noise_of_its_torque() {
         assert!(matches!(o.decision.verdict, Verdict::NoGap | Verdict::Parameters), "{noise}: {:?}", named(&o));
         assert!((o.models[1].parameters.i1 / INERTIA - 1.0).abs() < 0.02, "{:?}", o.models[1].parameters);
     }
+}
+
+#[test]
+fn three_hundredths_of_the_torque_are_a_gap_where_they_are_not_noise() {
+    // Nothing may be named, as where the library lacks what a machine has.
+    let all: Vec<Family> = EFFECTS.iter().map(|e| e.info().family).collect();
+    let told = |noise: f64, foreign: f64| {
+        let record = logged(Settings::default(), 1.0, noise, |t| foreign * (1.7 * t).sin(), 3);
+        let o = diagnosed_without(&all, &record, Structure::Rigid, parameters(INERTIA));
+        (o.decision.verdict, o.diagnosis.remainder.share)
+    };
+    let of_torque = |amplitude: f64| amplitude * rms_of_the_torque();
+    let (verdict, share) = told(of_torque(0.03), 0.0);
+    assert!(verdict == Verdict::NoGap && share < 0.03, "{verdict:?} {share}");
+    let (verdict, share) = told(1e-9, of_torque(0.03 * SQRT_2));
+    assert!(verdict == Verdict::Unexplained && (0.015..0.04).contains(&share), "{verdict:?} {share}");
+    // What no drive is true to.
+    let (verdict, share) = told(1e-9, of_torque(0.005 * SQRT_2));
+    assert!(matches!(verdict, Verdict::NoGap | Verdict::Parameters) && share < 0.01, "{verdict:?} {share}");
+}
+
+/// Rms torque, N.m, of a log without anything hidden.
+fn rms_of_the_torque() -> f64 {
+    rms(&logged(Settings::default(), 1.0, 0.0, |_| 0.0, 3).torque)
 }
 
 #[test]
