@@ -184,9 +184,17 @@ impl<'a> Ascent<'a> {
             (0..chosen.terms.len()).into_par_iter().filter_map(|i| search.refitted(&chosen, i)).collect();
         pool.extend(anew);
         let chosen = search.pruned(chosen, &mut pool);
+        // The parameters alone, too, may have ended elsewhere than where an effect led that is none.
+        let parameters = likeliest_parameters(parameters, &pool);
         let parameters = search.told_alone(parameters);
         search.conclude(given, parameters, chosen, pool.into_fits())
     }
+}
+
+/// The parameters alone as they were fitted first, or likelier on the way back from an effect.
+fn likeliest_parameters(first: Fit, pool: &Pool) -> Fit {
+    let likelier = |f: &&Fit| !f.coordinates.is_empty() && f.log_likelihood > first.log_likelihood;
+    pool.converged(&[]).filter(likelier).cloned().unwrap_or(first)
 }
 
 impl Search<'_> {
@@ -319,6 +327,26 @@ mod tests {
 
     fn fit(terms: &[Term]) -> Fit {
         Fit::of_likelihood(Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default()), terms, 0.0)
+    }
+
+    #[test]
+    fn of_the_parameters_alone_the_likeliest_that_were_fitted_are_told() {
+        let at = |log_likelihood: f64, free: bool| {
+            let fit = Fit { log_likelihood, ..fit(&[]) };
+            if free { fit } else { Fit { coordinates: Vec::new(), ..fit } }
+        };
+        let told = |others: &[Fit]| {
+            let mut pool = Pool::default();
+            pool.extend(others.iter().cloned());
+            likeliest_parameters(at(1.0, true), &pool).log_likelihood
+        };
+        assert_eq!(told(&[at(0.0, false), at(1.0, true)]), 1.0);
+        assert_eq!(
+            told(&[at(1.0, true), at(7.0, true), Fit { log_likelihood: 9.0, ..fit(&[(Effect::Delay, 0)]) }]),
+            7.0
+        );
+        // The model as given has none free.
+        assert_eq!(told(&[at(8.0, false)]), 1.0);
     }
 
     #[test]
