@@ -17,10 +17,8 @@ use crate::hypothesis::starts::{Screening, StartPoint};
 
 /// The best that are gone on with: effects, in their richer forms, and twice as many in one; hypotheses of each size, beside the chosen way.
 pub const PROMISING: usize = 4;
-/// Starts of each form of an effect that enter the regression of several, sets of each size that are fitted, and those of all that go on.
-const STARTS: usize = 3;
-const OF_A_SIZE: usize = 3;
-const GOING_ON: usize = 3;
+/// The best of a regression of several effects: starts of each form that enter it, sets of each size that are fitted, those that go on.
+const BEST: usize = 3;
 /// Change of a parameter, in its logarithm, from which effects are looked for beside the nominal ones, too.
 pub const MOVED: f64 = 0.2;
 /// The same beside effects, which let most parameters be what they are, and from which one inertia has taken what they do: a factor of two.
@@ -131,10 +129,10 @@ impl Search<'_> {
         let Some(screening) = freed.and_then(|fit| Screening::of(&self.problem, &fit)) else { return Vec::new() };
         let starts = |e: &Effect| {
             let forms: Vec<usize> = (0..e.info().variants.len()).collect();
-            screening.starts(*e, &forms).into_iter().flat_map(|of_form| of_form.into_iter().take(STARTS))
+            screening.starts(*e, &forms).into_iter().flat_map(|of_form| of_form.into_iter().take(BEST))
         };
         let points: Vec<StartPoint> = self.suspects.par_iter().flat_map_iter(starts).collect();
-        let subsets = screening.best_subsets(&points, MOST, OF_A_SIZE);
+        let subsets = screening.best_subsets(&points, MOST, BEST);
         let coarse = self.problem.coarse();
         let mut probed: Vec<Fit> = Vec::new();
         for size in 2..=MOST {
@@ -146,7 +144,7 @@ impl Search<'_> {
         }
         let share = self.independent(&probed);
         probed.sort_by(|a, b| self.evidence(b, share).total_cmp(&self.evidence(a, share)));
-        probed.truncate(GOING_ON);
+        probed.truncate(BEST);
         self.raced(probed, None, None)
     }
 

@@ -423,7 +423,7 @@ impl<'a> Descent<'a> {
 
     /// Whether a third inertia on a spring is there beside a coupling as stiff as it may be: it is the table, the two inertias are one.
     fn stands_for_the_coupling(&self, x: &[f64]) -> bool {
-        let is_stiff = |(c, x): (&Coordinate, &f64)| c.free == Free::Base(BaseParameter::K) && *x > c.bounds[1] - 1e-9;
+        let is_stiff = |(c, x): (&Coordinate, &f64)| c.free == Free::Base(BaseParameter::K) && c.is_most(*x);
         self.terms.iter().any(|t| t.0.is_mode()) && self.coordinates.iter().zip(x).any(is_stiff)
     }
 }
@@ -546,9 +546,8 @@ impl Normal {
                 if coordinates[i].log && !coordinates[i].is_base() {
                     delta[i] = delta[i].clamp(-FARTHEST_STEP, FARTHEST_STEP);
                 }
-                let to = x[i] + delta[i];
-                let b = coordinates[i].bounds;
-                if (x[i] <= b[0] + 1e-12 && to < b[0]) || (x[i] >= b[1] - 1e-12 && to > b[1]) {
+                let (at, to) = (&coordinates[i], x[i] + delta[i]);
+                if at.is_least(x[i]) && to < at.bounds[0] || at.is_most(x[i]) && to > at.bounds[1] {
                     fixed[i] = true;
                     again = true;
                 }

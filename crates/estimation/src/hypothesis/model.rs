@@ -180,8 +180,20 @@ impl Coordinate {
     /// Whether the model's present value is as far off as it may be.
     #[must_use]
     pub fn is_at_bound(&self, model: &Model) -> bool {
-        let [least, most] = self.bounds;
-        !(least + ROUNDING..most - ROUNDING).contains(&self.x(model))
+        let x = self.x(model);
+        self.is_least(x) || self.is_most(x)
+    }
+
+    /// Whether a place is the least that it may be.
+    #[must_use]
+    pub fn is_least(&self, x: f64) -> bool {
+        x < self.bounds[0] + ROUNDING
+    }
+
+    /// Whether a place is the most that it may be.
+    #[must_use]
+    pub fn is_most(&self, x: f64) -> bool {
+        x > self.bounds[1] - ROUNDING
     }
 
     /// The model's present value.
