@@ -30,14 +30,14 @@ const DOUBT: f64 = 0.35;
 const PART: f64 = 0.2;
 /// Share of the torque that may be left white where no cause is named: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
-/// The same of any colour: what does not come and go as noise does has a cause, known or not. Of 200 healthy axes one leaves more.
+/// The same of any colour: what does not come and go as noise does has a cause, known or not. Of 240 healthy axes one leaves more.
 const COLOURED: f64 = 0.01;
 /// Hypotheses that are told, each with its own run over the held-out data.
 pub const REPORTED: usize = 12;
 /// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
 const WHITE: f64 = 0.8;
-/// The same where next to nothing is left to explain, beside an encoder's noise of another colour: of healthy axes it was 0.65 and more,
-/// of those with a cause that the library lacks up to 0.5.
+/// The same where next to nothing is left to explain, beside an encoder's noise of another colour: of all healthy axes but one it was
+/// 0.65 and more, of those with a cause that the library lacks up to 0.5.
 const HARDLY_COLOURED: f64 = 0.6;
 
 /// The decision.
