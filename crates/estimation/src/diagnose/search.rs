@@ -191,9 +191,9 @@ impl<'a> Ascent<'a> {
     }
 }
 
-/// The parameters alone as they were fitted first, or likelier on the way back from an effect.
+/// The parameters alone as they were fitted first, or on the way back from an effect where they are likelier there and not alike.
 fn likeliest_parameters(first: Fit, pool: &Pool) -> Fit {
-    let likelier = |f: &&Fit| !f.coordinates.is_empty() && f.log_likelihood > first.log_likelihood;
+    let likelier = |f: &&Fit| !f.coordinates.is_empty() && f.log_likelihood > first.log_likelihood + ALIKE;
     pool.converged(&[]).filter(likelier).cloned().unwrap_or(first)
 }
 
@@ -340,7 +340,7 @@ mod tests {
             pool.extend(others.iter().cloned());
             likeliest_parameters(at(1.0, true), &pool).log_likelihood
         };
-        assert_eq!(told(&[at(0.0, false), at(1.0, true)]), 1.0);
+        assert_eq!(told(&[at(0.0, false), at(1.0, true), at(1.0 + ALIKE, true)]), 1.0);
         assert_eq!(
             told(&[at(1.0, true), at(7.0, true), Fit { log_likelihood: 9.0, ..fit(&[(Effect::Delay, 0)]) }]),
             7.0
