@@ -121,19 +121,14 @@ fn three_hundredths_of_the_torque_are_a_gap_where_they_are_not_noise() {
         let o = diagnosed_without(&all, &record, Structure::Rigid, parameters(INERTIA));
         (o.decision.verdict, o.diagnosis.remainder.share)
     };
-    let of_torque = |amplitude: f64| amplitude * rms_of_the_torque();
-    let (verdict, share) = told(of_torque(0.03), 0.0);
+    let torque = rms(&logged(Settings::default(), 1.0, 0.0, |_| 0.0, 3).torque);
+    let (verdict, share) = told(0.03 * torque, 0.0);
     assert!(verdict == Verdict::NoGap && share < 0.03, "{verdict:?} {share}");
-    let (verdict, share) = told(1e-9, of_torque(0.03 * SQRT_2));
+    let (verdict, share) = told(1e-9, 0.03 * SQRT_2 * torque);
     assert!(verdict == Verdict::Unexplained && (0.015..0.04).contains(&share), "{verdict:?} {share}");
     // What no drive is true to.
-    let (verdict, share) = told(1e-9, of_torque(0.005 * SQRT_2));
+    let (verdict, share) = told(1e-9, 0.005 * SQRT_2 * torque);
     assert!(matches!(verdict, Verdict::NoGap | Verdict::Parameters) && share < 0.01, "{verdict:?} {share}");
-}
-
-/// Rms torque, N.m, of a log without anything hidden.
-fn rms_of_the_torque() -> f64 {
-    rms(&logged(Settings::default(), 1.0, 0.0, |_| 0.0, 3).torque)
 }
 
 #[test]
