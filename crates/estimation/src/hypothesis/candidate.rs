@@ -7,7 +7,7 @@ use super::fit::Term;
 use super::likelihood::{C, Spectra};
 use super::problem::Problem;
 use super::scales::Scales;
-use crate::effects::{Effect, Place, Role, Settings, Start};
+use crate::effects::{Effect, Role, Settings, Start};
 
 /// Shares of a size among the shapes that were tried that an effect may begin at.
 const LEAST_SHARE: f64 = 0.2;
@@ -47,8 +47,7 @@ impl Candidate {
         let info = effect.info();
         let free = info.variants[form].free;
         let changed = |settings: &Settings| Some(difference(rows_of(settings)?.as_ref(), lacked));
-        let guessed =
-            |i: usize| TRIAL * guess(info.parameters[i].unit, scales, usize::from(info.place == Place::Table));
+        let guessed = |i: usize| TRIAL * guess(info.parameters[i].unit, scales, info.place.side());
         let has_column =
             |i: &usize| info.parameters[*i].role == Role::Size && matches!(info.parameters[*i].start, Start::Linear);
         let sizes: Vec<usize> = free.iter().copied().filter(has_column).collect();

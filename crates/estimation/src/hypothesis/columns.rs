@@ -82,9 +82,7 @@ impl Problem<'_> {
                 let info = &e.info().parameters[i];
                 let value = model.effects.of(e)[i];
                 match info.start {
-                    Start::Grid(Scale::Order, _) => {
-                        0.02 / (value.abs() * self.range[usize::from(e.info().place == Place::Table)]).max(1e-3)
-                    }
+                    Start::Grid(Scale::Order, _) => 0.02 / (value.abs() * self.range[e.info().place.side()]).max(1e-3),
                     Start::Grid(Scale::Frequency, _) => {
                         0.02 / (std::f64::consts::TAU * value.abs() * self.record.dt * self.record.len() as f64)
                             .max(1e-3)

@@ -11,7 +11,7 @@ use super::likelihood::{Band, C, Weight, mode_inertia, square};
 use super::model::Model;
 use super::problem::largest;
 use crate::axis::Structure;
-use crate::effects::{EFFECTS, Effect, Place};
+use crate::effects::{EFFECTS, Effect};
 use crate::trace::numerics::dot;
 
 /// Share of the second sine that must be left beside the first for it to be another one.
@@ -46,7 +46,7 @@ impl Hidden {
             return None;
         }
         let rigid = model.structure == Structure::Rigid;
-        let side = usize::from(!rigid && effect.info().place == Place::Table);
+        let side = if rigid { 0 } else { effect.info().place.side() };
         let of = model.effects.of(effect);
         (rigid || sides.contains(&side)).then_some(Self { side, inertia: of[0], stiffness: of[1], damping: of[2] })
     }

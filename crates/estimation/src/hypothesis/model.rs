@@ -251,7 +251,7 @@ impl Model {
         let inertia = self.parameters.inertias(self.structure);
         let mut pull = [0.0_f64; 2];
         for &effect in self.effects.active().forces() {
-            let side = usize::from(self.structure == Structure::TwoInertia && effect.info().place == Place::Table);
+            let side = if self.structure == Structure::Rigid { 0 } else { effect.info().place.side() };
             pull[side] = pull[side].max(effect.pull(self.effects.of(effect), inertia[side]));
         }
         pull

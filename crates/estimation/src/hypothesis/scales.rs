@@ -9,7 +9,7 @@ use super::model::Model;
 use super::problem::Problem;
 use crate::axis::Structure;
 use crate::conditioning::Record;
-use crate::effects::{Effect, Extent, PERIODS, Place, Scale};
+use crate::effects::{Effect, Extent, PERIODS, Scale};
 use crate::numerics::level::{self, deviation};
 
 #[derive(Clone)]
@@ -90,11 +90,6 @@ fn path(positions: impl Iterator<Item = f64>, threshold: f64) -> (f64, f64) {
         }
     }
     (path + from.map_or(0.0, |start| (farthest - start).abs()), reversals)
-}
-
-/// The side on which an effect acts: the table's, or the motor's as any other.
-fn side(effect: Effect) -> usize {
-    usize::from(effect.info().place == Place::Table)
 }
 
 /// Whether the torque acts in a model when and as it was logged.
@@ -194,7 +189,7 @@ impl Scales {
         }
         effects.into_iter().all(|e| {
             let info = e.info();
-            let side = side(e);
+            let side = info.place.side();
             let extent = Extent {
                 torque: self.peak,
                 torque_deviation: self.torque,
@@ -227,7 +222,7 @@ impl Scales {
 
     /// Whether the travel shows an effect of a model again, where it is one that repeats.
     pub fn repeats(&self, effect: Effect, model: &Model) -> bool {
-        effect.repeats(model.effects.of(effect), self.travel_of(side(effect)))
+        effect.repeats(model.effects.of(effect), self.travel_of(effect.info().place.side()))
     }
 
     /// Travel of a side, rad.
@@ -238,7 +233,7 @@ impl Scales {
 
     /// The value that is a fraction of a scale.
     pub fn value(&self, effect: Effect, scale: Scale, f: f64) -> f64 {
-        let side = side(effect);
+        let side = effect.info().place.side();
         match scale {
             Scale::One | Scale::Order | Scale::Frequency => f,
             Scale::Speed => f * self.speed[side],

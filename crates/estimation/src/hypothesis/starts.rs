@@ -334,7 +334,7 @@ impl Screening<'_> {
         let (p, fit, reg) = (&self.problem, &self.fit, &self.regression);
         let (effect, form) = term;
         let info = effect.info();
-        let side = usize::from(info.place == Place::Table);
+        let side = info.place.side();
         let free = info.variants[form].free;
         let mut off = fit.model.effects;
         off.of_mut(effect).copy_from_slice(Settings::default().of(effect));

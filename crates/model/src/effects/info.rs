@@ -40,6 +40,12 @@ impl Place {
             Self::Sensor => "sensor",
         }
     }
+
+    /// The side whose motion an effect goes with that acts here: 1, the table's, for what acts on it or misreads it; 0 for any other.
+    #[must_use]
+    pub const fn side(self) -> usize {
+        matches!(self, Self::Table | Self::Sensor) as usize
+    }
 }
 
 /// Whether a parameter makes the effect, or shapes it.

@@ -451,3 +451,16 @@ fn a_mode_of_the_table_is_found_beside_a_sine_and_a_load() {
     let o = diagnosed_as(&moved(Parameters::PAPER, effects, &sweep, 0), Structure::TwoInertia, Parameters::PAPER);
     assert_eq!(named(&o), ["disturbance", "flexible_mode", "load_torque"], "{:#?}", ranking(&o));
 }
+
+#[test]
+fn an_error_of_the_tables_scale_is_found_at_its_order() {
+    // Of the motor's side hardly anything is off.
+    let swept = |t: f64| 0.02 * (3.0 * t + 0.9 * t * t).sin() + 0.012 * (29.0 * t).sin() + 0.006 * (83.0 * t).cos();
+    let mut record = moved(Parameters::PAPER, Settings::default(), &swept, 0);
+    let table = record.channels[2].as_mut().expect("measured");
+    table.iter_mut().for_each(|theta| *theta += 4e-4 * (7.0 * *theta + 1.0).sin());
+    let o = diagnosed_as(&record, Structure::TwoInertia, Parameters::PAPER);
+    assert_eq!(o.decision.chosen.effects(), [Effect::LeadError], "{:#?}", ranking(&o));
+    let found = o.improved.effects.of(Effect::LeadError);
+    assert!((found[1] / 4e-4 - 1.0).abs() < 0.1 && (found[2] / 7.0 - 1.0).abs() < 1e-3, "{found:?}");
+}
