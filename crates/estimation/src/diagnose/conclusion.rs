@@ -101,7 +101,14 @@ impl Search<'_> {
         let nominal = &self.problem.nominal;
         let is_off = self.are_off(&given, &parameters, independent);
         let plain = if is_off { parameters.clone() } else { given.clone() };
-        let chosen = if chosen.terms.is_empty() || is_run_off(&chosen, nominal) { plain.clone() } else { chosen };
+        let is_of_another_axis = |f: &Fit| !f.terms.is_empty() && is_run_off(f, nominal);
+        if is_of_another_axis(&chosen) {
+            // The likeliest that says something of this one.
+            pool.retain(|f| !is_of_another_axis(f));
+            let next = self.best(&pool, independent).filter(|f| !f.terms.is_empty()).unwrap_or(&plain).clone();
+            return self.conclude(given, parameters, next, pool);
+        }
+        let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
         self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
