@@ -219,7 +219,7 @@ impl Search<'_> {
                 None => 0.0,
             };
             let repeats = self.problem.scales.as_ref().is_none_or(|s| s.repeats(effect, &chosen.model));
-            let odds = if repeats { usual_odds(effect) } else { ONCE };
+            let odds = if repeats { 1.0 } else { ONCE } * usual_odds(effect);
             discounted(odds, steadiness(finished, effect, independent) * decisive) * confidence
         };
         let standing: Vec<f64> = all.clone().map(standing).collect();

@@ -220,9 +220,12 @@ impl Scales {
         })
     }
 
-    /// Whether the travel shows an effect of a model again, where it is one that repeats.
+    /// Whether the motion shows an effect of a model again.
     pub fn repeats(&self, effect: Effect, model: &Model) -> bool {
-        effect.repeats(model.effects.of(effect), self.travel_of(effect.info().place.side()))
+        let side = effect.info().place.side();
+        // How often a side turns that is not measured is not known.
+        let (path, reversals) = self.paths[side];
+        effect.repeats(model.effects.of(effect), self.travel_of(side), path == 0.0 || reversals > 0.0)
     }
 
     /// Travel of a side, rad.

@@ -77,7 +77,7 @@ impl DryFriction for FrictionDrift {
         memory: 0,
         named: true,
         textbook: false,
-        odds: 0.01,
+        odds: 0.05,
         bounds: |p, x| p[0].abs() * x.length <= x.torque && is_slow(p[2], x.length),
         example: &[4e-3, 1e-4, 0.5],
         variants: &[

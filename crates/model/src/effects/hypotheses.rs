@@ -49,12 +49,13 @@ impl Effect {
         }
     }
 
-    /// Whether a travel, rad, shows its period twice where that may be any: seen once it is a torque of the position like others.
+    /// Whether a motion shows it again, that goes over a travel, rad, and turns back or does not: a period of any length that is seen once is
+    /// a torque of the position like others, and what changes while the axis goes one way may be any torque.
     #[must_use]
-    pub fn repeats(self, values: &[f64], travel: f64) -> bool {
+    pub fn repeats(self, values: &[f64], travel: f64, turns_back: bool) -> bool {
         match self.length() {
             Some(Length::Periods(order)) => values[order] * travel >= 2.0 * std::f64::consts::TAU,
-            _ => true,
+            _ => turns_back || self != Self::FrictionDrift,
         }
     }
 

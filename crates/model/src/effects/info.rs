@@ -3,7 +3,8 @@
 use super::extent::Extent;
 use super::family::Family;
 
-/// Odds of a torque of the position that its travel does not show again, whatever the law: the pull of a cover, a hose, a cable.
+/// Odds, times its own, of an effect that the motion does not show again ([`super::Effect::repeats`]); those of the pull of a cover, a hose, a
+/// cable.
 pub const ONCE: f64 = 0.02;
 
 /// The place in the chain where an effect acts.
