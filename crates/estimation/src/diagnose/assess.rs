@@ -1,6 +1,6 @@
 //! What is diagnosed, and what comes of it.
 
-use super::conclusion::Decision;
+use super::decision::Decision;
 use super::diagnosis::Diagnosis;
 use super::overlay::Overlay;
 use crate::axis::AxisKind;

@@ -1,9 +1,12 @@
 //! The verdict on the hypothesis that a search ended with: how likely each of its effects is, and whether they may be named.
 
+use std::ops::ControlFlow::{self, Break, Continue};
 use std::sync::atomic::Ordering;
 
 use itertools::Itertools;
 
+use super::confidence::{discounted, usual_odds};
+use super::decision::Decision;
 use super::diagnosis::Undecided;
 use super::material::{MATERIAL, MINOR};
 use super::moves::{MOVED, MOVED_FAR};
@@ -11,168 +14,122 @@ use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
 use super::verdict::Verdict;
 use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
-use crate::effects::{EFFECTS, Effect, Family, ONCE};
+use crate::effects::{Effect, Family, ONCE};
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
 use crate::hypothesis::fit::Fit;
-use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::model::Model;
 use crate::trace::machine::NOMINAL_OFF;
 
-/// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
-const GAIN_LIKENESS: f64 = 0.25;
-/// Smallest relative change of the parameters that is called one.
-const GAIN_SEEN: f64 = 0.02;
-/// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
-/// cause in thirty is none, beside a tenth one in nine (both blind sets, whole and with the family of a cause withheld).
-const DOUBT: f64 = 0.35;
-/// Share of the gap's power that no cause explains beside which a cause is as likely none: where the library lacks what a machine has, what
-/// does a part of the same is found in its place (the same sets).
-const PART: f64 = 0.2;
-/// Share of the torque that may be left white where no cause is named: the error of a measured current (one to five per cent).
-pub const UNCAUSED: f64 = 0.05;
-/// The same of any colour: what does not come and go as noise does has a cause, known or not. Of 240 healthy axes one leaves more.
-const COLOURED: f64 = 0.01;
 /// Hypotheses that are told, each with its own run over the held-out data.
 pub const REPORTED: usize = 12;
-/// Share of independent values from which a residual counts as noise of its own: white in the band, as a noisy torque leaves it.
-const WHITE: f64 = 0.8;
-/// The same where next to nothing is left to explain, beside an encoder's noise of another colour: of all healthy axes but one it was
-/// 0.65 and more, of those with a cause that the library lacks up to 0.5.
-const HARDLY_COLOURED: f64 = 0.6;
 
-/// The decision.
-#[derive(Debug, Clone)]
-pub struct Decision {
-    /// The verdict.
-    pub verdict: Verdict,
-    /// Whether the search ended before every exchange was tried.
-    pub cut_short: bool,
-    /// Model as given.
-    pub given: Fit,
-    /// Its parameters fitted.
-    pub parameters: Fit,
-    /// The hypothesis decided for.
-    pub chosen: Fit,
-    /// Every hypothesis that was fitted, best first.
-    pub ranking: Vec<Weighed>,
-    /// Share of the gap of each effect of the chosen hypothesis.
-    pub shares: Vec<f64>,
-    /// Probability of each.
-    pub probabilities: Vec<f64>,
+/// A hypothesis that may be told, weighed among its rivals.
+struct Account {
+    chosen: Fit,
+    /// The same along its own motion.
+    finished: Fit,
     /// Share of the values that are independent.
-    pub independent: f64,
-    /// Effects that the record cannot tell from chosen ones.
-    pub confusable: Vec<Confusable>,
-    /// What of the chosen hypothesis is not told, where it is one of several effects.
-    pub undecided: Option<Undecided>,
-}
-
-impl Decision {
-    /// Causes that are named.
-    fn named(&self) -> usize {
-        if self.verdict == Verdict::Effect { self.probabilities.iter().filter(|p| is_likely(p)).count() } else { 0 }
-    }
-
-    /// True if the parameters all changed by one factor: a wrong torque constant.
-    #[must_use]
-    pub fn torque_gain(&self) -> Option<(f64, f64)> {
-        let f = &self.parameters;
-        if f.coordinates.is_empty() {
-            return None;
-        }
-        let change = |i: usize| (f.coordinates[i].value(&f.model) / f.coordinates[i].unit).ln();
-        let first = change(0);
-        // A rigid axis has one parameter: its change and a gain are the same thing.
-        let alike = f.coordinates.len() > 1
-            && (1..f.coordinates.len()).all(|i| {
-                let std = f.std[i] / f.coordinates[i].value(&f.model);
-                (change(i) - first).abs() <= GAIN_LIKENESS * first.abs() + 2.0 * std.min(0.2)
-            });
-        let std = f.std[0] / f.coordinates[0].value(&f.model);
-        (alike && first.abs() > GAIN_SEEN).then(|| ((-first).exp(), (-first).exp() * std))
-    }
+    independent: f64,
+    weighing: Weighing,
 }
 
 impl Search<'_> {
     /// The verdict on the hypothesis at the end.
-    pub fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, mut pool: Vec<Fit>) -> Decision {
+    pub fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, pool: Vec<Fit>) -> Decision {
+        let axis = [&given, &parameters];
+        let mut next = (chosen, pool);
+        let mut account = loop {
+            match self.account(axis, next) {
+                Break(account) => break account,
+                Continue(other) => next = other,
+            }
+        };
+        match self.left_open(&mut account, axis) {
+            Break(without) => *without,
+            Continue(open) => self.told(account, open, given, parameters),
+        }
+    }
+
+    /// What may be told of a hypothesis among all that were fitted, or that in its place.
+    fn account(
+        &self,
+        [given, parameters]: [&Fit; 2],
+        (chosen, mut pool): (Fit, Vec<Fit>),
+    ) -> ControlFlow<Account, (Fit, Vec<Fit>)> {
         pool.push(chosen.clone());
         let independent = self.independent([&chosen]);
-        let nominal = &self.problem.nominal;
-        let is_off = self.are_off(&given, &parameters, independent);
-        let plain = if is_off { parameters.clone() } else { given.clone() };
-        let is_of_another_axis = |f: &Fit| !f.terms.is_empty() && is_run_off(f, nominal);
+        let plain = if self.are_off(given, parameters, independent) { parameters } else { given };
+        let is_of_another_axis = |f: &Fit| !f.terms.is_empty() && is_run_off(f, &self.problem.nominal);
         if is_of_another_axis(&chosen) {
             // The likeliest that says something of this one.
             pool.retain(|f| !is_of_another_axis(f));
-            let next = self.best(&pool, independent).filter(|f| !f.terms.is_empty()).unwrap_or(&plain).clone();
-            return self.conclude(given, parameters, next, pool);
+            let next = self.best(&pool, independent).filter(|f| !f.terms.is_empty()).unwrap_or(plain).clone();
+            return Continue((next, pool));
         }
         let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
         self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
-            return self.conclude(given, parameters, simple, pool);
+            return Continue((simple, pool));
         }
-        let mut weighing = self.weigh(&chosen, &finished, &parameters, pool, independent);
+        let mut weighing = self.weigh(&chosen, &finished, parameters, pool, independent);
         // One that is not likely explains nothing that needs a cause.
         if let [only] = weighing.probabilities[..]
             && !is_likely(&only)
-            && self.needs_no_cause(&plain)
+            && self.needs_no_cause(plain)
         {
-            return self.conclude(given, parameters, plain, weighing.into_fits());
+            return Continue((plain.clone(), weighing.into_fits()));
         }
         weighing.share_with_twins();
-        let mut open = weighing.open(&chosen);
-        if let Some(shorter) = open.and_then(|i| weighing.instead_of_open(&chosen, i)) {
-            return self.conclude(given, parameters, shorter, weighing.into_fits());
+        if let Some(shorter) = weighing.open(&chosen).and_then(|i| weighing.instead_of_open(&chosen, i)) {
+            return Continue((shorter, weighing.into_fits()));
         }
-        // Beside more of the torque than that the causes of the rest are suspects, however large the gap was.
-        let is_understood = self.left(&chosen) <= MATERIAL;
-        if open.is_none()
-            && let Some(least) = weighing.least_likely().filter(|_| chosen.terms.len() > 1)
-            && let Some(refitted) = weighing.refitted(least).or_else(|| self.refitted(&chosen, least))
-        {
-            let [with_it, without_it] = [&chosen, &refitted].map(|fit| self.confidence(&parameters, fit));
-            let ranking = &weighing.ranking;
-            let without = self.concluded_without(&chosen, least, refitted, ranking, [&given, &parameters], independent);
-            // Beside what it leaves the others may be lost, which beside it are likely, or others take a part of that: then it stays, and is
-            // not named.
-            let others = weighing.likely();
-            let is_its_own = inertia_off(&chosen, nominal) < MOVED_FAR;
-            let keeps_the_others = without.named() >= others && is_extension(&chosen, &without.chosen);
-            if others + 1 < chosen.terms.len() || !is_understood || !is_its_own || keeps_the_others {
-                return without;
-            }
-            // As likely as it is none, the others are beside what is left without it.
-            let there = weighing.probabilities[least];
-            weighing.doubt_beside(least, there + (1.0 - there) * without_it / with_it);
-            open = Some(least);
-        }
-        let are_likely = weighing.likely() + usize::from(open.is_some()) == chosen.terms.len();
-        let verdict = match chosen.terms.is_empty() {
-            false if are_likely && is_understood => Verdict::Effect,
-            false => Verdict::Unexplained,
-            true if is_run_off(&chosen, nominal) => Verdict::Unexplained,
-            true if !self.needs_no_cause(&chosen) => Verdict::Unexplained,
-            true if chosen.coordinates.is_empty() => Verdict::NoGap,
-            true => Verdict::Parameters,
+        Break(Account { chosen, finished, independent, weighing })
+    }
+
+    /// Which of several effects stays open beside those that are told, or the verdict without the one that is not likely.
+    fn left_open(&self, account: &mut Account, axis: [&Fit; 2]) -> ControlFlow<Box<Decision>, Option<usize>> {
+        let Account { chosen, weighing, independent, .. } = account;
+        let open = weighing.open(chosen);
+        let Some(least) = weighing.least_likely().filter(|_| open.is_none() && chosen.terms.len() > 1) else {
+            return Continue(open);
         };
-        let chosen = finished;
+        let Some(refitted) = weighing.refitted(least).or_else(|| self.refitted(chosen, least)) else {
+            return Continue(None);
+        };
+        let [with_it, without_it] = [&*chosen, &refitted].map(|fit| self.confidence(axis[1], fit));
+        let without = self.concluded_without(chosen, least, refitted, &weighing.ranking, axis, *independent);
+        // Beside what it leaves the others may be lost, which beside it are likely, or others take a part of that: then it stays, and is
+        // not named.
+        let others = weighing.likely();
+        let is_its_own = inertia_off(chosen, &self.problem.nominal) < MOVED_FAR;
+        let keeps_the_others = without.named() >= others && is_extension(chosen, &without.chosen);
+        if others + 1 < chosen.terms.len() || !self.is_understood(chosen) || !is_its_own || keeps_the_others {
+            return Break(Box::new(without));
+        }
+        // As likely as it is none, the others are beside what is left without it.
+        let there = weighing.probabilities[least];
+        weighing.doubt_beside(least, there + (1.0 - there) * without_it / with_it);
+        Continue(Some(least))
+    }
+
+    /// The decision for an account of which an effect may stay open.
+    fn told(&self, account: Account, open: Option<usize>, given: Fit, parameters: Fit) -> Decision {
+        let verdict = self.verdict(&account, open);
+        let Account { finished, independent, weighing, .. } = account;
         let Weighing { mut ranking, twins, probabilities, .. } = weighing;
-        let shares = self.shares(&chosen);
-        let effects = |i: usize| instead(&ranking, &chosen, i, twins[i]);
+        let shares = self.shares(&finished);
+        let effects = |i: usize| instead(&ranking, &finished, i, twins[i]);
         let undecided = open.map(|i| Undecided { effects: effects(i), share_of_gap: shares[i] });
         let twins = twins.into_iter().flatten().filter(|t| t.difference < ALIKE);
-        let confusable = confusable(&chosen, &ranking, self.evidence(&chosen, independent), twins);
+        let confusable = confusable(&finished, &ranking, self.evidence(&finished, independent), twins);
         ranking.truncate(REPORTED);
-        let cut_short = self.cut_short.load(Ordering::Relaxed);
         Decision {
             verdict,
-            cut_short,
+            cut_short: self.cut_short.load(Ordering::Relaxed),
             given,
             parameters,
-            chosen,
+            chosen: finished,
             ranking,
             shares,
             probabilities,
@@ -180,6 +137,23 @@ impl Search<'_> {
             confusable,
             undecided,
         }
+    }
+
+    fn verdict(&self, Account { chosen, weighing, .. }: &Account, open: Option<usize>) -> Verdict {
+        let are_likely = weighing.likely() + usize::from(open.is_some()) == chosen.terms.len();
+        match chosen.terms.is_empty() {
+            false if are_likely && self.is_understood(chosen) => Verdict::Effect,
+            false => Verdict::Unexplained,
+            true if is_run_off(chosen, &self.problem.nominal) => Verdict::Unexplained,
+            true if !self.needs_no_cause(chosen) => Verdict::Unexplained,
+            true if chosen.coordinates.is_empty() => Verdict::NoGap,
+            true => Verdict::Parameters,
+        }
+    }
+
+    /// Whether a hypothesis leaves no more of the torque than that its causes are none of suspects, however large the gap was.
+    fn is_understood(&self, chosen: &Fit) -> bool {
+        self.left(chosen) <= MATERIAL
     }
 
     /// Whether the parameters alone are likelier than the nominal ones, with none as far off as it may be: one that is is not known.
@@ -233,14 +207,6 @@ impl Search<'_> {
         Weighing { nested, standing, twins, ranking, probabilities }
     }
 
-    /// Confidence in the causes of a hypothesis beside what none of them explains.
-    fn confidence(&self, parameters: &Fit, chosen: &Fit) -> f64 {
-        let is_complete = self.at_floor(chosen) || self.independent([chosen]) > WHITE;
-        let [left, before] = [chosen, parameters].map(|fit| self.left(fit));
-        let unexplained = if is_complete { 0.0 } else { (left / before.max(f64::MIN_POSITIVE)).powi(2) };
-        confidence_beside(left) * confidence_in_whole(unexplained)
-    }
-
     /// The verdict without one of several effects, from the fit without it.
     fn concluded_without(
         &self,
@@ -279,26 +245,6 @@ impl Search<'_> {
             Some(fit) => Some(Nested { fit: fit.clone(), refitted: false }),
             None => Some(Nested { fit: self.refitted(chosen, i)?, refitted: true }),
         }
-    }
-
-    /// Whether what a fit leaves may be the error of a measured current, or the encoders' noise.
-    fn needs_no_cause(&self, fit: &Fit) -> bool {
-        let left = self.left(fit);
-        let of_noise = self.band().torque_share([0, 1].map(|i| self.band().noise_power(i)), self.problem.record);
-        left <= COLOURED
-            || left <= UNCAUSED && self.independent([fit]) > HARDLY_COLOURED
-            || left <= of_noise && self.band().noise_multiple(&fit.rows) < NEAR_THE_NOISE
-    }
-
-    /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
-    /// without it: what no effect explains may be what explains this one, too. Less of it where the effect hardly stands out of a
-    /// remainder of any colour.
-    fn decisive(&self, chosen: &Fit, plain: &Fit) -> f64 {
-        let share = |e: usize| {
-            let (without, with) = (plain.discrepancy[e], chosen.discrepancy[e]);
-            if without > with { (without - with) / without } else { 0.0 }
-        };
-        (0..self.band().equations()).map(share).fold(0.0, f64::max) * self.stands_out(chosen, plain)
     }
 
     /// The constant torque that a friction may be as well: where the motion hardly goes back the law without any shape is one, and a shape
@@ -374,28 +320,6 @@ impl Search<'_> {
     }
 }
 
-/// Confidence in a cause beside a share of the torque that no cause explains ([`DOUBT`]).
-fn confidence_beside(left: f64) -> f64 {
-    (1.0 - DOUBT * left.sqrt()).max(0.0)
-}
-
-/// Confidence that what explains all but a share of the gap's power is the whole of it, and does no part of something else ([`PART`]).
-fn confidence_in_whole(unexplained: f64) -> f64 {
-    1.0 / (1.0 + (unexplained / PART).powi(2))
-}
-
-/// How often machines have the like of an effect, whatever its law.
-fn usual_odds(effect: Effect) -> f64 {
-    let like = EFFECTS.iter().filter(|like| like.is_alternative_to(effect)).map(|like| like.info().odds);
-    like.fold(effect.info().odds, f64::max)
-}
-
-/// Probability that an effect of such odds is there, and what no cause explains does not do as it would. Friction is named that explains
-/// half of what is left without it, a spring is not.
-fn discounted(odds: f64, decisive: f64) -> f64 {
-    odds * decisive / (odds * decisive + (1.0 - decisive))
-}
-
 /// How far the inertia that moves is from the nominal one, in its logarithm.
 fn inertia_off(fit: &Fit, nominal: &Model) -> f64 {
     let inertia = |m: &Model| m.parameters.i1 + m.parameters.i2;
@@ -439,7 +363,6 @@ fn confusable(
 
 #[cfg(test)]
 mod tests {
-    use super::super::weighing::LIKELY;
     use super::*;
     use crate::axis::{Parameters, Structure};
     use crate::effects::Settings;
@@ -453,47 +376,6 @@ mod tests {
         )
     }
 
-    #[test]
-    fn a_cause_is_believed_less_the_more_of_the_torque_and_of_the_gap_no_cause_explains() {
-        // One in thirty is none beside a hundredth of the torque, one in nine beside a tenth, and all are beside nine times it.
-        for (left, none) in [(0.0, 0.0), (0.01, 0.035), (0.1, 0.1107), (9.0, 1.0)] {
-            assert!((confidence_beside(left) - (1.0 - none)).abs() < 1e-3, "{left}");
-        }
-        // Half of them are beside the part of the gap that doubts as much, a tenth beside a third of that.
-        for (unexplained, none) in [(PART, 0.5), (PART / 3.0, 0.1), (3.0 * PART, 0.9)] {
-            assert!((confidence_in_whole(unexplained) - (1.0 - none)).abs() < 1e-12, "{unexplained}");
-        }
-    }
-
-    #[test]
-    fn friction_needs_less_beside_a_remainder_than_what_few_machines_have() {
-        let of = |effect, decisive| discounted(usual_odds(effect), decisive);
-        // Odds of ten to one, whatever the law: 0.6 of it is 6/6.4.
-        for friction in [Effect::CoulombMotor, Effect::PreslidingMotor] {
-            assert!((of(friction, 0.6) - 6.0 / 6.4).abs() < 1e-12);
-        }
-        let spring = Effect::ExternalSpring.info().odds;
-        assert!((of(Effect::ExternalSpring, 0.6) - 0.6 * spring / (0.6 * spring + 0.4)).abs() < 1e-12);
-        assert!(of(Effect::ExternalSpring, 0.6) < LIKELY && LIKELY < of(Effect::ViscousTable, 0.5));
-        assert_eq!([0.0, 1.0].map(|p| of(Effect::ExternalSpring, p)), [0.0, 1.0]);
-    }
-
-    fn decision(parameters: Fit) -> Decision {
-        Decision {
-            verdict: Verdict::Parameters,
-            cut_short: false,
-            given: parameters.clone(),
-            chosen: parameters.clone(),
-            parameters,
-            ranking: Vec::new(),
-            shares: Vec::new(),
-            probabilities: Vec::new(),
-            independent: 1.0,
-            confusable: Vec::new(),
-            undecided: None,
-        }
-    }
-
     fn scaled(by: [f64; 4]) -> Fit {
         let mut fit = fit(&[], 0.0);
         let p = &mut fit.model.parameters;
@@ -501,21 +383,6 @@ mod tests {
             *value *= by;
         }
         fit
-    }
-
-    #[test]
-    fn parameters_that_all_changed_by_one_factor_are_a_gain_of_its_inverse() {
-        let (gain, _) = decision(scaled([1.25; 4])).torque_gain().expect("one factor");
-        assert!((gain - 0.8).abs() < 1e-12, "{gain}");
-        assert!(decision(scaled([1.25, 1.2, 1.3, 1.25])).torque_gain().is_some());
-        assert!(decision(scaled([1.25, 1.0, 1.25, 1.25])).torque_gain().is_none());
-        assert!(decision(scaled([1.01; 4])).torque_gain().is_none());
-    }
-
-    #[test]
-    fn causes_are_named_where_they_are_likely_and_the_verdict_is_theirs() {
-        let of = |verdict| Decision { verdict, probabilities: vec![0.9, 0.5, 0.7], ..decision(scaled([1.0; 4])) };
-        assert_eq!([Verdict::Effect, Verdict::Unexplained].map(|v| of(v).named()), [2, 0]);
     }
 
     #[test]

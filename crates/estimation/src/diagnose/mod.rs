@@ -3,6 +3,8 @@
 mod assess;
 mod closed_loop;
 mod conclusion;
+mod confidence;
+mod decision;
 mod diagnosis;
 mod gap;
 pub mod location;
@@ -29,7 +31,8 @@ pub use crate::conditioning::{CHANNELS, NoiseEstimate, NoiseMethod, Record, TORQ
 pub use crate::hypothesis::{BaseParameter, Fit, Hypothesis, Model};
 pub use assess::{Case, Outcome, Replay};
 pub use closed_loop::{ClosedLoop, Commands, LoopRanked, verified};
-pub use conclusion::{Decision, UNCAUSED};
+pub use confidence::UNCAUSED;
+pub use decision::Decision;
 pub use diagnosis::{
     AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, Figures, GapReport, HeldOut, Levels, Ranked, Remainder,
     Rounding, RoundingRole, Site, Undecided, Way, Where,

@@ -9,7 +9,7 @@
 //! On a rigid axis motor, coupling and table are one place, called `axis`.
 
 use super::assess::{Case, HELD_OUT, Outcome, Replay};
-use super::conclusion::Decision;
+use super::decision::Decision;
 use super::diagnosis::ClosureOf;
 use super::gap::{self, Gaps};
 use super::location::without_offset;

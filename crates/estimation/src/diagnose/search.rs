@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use super::conclusion::Decision;
+use super::decision::Decision;
 use super::moves::{MOVED, MOVED_FAR};
 use super::pool::Pool;
 use super::steps::Measure;

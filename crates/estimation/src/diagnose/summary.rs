@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::assess::Case;
-use super::conclusion::Decision;
+use super::decision::Decision;
 use super::diagnosis::{AxisParameter, Cause, ClosureOf, Diagnosis, Estimate, GapReport, HeldOut, Ranked, Site, Where};
 use super::gap::{Gap, Gaps};
 use super::location::Location;
