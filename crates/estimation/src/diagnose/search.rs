@@ -82,6 +82,7 @@ fn decide_from(search: Search<'_>, baseline: Baseline, known: Option<Fit>) -> De
     ascent.beside_the_textbook();
     ascent.several_at_once();
     ascent.what_was_passed_by();
+    ascent.down_to_the_noise();
     ascent.ended()
 }
 
@@ -171,6 +172,24 @@ impl<'a> Ascent<'a> {
                 // It was likelier by what is no cause alone.
                 pool.give_up(&terms);
             }
+        }
+    }
+
+    /// What is less than drives are true to is a cause all the same where one effect leaves no more than the encoders' noise of it: then the
+    /// torque of this log is as true as that.
+    fn down_to_the_noise(&mut self) {
+        let (search, chosen) = (&self.search, &self.chosen);
+        if !search.is_negligible(chosen)
+            || search.at_floor(chosen)
+            || chosen.terms.len() >= MOST
+            || search.is_over_budget()
+        {
+            return;
+        }
+        let mut all = search.extended(chosen, chosen.terms.len(), &mut self.pool);
+        all.retain(|f| search.at_floor(f) && search.leaves_materially_less(&chosen.discrepancy, f));
+        if let Some(best) = search.likeliest_account(&all).filter(|f| search.is_likelier(f, chosen)) {
+            self.chosen = best;
         }
     }
 

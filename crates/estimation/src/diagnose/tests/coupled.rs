@@ -464,3 +464,18 @@ fn an_error_of_the_tables_scale_is_found_at_its_order() {
     let found = o.improved.effects.of(Effect::LeadError);
     assert!((found[1] / 4e-4 - 1.0).abs() < 0.1 && (found[2] / 7.0 - 1.0).abs() < 1e-3, "{found:?}");
 }
+
+#[test]
+fn what_is_less_than_drives_are_true_to_is_told_where_one_effect_leaves_the_noise_alone() {
+    let mut record = of_two_inertias(Parameters::PAPER, Settings::default(), 0.05, 0);
+    record.channels[2].as_mut().expect("measured").iter_mut().for_each(|theta| *theta *= 1.0 + 6e-7);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    record.channels.iter_mut().flatten().flatten().for_each(|theta| *theta += noise(&mut rng, 1e-4));
+    record.noise = [1e-4; 4];
+    searched(&record, Parameters::PAPER, |search| {
+        let given = search.problem.given(&search.problem.nominal).expect("runs");
+        assert!(search.is_negligible(&given) && !search.at_floor(&given), "{}", search.left(&given));
+    });
+    let o = diagnosed_as(&record, Structure::TwoInertia, Parameters::PAPER);
+    assert_eq!(o.decision.chosen.effects(), [Effect::LeadError], "{:#?}", ranking(&o));
+}
