@@ -73,10 +73,11 @@ impl Search<'_> {
             return Continue((simple, pool));
         }
         let mut weighing = self.weigh(&chosen, &finished, parameters, pool, independent);
-        // One that is not likely explains nothing that needs a cause.
+        // One that is not likely explains nothing that needs a cause, but where it alone leaves the noise of many times that.
         if let [only] = weighing.probabilities[..]
             && !is_likely(&only)
             && self.needs_no_cause(plain)
+            && !(self.at_floor(&chosen) && self.is_far_from_the_noise(plain))
         {
             return Continue((plain.clone(), weighing.into_fits()));
         }

@@ -36,7 +36,12 @@ impl Search<'_> {
         let of_noise = self.band().torque_share([0, 1].map(|i| self.band().noise_power(i)), self.problem.record);
         left <= COLOURED
             || left <= UNCAUSED && self.independent([fit]) > HARDLY_COLOURED
-            || left <= of_noise && self.band().noise_multiple(&fit.rows) < NEAR_THE_NOISE
+            || left <= of_noise && !self.is_far_from_the_noise(fit)
+    }
+
+    /// Whether a fit leaves many times the encoders' noise.
+    pub fn is_far_from_the_noise(&self, fit: &Fit) -> bool {
+        self.band().noise_multiple(&fit.rows) >= NEAR_THE_NOISE
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted
