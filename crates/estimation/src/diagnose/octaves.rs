@@ -12,25 +12,28 @@
 
 use std::ops::Range;
 
+use rustfft::FftPlanner;
+
 use super::search::Search;
 use crate::hypothesis::evidence::PRICE;
 use crate::hypothesis::fit::Fit;
-use crate::hypothesis::likelihood::{Band, TorqueResidual};
+use crate::hypothesis::likelihood::{Band, C, TorqueResidual};
 use crate::numerics::distribution::of_log_odds;
+use crate::trace::numerics::dot;
 
 impl Search<'_> {
     /// Probability that an effect of a fit stands out of such a discrepancy, beside `plain`, the fit without it.
     pub fn stands_out(&self, fit: &Fit, plain: &Fit) -> f64 {
         let band = self.band();
         let [with, without] = [fit, plain].map(|f| powers(band, &f.rows));
-        let gained: f64 = with.iter().zip(&without).map(|(with, without)| gain(&band.weight, with, without)).sum();
+        let gained = gain(&band.weight, &with, &without);
         let free = fit.coordinates.len() as f64 - plain.coordinates.len() as f64;
         let gained = gained - 0.5 * free * band.values().ln() - PRICE;
         of_log_odds(gained)
     }
 }
 
-/// Gain in log likelihood of an equation's powers `with` a cause over those `without`; `weight`: complex values of each bin.
+/// Gain in log likelihood of powers `with` a cause over those `without`; `weight`: complex values of each bin.
 fn gain(weight: &[f64], with: &[f64], without: &[f64]) -> f64 {
     let sum = |powers: &[f64], bins: Range<usize>| -> f64 { bins.map(|m| powers[m] * weight[m]).sum() };
     // An octave of a bin or two hardly has a power of its own: the mean of all counts as one value more in each.
@@ -42,15 +45,24 @@ fn gain(weight: &[f64], with: &[f64], without: &[f64]) -> f64 {
     octaves(weight.len()).into_iter().map(of_octave).sum()
 }
 
-/// Power of what lacks at each bin, in units of the noise there, for each equation.
-fn powers(band: &Band, residual: &TorqueResidual) -> Vec<Vec<f64>> {
-    let equations = band.equations();
-    let white = band.whiten(&residual.rows, &residual.weights, [0.0; 2]);
-    let of = |equation: usize| {
-        let bins = white.chunks_exact(2 * equations).zip(&band.weight);
-        bins.map(|(z, w)| (z[2 * equation].powi(2) + z[2 * equation + 1].powi(2)) / (2.0 * w)).collect()
+/// Power of what lacks at each bin, in units of the noise there: of the equations together, for what acts on one side shows in both; and without
+/// what the window spreads of the mean, which is one value.
+fn powers(band: &Band, residual: &TorqueResidual) -> Vec<f64> {
+    let spread = spread_of_a_mean(&band.taper, band.omega.len());
+    let without = |row: &Vec<C>| -> Vec<C> {
+        let mean = row.first().copied().unwrap_or_default();
+        row.iter().zip(&spread).map(|(r, of_mean)| r - mean * of_mean).collect()
     };
-    (0..equations).map(of).collect()
+    let white = band.whiten(&residual.rows.each_ref().map(without), &residual.weights, [0.0; 2]);
+    let bins = white.chunks_exact(2 * band.equations()).zip(&band.weight);
+    bins.map(|(z, w)| dot(z, z) / (2.0 * w)).collect()
+}
+
+/// What a window spreads of a mean into each bin but its own, over what it leaves there.
+fn spread_of_a_mean(taper: &[f64], bins: usize) -> Vec<C> {
+    let mut z: Vec<C> = taper.iter().map(|w| C::new(*w, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(z.len()).process(&mut z);
+    (0..bins).map(|m| if m == 0 { C::default() } else { z[m] / z[0] }).collect()
 }
 
 /// The mean's bin, the first, and each further octave of so many bins.
@@ -82,5 +94,19 @@ mod tests {
         let few = gain(&weight, &lower(8), &without);
         assert!(few > 0.2 * 8.0 * 100.0_f64.ln() && few < 8.0 * 100.0_f64.ln(), "{few}");
         assert_eq!(gain(&weight, &without, &without), 0.0);
+    }
+
+    #[test]
+    fn a_mean_is_one_value_under_a_window_too() {
+        // Half a sine: a constant under it has as much in the first bins as it spreads.
+        let taper: Vec<f64> = (0..256).map(|k| (std::f64::consts::PI * (f64::from(k) + 0.5) / 256.0).sin()).collect();
+        let spread = spread_of_a_mean(&taper, 8);
+        let bin = |m: usize| -> C {
+            let turned = |k: usize| C::from_polar(3.0 * taper[k], -std::f64::consts::TAU * (m * k) as f64 / 256.0);
+            (0..256).map(turned).sum()
+        };
+        assert_eq!(spread[0], C::default());
+        assert!((1..8).all(|m| (bin(m) - bin(0) * spread[m]).norm() < 1e-9), "{spread:?}");
+        assert!(spread[1].norm() > 0.3);
     }
 }
