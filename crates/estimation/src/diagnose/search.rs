@@ -4,8 +4,9 @@
 //! well the record speaks for it. One search raises it: from the axis alone, or from the several effects that one regression finds at
 //! once where no single one explains it, and from the best of the textbook's combinations (bias, Coulomb, viscous and their asymmetry,
 //! all of them compared), an effect is added, dropped or exchanged as long as that helps; then several at once, because of several large
-//! causes none helps alone. The verdict is the hypothesis at the end; what it leaves is the remainder. ([`super::steps`] has the single
-//! steps, [`super::moves`] what a step may lead to.)
+//! causes none helps alone; then beside what was passed by; last the one that leaves the noise alone of less than a drive is true to. The
+//! verdict is the hypothesis at the end ([`super::conclusion`]); what it leaves is the remainder. ([`super::steps`] has the single steps,
+//! [`super::moves`] what a step may lead to.)
 //!
 //! Held-out data have no part in it.
 
