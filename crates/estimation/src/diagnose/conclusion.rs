@@ -31,6 +31,8 @@ struct Account {
     /// Share of the values that are independent.
     independent: f64,
     weighing: Weighing,
+    /// The one of several effects that stays open beside those that are told.
+    open: Option<usize>,
 }
 
 impl Search<'_> {
@@ -44,10 +46,7 @@ impl Search<'_> {
                 Continue(other) => next = other,
             }
         };
-        match self.left_open(&mut account, axis) {
-            Break(without) => *without,
-            Continue(open) => self.told(account, open, given, parameters),
-        }
+        self.without_the_least_likely(&mut account, axis).unwrap_or_else(|| self.told(account, given, parameters))
     }
 
     /// What may be told of a hypothesis among all that were fitted, or that in its place.
@@ -77,27 +76,23 @@ impl Search<'_> {
         if let [only] = weighing.probabilities[..]
             && !is_likely(&only)
             && self.needs_no_cause(plain)
-            && !(self.at_floor(&chosen) && self.is_far_from_the_noise(plain))
+            && (!self.at_floor(&chosen) || self.band().is_near_the_noise(&plain.rows))
         {
             return Continue((plain.clone(), weighing.into_fits()));
         }
         weighing.share_with_twins();
-        if let Some(shorter) = weighing.open(&chosen).and_then(|i| weighing.instead_of_open(&chosen, i)) {
+        let open = weighing.open(&chosen);
+        if let Some(shorter) = open.and_then(|i| weighing.instead_of_open(&chosen, i)) {
             return Continue((shorter, weighing.into_fits()));
         }
-        Break(Account { chosen, finished, independent, weighing })
+        Break(Account { chosen, finished, independent, weighing, open })
     }
 
-    /// Which of several effects stays open beside those that are told, or the verdict without the one that is not likely.
-    fn left_open(&self, account: &mut Account, axis: [&Fit; 2]) -> ControlFlow<Box<Decision>, Option<usize>> {
-        let Account { chosen, weighing, independent, .. } = account;
-        let open = weighing.open(chosen);
-        let Some(least) = weighing.least_likely().filter(|_| open.is_none() && chosen.terms.len() > 1) else {
-            return Continue(open);
-        };
-        let Some(refitted) = weighing.refitted(least).or_else(|| self.refitted(chosen, least)) else {
-            return Continue(None);
-        };
+    /// The verdict without the one of several effects that is not likely; `None` where there is none such, or it stays open.
+    fn without_the_least_likely(&self, account: &mut Account, axis: [&Fit; 2]) -> Option<Decision> {
+        let Account { chosen, weighing, independent, open, .. } = account;
+        let least = weighing.least_likely().filter(|_| open.is_none() && chosen.terms.len() > 1)?;
+        let refitted = weighing.refitted(least).or_else(|| self.refitted(chosen, least))?;
         let [with_it, without_it] = [&*chosen, &refitted].map(|fit| self.confidence(axis[1], fit));
         let without = self.concluded_without(chosen, least, refitted, &weighing.ranking, axis, *independent);
         // Beside what it leaves the others may be lost, which beside it are likely, or others take a part of that: then it stays, and is
@@ -106,18 +101,19 @@ impl Search<'_> {
         let is_its_own = inertia_off(chosen, &self.problem.nominal) < MOVED_FAR;
         let keeps_the_others = without.named() >= others && is_extension(chosen, &without.chosen);
         if others + 1 < chosen.terms.len() || !self.is_understood(chosen) || !is_its_own || keeps_the_others {
-            return Break(Box::new(without));
+            return Some(without);
         }
         // As likely as it is none, the others are beside what is left without it.
         let there = weighing.probabilities[least];
         weighing.doubt_beside(least, there + (1.0 - there) * without_it / with_it);
-        Continue(Some(least))
+        *open = Some(least);
+        None
     }
 
     /// The decision for an account of which an effect may stay open.
-    fn told(&self, account: Account, open: Option<usize>, given: Fit, parameters: Fit) -> Decision {
-        let verdict = self.verdict(&account, open);
-        let Account { finished, independent, weighing, .. } = account;
+    fn told(&self, account: Account, given: Fit, parameters: Fit) -> Decision {
+        let verdict = self.verdict(&account);
+        let Account { finished, independent, weighing, open, .. } = account;
         let Weighing { mut ranking, twins, probabilities, .. } = weighing;
         let shares = self.shares(&finished);
         let effects = |i: usize| instead(&ranking, &finished, i, twins[i]);
@@ -140,7 +136,7 @@ impl Search<'_> {
         }
     }
 
-    fn verdict(&self, Account { chosen, weighing, .. }: &Account, open: Option<usize>) -> Verdict {
+    fn verdict(&self, Account { chosen, weighing, open, .. }: &Account) -> Verdict {
         let are_likely = weighing.likely() + usize::from(open.is_some()) == chosen.terms.len();
         match chosen.terms.is_empty() {
             false if are_likely && self.is_understood(chosen) => Verdict::Effect,

@@ -3,7 +3,6 @@
 use super::search::Search;
 use crate::effects::{EFFECTS, Effect};
 use crate::hypothesis::fit::Fit;
-use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 
 /// Doubt in a cause beside what no cause explains, times the root of that's share of the torque: beside a hundredth of the torque one
 /// cause in thirty is none, beside a tenth one in nine (both blind sets, whole and with the family of a cause withheld).
@@ -36,12 +35,7 @@ impl Search<'_> {
         let of_noise = self.band().torque_share([0, 1].map(|i| self.band().noise_power(i)), self.problem.record);
         left <= COLOURED
             || left <= UNCAUSED && self.independent([fit]) > HARDLY_COLOURED
-            || left <= of_noise && !self.is_far_from_the_noise(fit)
-    }
-
-    /// Whether a fit leaves many times the encoders' noise.
-    pub fn is_far_from_the_noise(&self, fit: &Fit) -> bool {
-        self.band().noise_multiple(&fit.rows) >= NEAR_THE_NOISE
+            || left <= of_noise && self.band().is_near_the_noise(&fit.rows)
     }
 
     /// Share of an effect in what it and the remainder make of the torque together, where that is largest, everything else fitted

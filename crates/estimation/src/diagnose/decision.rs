@@ -2,7 +2,7 @@
 
 use super::diagnosis::Undecided;
 use super::verdict::Verdict;
-use super::weighing::{Confusable, Weighed, is_likely};
+use super::weighing::{Confusable, Weighed, likely};
 use crate::hypothesis::fit::Fit;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -40,7 +40,7 @@ pub struct Decision {
 impl Decision {
     /// Causes that are named.
     pub fn named(&self) -> usize {
-        if self.verdict == Verdict::Effect { self.probabilities.iter().filter(|p| is_likely(p)).count() } else { 0 }
+        if self.verdict == Verdict::Effect { likely(&self.probabilities) } else { 0 }
     }
 
     /// True if the parameters all changed by one factor: a wrong torque constant.

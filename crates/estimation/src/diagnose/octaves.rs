@@ -25,7 +25,8 @@ impl Search<'_> {
     /// Probability that an effect of a fit stands out of such a discrepancy, beside `plain`, the fit without it.
     pub fn stands_out(&self, fit: &Fit, plain: &Fit) -> f64 {
         let band = self.band();
-        let [with, without] = [fit, plain].map(|f| powers(band, &f.rows));
+        let spread = spread_of_a_mean(&band.taper, band.omega.len());
+        let [with, without] = [fit, plain].map(|f| powers(band, &f.rows, &spread));
         let gained = gain(&band.weight, &with, &without);
         let free = fit.coordinates.len() as f64 - plain.coordinates.len() as f64;
         let gained = gained - 0.5 * free * band.values().ln() - PRICE;
@@ -47,11 +48,10 @@ fn gain(weight: &[f64], with: &[f64], without: &[f64]) -> f64 {
 
 /// Power of what lacks at each bin, in units of the noise there: of the equations together, for what acts on one side shows in both; and without
 /// what the window spreads of the mean, which is one value.
-fn powers(band: &Band, residual: &TorqueResidual) -> Vec<f64> {
-    let spread = spread_of_a_mean(&band.taper, band.omega.len());
+fn powers(band: &Band, residual: &TorqueResidual, spread: &[C]) -> Vec<f64> {
     let without = |row: &Vec<C>| -> Vec<C> {
         let mean = row.first().copied().unwrap_or_default();
-        row.iter().zip(&spread).map(|(r, of_mean)| r - mean * of_mean).collect()
+        row.iter().zip(spread).map(|(r, of_mean)| r - mean * of_mean).collect()
     };
     let white = band.whiten(&residual.rows.each_ref().map(without), &residual.weights, [0.0; 2]);
     let bins = white.chunks_exact(2 * band.equations()).zip(&band.weight);

@@ -24,7 +24,6 @@ use crate::conditioning::{Record, bridged};
 use crate::effects::Effect;
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::Fit;
-use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::problem::Work;
 
 /// Share of the torque that an account of a rigid axis leaves at most where the band that its motion rules is understood so far that what
@@ -95,7 +94,7 @@ impl<'a> Looks<'a> {
     fn at_own_rate(&self, searched: Prepared, own: Option<Prepared>, decision: Decision) -> (Prepared, Decision) {
         let chosen = &decision.chosen;
         let is_near = !chosen.terms.is_empty()
-            && (searched.band.noise_multiple(&chosen.rows) < NEAR_THE_NOISE || searched.left(chosen) < DISTINCT);
+            && (searched.band.is_near_the_noise(&chosen.rows) || searched.left(chosen) < DISTINCT);
         let Some(own) = own.filter(|_| is_near) else { return (searched, decision) };
         (self.progress)("at the record's own rate");
         let search = own.search(self.case, likely(&decision), &self.work, self.progress);

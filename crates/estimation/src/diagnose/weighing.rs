@@ -69,7 +69,7 @@ impl Weighing {
 
     /// Effects that are likely.
     pub fn likely(&self) -> usize {
-        self.probabilities.iter().filter(|p| is_likely(p)).count()
+        likely(&self.probabilities)
     }
 
     /// The least likely effect, where it is not likely.
@@ -118,6 +118,11 @@ impl Weighing {
 /// Whether a probability is that from which an effect may be named.
 pub fn is_likely(probability: &f64) -> bool {
     *probability >= LIKELY
+}
+
+/// How many of some effects are likely, by their probabilities.
+pub fn likely(probabilities: &[f64]) -> usize {
+    probabilities.iter().filter(|p| is_likely(p)).count()
 }
 
 /// Whether a fit has an effect of the family of this one.

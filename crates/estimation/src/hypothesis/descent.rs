@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::discrepancy::Discrepancy;
 use super::evidence::PRIOR;
 use super::fit::{Fit, Term};
-use super::likelihood::{Band, C, NEAR_THE_NOISE, Sight, TorqueResidual};
+use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
 use super::problem::Problem;
 use super::scatter;
@@ -183,7 +183,7 @@ impl<'a> Descent<'a> {
     /// at which every frequency counts alike, holds itself up by what the noise of the fast ones does to the parameters.
     pub fn try_noise_alone(&mut self) -> Option<()> {
         let (problem, band) = (self.problem, self.problem.band);
-        if band.at_floor(&self.at.rows) || band.noise_multiple(&self.at.rows) > NEAR_THE_NOISE {
+        if band.at_floor(&self.at.rows) || !band.is_near_the_noise(&self.at.rows) {
             return Some(());
         }
         let at = problem.along(&self.at.model, problem.bandwidth(self.at.s))?;

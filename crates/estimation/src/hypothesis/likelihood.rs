@@ -519,6 +519,11 @@ impl Band {
         (z.iter().map(|v| v * v).sum::<f64>() / self.values()).sqrt()
     }
 
+    /// Whether a residual is no more than some noises.
+    pub fn is_near_the_noise(&self, l: &TorqueResidual) -> bool {
+        self.noise_multiple(l) < NEAR_THE_NOISE
+    }
+
     /// Whether a residual is at the noise's floor, which is an estimate itself.
     pub fn at_floor(&self, l: &TorqueResidual) -> bool {
         self.noise_multiple(l).powi(2) < AT_FLOOR

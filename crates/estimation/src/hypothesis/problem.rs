@@ -9,7 +9,7 @@ use super::descent::{Along, differ, looser};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, Term};
 use super::inverse_dynamics::InverseDynamics;
-use super::likelihood::{Band, MotionSpectra, NEAR_THE_NOISE, TorqueResidual};
+use super::likelihood::{Band, MotionSpectra, TorqueResidual};
 use super::model::{BaseParameter, Free, Model};
 use super::scales::Scales;
 use super::tracking::{
@@ -185,7 +185,7 @@ impl Problem<'_> {
     /// the model to a place of their own: else it stands where these ask for the torque that it got, and lacks next to none.
     pub fn loosest(&self, model: &Model, rows: &TorqueResidual) -> Bandwidth {
         let of_noise = self.bandwidth([0.0; 2]);
-        if self.band.noise_multiple(rows) <= NEAR_THE_NOISE {
+        if self.band.is_near_the_noise(rows) {
             return of_noise;
         }
         let pull = model.pull();
