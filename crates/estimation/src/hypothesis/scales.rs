@@ -43,8 +43,10 @@ pub struct Scales {
     structure: Structure,
 }
 
-/// Least rms of the torque that acts on an axis, over the deviation of the logged one: an amplifier that swallows nearly all is none.
-const ACTS: f64 = 0.1;
+/// Least rms of the torque that acts on an axis, over that of the logged one: an amplifier that swallows more than it passes is none.
+const ACTS: f64 = 0.5;
+/// The same of its deviation: a limit below all of a torque makes a constant of it, beside which a load explains any motion.
+const VARIES: f64 = 0.1;
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
 /// Share of the path on which a torque that goes with the position must be in the band for it to be seen, where that is less than the
@@ -98,23 +100,26 @@ fn is_as_logged(model: &Model) -> bool {
     ahead == 0.0 && on_time.effects.active().inputs().is_empty()
 }
 
-/// Work of the torque that acts in a model along a motion, J, and the rms of that torque, N.m: what comes late, through a lag or cut off did
-/// other work than what was logged, where the motion swings as fast as that even of the other sign. `moved`: path from sample to sample,
-/// rad.
-fn acting(model: &Model, record: &Record, moved: &[f64]) -> (f64, f64) {
+/// Work of the torque that acts in a model along a motion, J, and rms and deviation of that torque, N.m: what comes late, through a lag or cut
+/// off did other work than what was logged, where the motion swings as fast as that even of the other sign. `moved`: path from sample to
+/// sample, rad.
+fn acting(model: &Model, record: &Record, moved: &[f64]) -> (f64, [f64; 2]) {
     let (model, ahead) = model.on_time();
     let per = record.instants();
     let mut arriving = Arriving::new(&model, record, per, ahead, 0);
-    let (mut work, mut square) = (0.0, 0.0);
+    let (mut work, mut sum, mut square) = (0.0, 0.0, 0.0);
     for (k, path) in moved.iter().enumerate() {
         for j in 0..per {
             let acts = arriving.over(k, j);
             let mean = 0.5 * (acts.start + acts.end);
             work += mean * path / per as f64;
+            sum += mean;
             square += mean * mean;
         }
     }
-    (work, (square / (per * moved.len().max(1)) as f64).sqrt())
+    let steps = (per * moved.len().max(1)) as f64;
+    let [mean, square] = [sum, square].map(|of| of / steps);
+    (work, [square, (square - mean * mean).max(0.0)].map(f64::sqrt))
 }
 
 impl Scales {
@@ -181,11 +186,13 @@ impl Scales {
         let rigid = self.structure == Structure::Rigid;
         let p = &model.parameters;
         let all = p.i1 + p.i2;
-        let (work, acts) =
-            if is_as_logged(model) { (self.work, self.torque) } else { acting(model, record, &self.moved) };
-        // A dead zone as wide as the limit beside it explains any motion by none of the torque.
-        if acts < ACTS * self.torque {
-            return false;
+        let mut work = self.work;
+        if !is_as_logged(model) {
+            let (done, [acts, varies]) = acting(model, record, &self.moved);
+            if acts < ACTS * level::rms(&record.torque) || varies < VARIES * self.torque {
+                return false;
+            }
+            work = done;
         }
         effects.into_iter().all(|e| {
             let info = e.info();
@@ -287,11 +294,33 @@ mod tests {
         assert!(is_as_logged(&model));
         for delay in [0.0, 0.021, 0.05, 0.09] {
             model.effects.of_mut(Effect::Delay)[0] = delay;
-            let (work, rms) = acting(&model, &record, &moved);
+            let (work, [rms, deviation]) = acting(&model, &record, &moved);
             let power = work / (f64::from(n) * dt);
             assert!((power - 0.5 * (w * delay).cos()).abs() < 5e-3, "{delay} {power}");
-            assert!((rms - 0.5_f64.sqrt()).abs() < 5e-3, "{delay} {rms}");
+            assert!([rms, deviation].iter().all(|of| (of - 0.5_f64.sqrt()).abs() < 5e-3), "{delay} {rms} {deviation}");
         }
         assert!(!is_as_logged(&model));
+    }
+
+    #[test]
+    fn a_limit_below_all_of_a_torque_makes_a_constant_of_it_and_a_dead_zone_takes_what_it_swallows() {
+        // T = 2 + cos(w t): the limit 1 lets a constant act; of cos(w t) a zone of cos(pi/6) passes a twentieth of the rms.
+        let (n, dt, w) = (20_000, 1e-3, 25.0);
+        let acts = |offset: f64, effect: Effect, value: f64| {
+            let torque = (0..=n).map(|k| offset + (w * dt * f64::from(k)).cos()).collect();
+            let record = Record::new(dt, Hold::Linear, torque, [const { None }; 4]);
+            let mut model = Model::new(Parameters::PAPER, Structure::TwoInertia, Settings::default());
+            model.effects.of_mut(effect)[0] = value;
+            acting(&model, &record, &vec![0.0; n as usize]).1
+        };
+        let [rms, deviation] = acts(2.0, Effect::Saturation, 1.0);
+        assert!((rms - 1.0).abs() < 1e-9 && deviation < 1e-6, "{rms} {deviation}");
+        let zone = (std::f64::consts::PI / 6.0).cos();
+        let [rms, _] = acts(0.0, Effect::DeadZone, zone);
+        // The mean square of cos x - cos a over |x| < a, twice a period: (a + 2 a cos^2 a - 3 sin a cos a)/pi.
+        let a = std::f64::consts::PI / 6.0;
+        let square = (a + 2.0 * a * zone * zone - 3.0 * a.sin() * zone) / std::f64::consts::PI;
+        assert!((rms - square.sqrt()).abs() < 1e-4, "{rms} {}", square.sqrt());
+        assert!(rms < ACTS * 0.5_f64.sqrt());
     }
 }
