@@ -60,6 +60,7 @@ impl Search<'_> {
         let plain = if self.are_off(given, parameters, independent) { parameters } else { given };
         let is_of_another_axis = |f: &Fit| !f.terms.is_empty() && is_run_off(f, &self.problem.nominal);
         if is_of_another_axis(&chosen) {
+            self.ran_off.store(true, Ordering::Relaxed);
             // The likeliest that says something of this one.
             pool.retain(|f| !is_of_another_axis(f));
             let next = self.best(&pool, independent).filter(|f| !f.terms.is_empty()).unwrap_or(plain).clone();
@@ -124,6 +125,7 @@ impl Search<'_> {
         Decision {
             verdict,
             cut_short: self.cut_short.load(Ordering::Relaxed),
+            ran_off: self.ran_off.load(Ordering::Relaxed),
             given,
             parameters,
             chosen: finished,

@@ -91,6 +91,14 @@ fn referred(
 }
 
 impl Prepared {
+    /// The same with the motion given, its noise seen through the axis as it is given: parameters alone follow no torque that friction takes.
+    #[must_use]
+    pub fn with_motion_given(self, nominal: &Model) -> Self {
+        let mask = band::mask(&self.record, nominal.structure);
+        let band = Band::new(&self.record, nominal, self.limit, &mask).with_motion_given();
+        Self { band, reference: *nominal, ..self }
+    }
+
     /// A search in it for some effects, its work counted with that of other looks.
     pub fn search<'a>(
         &'a self,
@@ -99,9 +107,10 @@ impl Prepared {
         work: &Work,
         progress: &'a (dyn Fn(&str) + Sync),
     ) -> Search<'a> {
-        let problem = Problem::of(&self.record, &self.band, case.nominal, self.peak).counted_in(work);
+        let problem =
+            Problem::of(&self.record, &self.band, case.nominal, self.peak).counted_in(work).along_what_is_given();
         let reference = self.reference;
-        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
+        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), ran_off: false.into(), progress }
     }
 
     /// Share of the torque that a fit leaves.
@@ -143,6 +152,7 @@ impl Prepared {
     /// A record at the same rate and in the same band. A torque that stands there is no measure of what is lacking.
     fn of_another(&self, record: Record, model: &Model) -> Self {
         let band = Band::new(&record, model, self.limit, &band::mask(&record, model.structure));
+        let band = if self.band.motion_is_given() { band.with_motion_given() } else { band };
         let torque_rms = deviation(&record.torque).max(self.torque_rms);
         Self { record, band, torque_rms, ..*self }
     }

@@ -19,9 +19,10 @@ use super::quantisation;
 use super::residual::located;
 use super::search::{Search, decide, decide_further};
 use super::summary::{build, overlays};
+use super::verdict::Verdict;
 use crate::axis::Structure;
 use crate::conditioning::{Record, bridged};
-use crate::effects::Effect;
+use crate::effects::{Effect, Place};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::Fit;
 use crate::hypothesis::problem::Work;
@@ -61,6 +62,8 @@ struct Looks<'a> {
     suspects: Vec<Effect>,
     /// What all of them have simulated.
     work: Work,
+    /// Whether the motion is given, and not the torque.
+    motion_is_given: bool,
     progress: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -68,7 +71,24 @@ impl<'a> Looks<'a> {
     fn new(case: &'a Case<'a>, progress: &'a (dyn Fn(&str) + Sync)) -> Self {
         let may = |e: &Effect| e.may_be_named(case.nominal.structure, case.motion) && !case.nominal.effects.is_on(*e);
         let suspects = case.suspects.iter().copied().filter(may).collect();
-        Self { case, suspects, work: Work::default(), progress }
+        Self { case, suspects, work: Work::default(), motion_is_given: false, progress }
+    }
+
+    /// The same with the motion given: an encoder's own effect is none of its torque, and of a torque that is swallowed any other would have
+    /// done as well.
+    fn with_motion_given(self) -> Self {
+        let is_told = |e: &Effect| e.info().place != Place::Sensor && !e.bends_torque();
+        Self { suspects: self.suspects.iter().copied().filter(is_told).collect(), motion_is_given: true, ..self }
+    }
+
+    /// A record ready for a look at it.
+    fn prepared(&self, record: &Record, reach: Reach) -> (Prepared, Option<Prepared>) {
+        let nominal = &self.case.nominal;
+        let (searched, own) = prepared(record, nominal, reach);
+        if !self.motion_is_given {
+            return (searched, own);
+        }
+        (searched.with_motion_given(nominal), own.map(|own| own.with_motion_given(nominal)))
     }
 
     /// A search for every effect that may be named.
@@ -76,11 +96,22 @@ impl<'a> Looks<'a> {
         prepared.search(self.case, self.suspects.clone(), &self.work, self.progress)
     }
 
-    /// The decision on a record, and the look that it was made in.
-    fn decided(&self, train: &Record) -> (Prepared, Decision) {
+    /// The decision on a record, and the look that it was made in. With the torque given an axis is the heavier the less of its torque the
+    /// motion needs: where it would be another one and nothing else is told of it, the motion is given.
+    fn decided(self, train: &Record) -> (Prepared, Decision) {
+        let found = self.looked(train);
+        let tells_nothing = found.1.ran_off && found.1.verdict == Verdict::Unexplained;
+        if self.case.nominal.structure == Structure::Rigid && tells_nothing {
+            (self.progress)("with the motion given");
+            return self.with_motion_given().looked(train);
+        }
+        found
+    }
+
+    fn looked(&self, train: &Record) -> (Prepared, Decision) {
         // A rigid axis is taken to be under control.
         let rigid = self.case.nominal.structure == Structure::Rigid;
-        let (searched, own) = prepared(train, &self.case.nominal, if rigid { Reach::Ruled } else { Reach::Shown });
+        let (searched, own) = self.prepared(train, if rigid { Reach::Ruled } else { Reach::Shown });
         let decision = decide(self.search(&searched), None);
         let (mut searched, mut decision) = self.at_own_rate(searched, own, decision);
         if let Some(wide) = rigid.then(|| self.beyond_the_band(train, &searched, &decision)).flatten() {
@@ -117,7 +148,7 @@ impl<'a> Looks<'a> {
             return None;
         }
         (self.progress)("beyond the band that the motion rules");
-        let (wide, own) = prepared(train, &self.case.nominal, Reach::Whole);
+        let (wide, own) = self.prepared(train, Reach::Whole);
         let further = decide_further(self.search(&wide), &decision.chosen)?;
         let (wide, other) = self.at_own_rate(wide, own, further);
         // More to explain and less left of it: what was missing is there.

@@ -59,6 +59,16 @@ impl InverseDynamics {
         model.effects.active().sensors().is_empty()
     }
 
+    /// What a model keeps of the record's torque on its way in, N.m; `None` where all of it acts.
+    pub fn kept(&self, model: &Model, record: &Record) -> Option<Vec<f64>> {
+        let on = model.effects.active();
+        let inputs = on.inputs();
+        (!inputs.is_empty()).then(|| {
+            let [kept, _] = self.trajectory.resisted(model, record, inputs.iter().copied());
+            kept
+        })
+    }
+
     /// What a model lacks, on motor and table, N.m.
     pub fn torque(&self, model: &Model, record: &Record) -> Torques {
         let acts = |e: &Effect| model.effects.is_on(*e) && !e.is_mode();

@@ -14,7 +14,8 @@
 //!
 //! That density takes the torque as given: the discrepancy moves the axis. Where the motion is given, as far as a drive follows its
 //! reference, the discrepancy is in the torque that it took, and the readings have the density that the reference model gives them:
-//! `ln det C` at the reference's stiffness ([`Band::with_motion_given`]).
+//! `ln det C` at the reference's stiffness ([`Band::with_motion_given`]). A torque that does not act as it was logged then has its own
+//! density ([`Band::density_of_torques`]): else what swallows it explained it.
 
 mod score;
 
@@ -113,6 +114,8 @@ pub struct TorqueResidual {
     /// The spectra with it, where there is any.
     whole: [Vec<C>; 2],
     vibrations: Vec<Vibration>,
+    /// `ln |dT'/dT|^2` of the torque `T'` that acts over the logged one, of all bins: the density of logged torques over that of acting ones.
+    pub(super) acts: f64,
     /// Square of the inertia of each equation over the larger one's: torques of one acceleration.
     pub(super) alike: [f64; 2],
 }
@@ -217,6 +220,12 @@ impl Band {
         Self { motion_is_given: true, ..self.clone() }
     }
 
+    /// Whether the motion is given, and not the torque.
+    #[must_use]
+    pub const fn motion_is_given(&self) -> bool {
+        self.motion_is_given
+    }
+
     /// The stiffness of parameters as the equations show it at a bin: of one equation its first entry. There the side without an encoder
     /// follows the other as it does in a `model`: `x11 - 2 a x12 + a^2 x22`, `a = d12/d22` of that, for the model itself the Schur
     /// complement `d11 - d12^2/d22`, and for a part of it what the complement gains by that part.
@@ -319,6 +328,18 @@ impl Band {
         rows
     }
 
+    /// How dense the logged torques lie over those that act, of which a model keeps some on their way in: `ln |dT'/dT|^2` over all bins but
+    /// the mean's.
+    pub(super) fn density_of_torques(&self, record: &Record, kept: &[f64], planner: &mut FftPlanner<f64>) -> f64 {
+        let acting = record.torque.iter().zip(kept).map(|(logged, kept)| logged - kept).collect();
+        let mut spectrum = |torque: Vec<f64>| {
+            let [rows, _] = self.rows(&[torque, vec![0.0; record.len()]], 1.0, planner);
+            rows.into_iter().map(|z| z.norm_sqr().max(f64::MIN_POSITIVE).ln())
+        };
+        let (logged, acting) = (spectrum(record.torque.clone()), spectrum(acting));
+        self.weight.iter().zip(acting.zip(logged)).skip(1).map(|(w, (a, l))| w * (a - l)).sum()
+    }
+
     /// Spectra of the torque on motor and table that a model lacks along a motion, `[theta1, omega1, theta2, omega2]` a sample. What hidden
     /// inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
     pub fn torque_residual(
@@ -338,7 +359,7 @@ impl Band {
         let weights = self.weights(model);
         let known = weighed_at.is_some();
         let weighed_at = weighed_at.unwrap_or_else(|| [0, 1].map(|i| self.power(&rows[i])));
-        let mut residual = TorqueResidual { rows, weights, weighed_at, whole, vibrations, alike };
+        let mut residual = TorqueResidual { rows, weights, weighed_at, whole, vibrations, acts: 0.0, alike };
         self.weigh(&mut residual, weighed_at);
         if !known && !residual.vibrations.is_empty() {
             let s = self.discrepancy(&residual);
@@ -476,7 +497,8 @@ impl Band {
                 if self.motion_is_given { log_det - self.factor(self.reference[m], s).3 } else { noise.density };
             weight * ((first * a).norm_sqr() + second + log_det - density)
         };
-        -l.weights.iter().zip(&self.weight).enumerate().map(bin).sum::<f64>()
+        let acts = if self.motion_is_given { l.acts } else { 0.0 };
+        acts - l.weights.iter().zip(&self.weight).enumerate().map(bin).sum::<f64>()
     }
 
     /// Real values compared.
@@ -557,7 +579,36 @@ impl TorqueResidual {
             weighed_at: [0.0; 2],
             whole: [Vec::new(), Vec::new()],
             vibrations: Vec::new(),
+            acts: 0.0,
             alike: [1.0; 2],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Hold, Structure};
+    use crate::effects::Settings;
+
+    #[test]
+    fn logged_torques_lie_denser_than_those_that_act_by_the_gain_at_each_frequency() {
+        let n = 1024;
+        let torque: Vec<f64> =
+            (0..n).map(|k| (0.9 * f64::from(k)).sin() + (0.02 * f64::from(k * k % 977)).cos()).collect();
+        let record = Record::new(1e-3, Hold::Zoh, torque.clone(), [const { None }; 4]);
+        let model = Model::new(Parameters::PAPER, Structure::Rigid, Settings::default());
+        let band = Band::new(&record, &model, 100.0, &vec![1.0; n as usize]);
+        let density = |kept: &[f64]| band.density_of_torques(&record, kept, &mut FftPlanner::new());
+        let bins = band.weight[1..].iter().sum::<f64>();
+        // Half of the torque is kept: a quarter of its power acts. All that is kept of another sign: four times.
+        let kept = |share: f64| -> Vec<f64> { torque.iter().map(|t| share * t).collect() };
+        assert!((density(&kept(0.5)) + bins * 4.0_f64.ln()).abs() < 1e-6 * bins);
+        assert!((density(&kept(-1.0)) - bins * 4.0_f64.ln()).abs() < 1e-6 * bins);
+        assert_eq!(density(&kept(0.0)), 0.0);
+        // What only comes late has the same power: one sample of 1024, the last in the place of the first.
+        let late: Vec<f64> =
+            (0..torque.len()).map(|k| torque[k] - torque[(k + torque.len() - 1) % torque.len()]).collect();
+        assert!(density(&late).abs() < 1e-6 * bins, "{}", density(&late));
     }
 }

@@ -105,6 +105,15 @@ impl Problem<'_> {
         Self { dynamics: dynamics().map(Arc::new), ..self.clone() }
     }
 
+    /// The same along the motion as measured, where that is given.
+    #[must_use]
+    pub fn along_what_is_given(self) -> Self {
+        if !self.band.motion_is_given() {
+            return self;
+        }
+        self.given(&self.nominal).map_or_else(|| self.clone(), |fit| self.along_the_motion_of(&fit))
+    }
+
     /// The same, its steps counted with those of other looks.
     #[must_use]
     pub fn counted_in(self, steps: &Work) -> Self {
@@ -231,7 +240,16 @@ impl Problem<'_> {
         let dynamics = self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model))?;
         let torque = dynamics.torque(model, self.record);
         let is_bounded = torque.iter().flatten().all(|t| t.abs() < LARGEST);
-        is_bounded.then(|| (self.residual_along(model, &torque, &dynamics.motion, weighed_at), dynamics))
+        is_bounded.then(|| {
+            let mut residual = self.residual_along(model, &torque, &dynamics.motion, weighed_at);
+            if self.band.motion_is_given()
+                && let Some(kept) = dynamics.kept(model, self.record)
+            {
+                let density = |planner: &mut _| self.band.density_of_torques(self.record, &kept, planner);
+                residual.acts = PLANNER.with_borrow_mut(density);
+            }
+            (residual, dynamics)
+        })
     }
 
     /// Whether a model is compared along the motion of another's run, whatever bandwidth it would follow the record at.

@@ -42,6 +42,19 @@ fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torq
 }
 
 #[test]
+fn the_friction_of_a_slow_joint_is_told_where_its_inertia_needs_next_to_none_of_the_torque() {
+    // Inertia: 0.2 N.m rms; friction: 2.8; beside it a torque of 0.4 that no law follows. With the torque given nothing is told beside an
+    // inertia that does not run off.
+    let wanted = |t: f64| 0.4 * ((0.4 * t).sin() + 0.4 * (0.93 * t).sin());
+    let wanders = |t: f64| 0.4 * ((0.31 * t * t).sin() + (0.17 * t * t + 1.0).cos());
+    let friction = with(&[(Effect::ViscousMotor, 0, 12.0), (Effect::CoulombMotor, 0, 1.2)]);
+    let o = diagnosed(&led(10_000, wanted, friction, 0.05, wanders, 5), INERTIA);
+    assert_eq!(named(&o), ["dry_friction", "viscous_friction"], "{:#?}", ranking(&o));
+    let [viscous, ..] = *o.improved.effects.of(Effect::ViscousMotor) else { unreachable!() };
+    assert!((viscous / 12.0 - 1.0).abs() < 0.15, "{viscous}");
+}
+
+#[test]
 fn causes_before_all_of_which_the_inertia_runs_off_are_found_at_once() {
     // Once to and fro at a constant speed: friction either way, a load and a ripple are nearly all of the torque.
     let way = |t: f64| 0.03 * (3.0 * t).sin().asin();
