@@ -69,7 +69,9 @@ impl Search<'_> {
         let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
         self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
-        if let Some(simple) = self.simplified(&finished, independent, &pool).cloned() {
+        // By its own errors, as its rivals are, or by those that hold.
+        let simple = [&finished, &chosen].into_iter().find_map(|fit| self.simplified(fit, independent, &pool));
+        if let Some(simple) = simple {
             return Continue((simple, pool));
         }
         let mut weighing = self.weigh(&chosen, &finished, parameters, pool, independent);

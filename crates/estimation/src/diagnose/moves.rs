@@ -10,7 +10,7 @@ use super::race::RACING;
 use super::search::{MOST, Search};
 use crate::effects::Effect;
 use crate::hypothesis::determined::is_simpler;
-use crate::hypothesis::fit::{Fit, PROBE, Term};
+use crate::hypothesis::fit::{Fit, PROBE, STEPS, Term};
 use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::model::{Coordinate, Model};
 use crate::hypothesis::starts::{Screening, StartPoint};
@@ -212,24 +212,39 @@ impl Search<'_> {
         self.raced(probed, None, Some(fit))
     }
 
-    /// The likelier fit with the simpler law of the same thing in place of an effect that stands where it is that law.
-    pub fn simplified<'f>(&self, fit: &Fit, independent: f64, pool: &'f [Fit]) -> Option<&'f Fit> {
-        let gone = fit.terms.iter().map(|t| t.0).find(|e| is_simpler(fit, *e, independent))?;
-        let is_simple = |e: Effect| {
-            let (own, info) = (gone.info(), e.info());
-            e.simpler_at_zero().is_none() && (info.family, info.place) == (own.family, own.place)
+    /// The likelier fit with the simpler law of the same thing in place of an effect that stands where it is that law: a known one, or else
+    /// from where that stands.
+    pub fn simplified(&self, fit: &Fit, independent: f64, pool: &[Fit]) -> Option<Fit> {
+        let at = (0..fit.terms.len()).find(|i| is_simpler(fit, fit.terms[*i].0, independent))?;
+        let gone = fit.terms[at].0.info();
+        let is_simple = |e: &Effect| {
+            let info = e.info();
+            e.simpler_at_zero().is_none() && (info.family, info.place) == (gone.family, gone.place)
         };
+        let simple = self.suspects.iter().copied().find(is_simple)?;
         let same = |f: &&Fit| {
-            let others = || fit.terms.iter().filter(|t| t.0 != gone);
+            let others = || fit.terms.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, t)| t);
             f.terms.len() == fit.terms.len()
                 && others().all(|t| f.terms.contains(t))
-                && f.terms.iter().any(|t| is_simple(t.0))
+                && f.terms.iter().any(|t| t.0 == simple)
         };
         let likelier = |f: &&Fit| !f.at_bound && self.evidence(f, independent) > self.evidence(fit, independent);
-        pool.iter()
+        let known = pool
+            .iter()
             .filter(same)
             .filter(likelier)
-            .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
+            .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)));
+        known.cloned().or_else(|| self.as_simpler(fit, at, simple).filter(|f| likelier(&f)))
+    }
+
+    /// The fit with the simpler law in the place of an effect that has its size first, too, from where that stands.
+    fn as_simpler(&self, fit: &Fit, at: usize, simple: Effect) -> Option<Fit> {
+        let mut model = self.bare(fit, at);
+        model.effects.of_mut(simple)[0] = fit.model.effects.of(fit.terms[at].0)[0];
+        let mut terms = fit.terms.clone();
+        terms[at] = (simple, 0);
+        let fitted = self.problem.fit(&model, &terms, fit.discrepancy, STEPS)?;
+        self.problem.deepen(&fitted)
     }
 }
 

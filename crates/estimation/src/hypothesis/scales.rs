@@ -232,7 +232,8 @@ impl Scales {
         let side = effect.info().place.side();
         // How often a side turns that is not measured is not known.
         let (path, reversals) = self.paths[side];
-        effect.repeats(model.effects.of(effect), self.travel_of(side), path == 0.0 || reversals > 0.0)
+        let reversals = if path == 0.0 { f64::INFINITY } else { reversals };
+        effect.repeats(model.effects.of(effect), self.travel_of(side), reversals)
     }
 
     /// Travel of a side, rad.

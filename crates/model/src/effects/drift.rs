@@ -88,6 +88,7 @@ impl DryFriction for FrictionDrift {
             Variant { name: "viscous, coming to rest", free: &[1, 2] },
         ],
     };
+    const CHANGES: bool = true;
 
     fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S> {
         let s = drifted(p[2], slip.time);

@@ -284,15 +284,16 @@ mod tests {
     fn a_ripple_of_any_order_repeats_where_the_travel_shows_two_periods_and_one_of_a_turn_does_anyway() {
         let mut settings = crate::effects::Settings::default();
         settings.of_mut(Effect::TorqueRipple)[1] = 10.0;
-        let repeats = |effect: Effect, travel: f64| effect.repeats(settings.of(effect), travel, false);
+        let repeats = |effect: Effect, travel: f64| effect.repeats(settings.of(effect), travel, 0.0);
         assert!(repeats(Effect::TorqueRipple, 1.3) && !repeats(Effect::TorqueRipple, 1.2));
         assert!(repeats(Effect::Unbalance, 1.2) && repeats(Effect::CoulombMotor, 0.0));
     }
 
     #[test]
-    fn a_friction_that_changes_shows_its_sign_again_where_the_axis_turns_back() {
-        assert!(Effect::FrictionDrift.repeats(&[0.1, 0.0, 0.0], 1.0, true));
-        assert!(!Effect::FrictionDrift.repeats(&[0.1, 0.0, 0.0], 1.0, false));
+    fn a_friction_that_changes_shows_its_sign_again_where_the_axis_goes_to_and_fro_twice() {
+        let repeats = |effect: Effect, reversals: f64| effect.repeats(&[0.1, 0.0, 0.0], 1.0, reversals);
+        assert!(repeats(Effect::FrictionDrift, 3.0) && !repeats(Effect::FrictionDrift, 2.0));
+        assert!(repeats(Effect::StiffnessDrift, 0.0) && repeats(Effect::ViscousMotor, 0.0));
     }
 
     #[test]

@@ -13,6 +13,9 @@ impl ParameterInfo {
     }
 }
 
+/// Periods of what repeats that a motion must show for it to be told from any other torque.
+const SHOWN: f64 = 2.0;
+
 impl Effect {
     /// Whether the effect can be identified from a record of an axis of that structure and motion: a rigid one has no coupling and no second
     /// encoder, and of two laws that differ by their side alone the motor's stands for both; a weight on a slide pulls alike everywhere.
@@ -49,13 +52,13 @@ impl Effect {
         }
     }
 
-    /// Whether a motion shows it again, that goes over a travel, rad, and turns back or does not: a period of any length that is seen once is
-    /// a torque of the position like others, and what changes while the axis goes one way may be any torque.
+    /// Whether a motion shows it again, that goes over a travel, rad, and turns back so many times: a period of any length that is seen once is
+    /// a torque of the position like others, and so is of the time what a motion to and fro once shows alone.
     #[must_use]
-    pub fn repeats(self, values: &[f64], travel: f64, turns_back: bool) -> bool {
+    pub fn repeats(self, values: &[f64], travel: f64, reversals: f64) -> bool {
         match self.length() {
-            Some(Length::Periods(order)) => values[order] * travel >= 2.0 * std::f64::consts::TAU,
-            _ => turns_back || self != Self::FrictionDrift,
+            Some(Length::Periods(order)) => values[order] * travel >= SHOWN * std::f64::consts::TAU,
+            _ => !self.is_changing_friction() || reversals >= 2.0 * SHOWN - 1.0,
         }
     }
 

@@ -164,6 +164,14 @@ macro_rules! effects {
                 }
             }
 
+            /// Whether it is a friction that changes with time: see [`DryFriction::CHANGES`].
+            #[must_use]
+            pub const fn is_changing_friction(self) -> bool {
+                match self {
+                    $(Self::$name => when!(dry, $shape, <$law as DryFriction>::CHANGES, false),)*
+                }
+            }
+
             /// The parameter that is half of a play, whose contacts the step locates in time.
             #[must_use]
             pub const fn play_parameter(self) -> Option<usize> {

@@ -211,6 +211,8 @@ pub trait DryFriction {
     const INFO: EffectInfo;
     /// The parameter that is the level's share of the load, if it has one.
     const LOAD: Option<usize> = None;
+    /// Whether it changes with time, so that a motion to and fro alone shows it: while the axis goes one way it may be any torque.
+    const CHANGES: bool = false;
 
     /// The level for a slip.
     fn level<S: Scalar>(p: &[S], slip: &Slip<S>) -> Level<S>;

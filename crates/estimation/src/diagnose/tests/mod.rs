@@ -17,7 +17,7 @@ use crate::effects::{EFFECTS, Effect, Family, Ramp, Settings};
 use crate::hypothesis::band::Reach;
 use crate::hypothesis::fit::{Fit, STEPS, Term};
 use crate::hypothesis::likelihood::{C, TorqueResidual};
-use crate::hypothesis::model::Model;
+use crate::hypothesis::model::{Free, Model};
 use crate::hypothesis::problem::{Problem, Work};
 use crate::hypothesis::tracking::{steps_per_sample, track, track_step_by_step};
 use rand::{RngExt, SeedableRng};

@@ -31,6 +31,28 @@ fn a_cause_that_acts_beyond_the_part_searched_joins_the_verdict() {
 }
 
 #[test]
+fn a_bristle_whose_reach_is_not_known_is_dry_friction_though_that_was_never_fitted() {
+    let (bristle, dry) = (Effect::PreslidingMotor, Effect::CoulombMotor);
+    let record = logged(with(&[(dry, 0, 3.0), (Effect::ViscousMotor, 0, 1.5)]), 1.0, 0.05, |_| 0.0, 5);
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let noise = estimate_noise(&record.torque, &channels, None);
+    let nominal = Model::new(parameters(INERTIA), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &nominal, Reach::Ruled);
+    let search = searched.search(&case(&record, nominal, &noise), EFFECTS.to_vec(), &Work::default(), &|_| ());
+    let start =
+        Model { effects: with(&[(Effect::ViscousMotor, 0, 1.5), (bristle, 0, 3.0), (bristle, 1, 1e-5)]), ..nominal };
+    let terms = [(Effect::ViscousMotor, 0), (bristle, 0)];
+    let mut fit = search.problem.fit(&start, &terms, [f64::MAX; 2], STEPS).expect("a fit");
+    let reach = fit.coordinates.iter().position(|c| c.free == Free::Effect(bristle, 1)).expect("a reach");
+    for (error, told) in [(1e-9, None), (1.0, Some([Effect::CoulombMotor, Effect::ViscousMotor]))] {
+        fit.std[reach] = error;
+        let simple = search.simplified(&fit, 1.0, &[]);
+        assert_eq!(simple.as_ref().map(Fit::effects), told.map(Vec::from));
+        assert!(simple.is_none_or(|f| (f.model.effects.of(dry)[0] / 3.0 - 1.0).abs() < 0.02));
+    }
+}
+
+#[test]
 fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torque() {
     // To and fro at a constant speed. With the torque given the friction would make an inertia of ten times as much.
     let way = |t: f64| 0.5 * (0.6 * t).sin().asin();
