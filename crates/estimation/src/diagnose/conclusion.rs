@@ -16,7 +16,7 @@ use super::verdict::Verdict;
 use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
 use crate::effects::{Effect, Family, ONCE};
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
-use crate::hypothesis::fit::Fit;
+use crate::hypothesis::fit::{Fit, Term};
 use crate::hypothesis::model::Model;
 use crate::trace::machine::NOMINAL_OFF;
 
@@ -40,8 +40,12 @@ impl Search<'_> {
     pub fn conclude(&self, given: Fit, parameters: Fit, chosen: Fit, pool: Vec<Fit>) -> Decision {
         let axis = [&given, &parameters];
         let mut next = (chosen, pool);
+        let mut passed: Vec<Vec<Term>> = Vec::new();
         let mut account = loop {
-            match self.account(axis, next) {
+            // Of two that lead to one another the one that is come back to is told.
+            let is_settled = passed.contains(&next.0.terms);
+            passed.push(next.0.terms.clone());
+            match self.account(axis, next, is_settled) {
                 Break(account) => break account,
                 Continue(other) => next = other,
             }
@@ -54,6 +58,7 @@ impl Search<'_> {
         &self,
         [given, parameters]: [&Fit; 2],
         (chosen, mut pool): (Fit, Vec<Fit>),
+        is_settled: bool,
     ) -> ControlFlow<Account, (Fit, Vec<Fit>)> {
         pool.push(chosen.clone());
         let independent = self.independent([&chosen]);
@@ -71,7 +76,7 @@ impl Search<'_> {
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         // By its own errors, as its rivals are, or by those that hold.
         let simple = [&finished, &chosen].into_iter().find_map(|fit| self.simplified(fit, independent, &pool));
-        if let Some(simple) = simple {
+        if let Some(simple) = simple.filter(|f| !is_settled && !is_of_another_axis(f)) {
             return Continue((simple, pool));
         }
         let mut weighing = self.weigh(&chosen, &finished, parameters, pool, independent);
@@ -85,7 +90,7 @@ impl Search<'_> {
         }
         weighing.share_with_twins();
         let open = weighing.open(&chosen);
-        if let Some(shorter) = open.and_then(|i| weighing.instead_of_open(&chosen, i)) {
+        if let Some(shorter) = open.and_then(|i| weighing.instead_of_open(&chosen, i)).filter(|_| !is_settled) {
             return Continue((shorter, weighing.into_fits()));
         }
         Break(Account { chosen, finished, independent, weighing, open })

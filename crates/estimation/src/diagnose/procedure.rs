@@ -100,14 +100,18 @@ impl<'a> Looks<'a> {
     /// motion needs: where it would be another one and nothing else is told of it, the motion is given.
     fn decided(self, train: &Record) -> (Prepared, Decision) {
         let found = self.looked(train);
+        let nominal = &self.case.nominal;
         let tells_nothing = found.1.ran_off && found.1.verdict == Verdict::Unexplained;
-        if self.case.nominal.structure == Structure::Rigid && tells_nothing {
+        // A known effect of an encoder leaves the motion to be told.
+        let is_measured = nominal.effects.active().sensors().is_empty();
+        if nominal.structure == Structure::Rigid && is_measured && tells_nothing {
             (self.progress)("with the motion given");
             return self.with_motion_given().looked(train);
         }
         found
     }
 
+    /// The decision of all looks, with the torque given or the motion.
     fn looked(&self, train: &Record) -> (Prepared, Decision) {
         // A rigid axis is taken to be under control.
         let rigid = self.case.nominal.structure == Structure::Rigid;

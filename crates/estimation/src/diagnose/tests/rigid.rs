@@ -53,6 +53,28 @@ fn a_bristle_whose_reach_is_not_known_is_dry_friction_though_that_was_never_fitt
 }
 
 #[test]
+fn a_bristle_is_not_told_as_the_dry_friction_of_another_axis() {
+    let (bristle, dry) = (Effect::PreslidingMotor, Effect::CoulombMotor);
+    let record = logged(with(&[(dry, 0, 3.0)]), 1.0, 0.05, |_| 0.0, 5);
+    let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+    let noise = estimate_noise(&record.torque, &channels, None);
+    // The friction's own fit has the true inertia, which is nearly as far off as it may be; the bristle's is held where it is not.
+    let nominal = Model::new(parameters(INERTIA / 4.5), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &nominal, Reach::Ruled);
+    let mut search = searched.search(&case(&record, nominal, &noise), EFFECTS.to_vec(), &Work::default(), &|_| ());
+    search.gap = [1.0; 2];
+    let start = Model { effects: with(&[(bristle, 0, 3.0), (bristle, 1, 1e-5)]), ..nominal };
+    let mut fit = search.problem.fit(&start, &[(bristle, 0)], [f64::MAX; 2], 0).expect("a run");
+    let coordinates = fit.coordinates.iter();
+    fit.std = coordinates.map(|c| if c.free == Free::Effect(bristle, 1) { 1.0 } else { 1e-9 }).collect();
+    let given = search.problem.given(&nominal).expect("a run");
+    let simple = search.simplified(&fit, 1.0, &[]).expect("a likelier fit");
+    assert!(simple.model.parameters.i1 > 4.1 * nominal.parameters.i1);
+    let told = search.conclude(given.clone(), given, fit, Vec::new());
+    assert!(told.chosen.terms.iter().all(|t| t.0 != dry), "{:?}", told.chosen.terms);
+}
+
+#[test]
 fn an_inertia_alone_stays_what_the_motion_has_where_friction_is_most_of_the_torque() {
     // To and fro at a constant speed. With the torque given the friction would make an inertia of ten times as much.
     let way = |t: f64| 0.5 * (0.6 * t).sin().asin();
