@@ -74,7 +74,7 @@ impl Search<'_> {
         let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
         self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
-        // By its own errors, as its rivals are, or by those that hold.
+        // By the errors that hold, or by its own, as its rivals are.
         let simple = [&finished, &chosen].into_iter().find_map(|fit| self.simplified(fit, independent, &pool));
         if let Some(simple) = simple.filter(|f| !is_settled && !is_of_another_axis(f)) {
             return Continue((simple, pool));

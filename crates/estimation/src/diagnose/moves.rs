@@ -10,7 +10,7 @@ use super::race::RACING;
 use super::search::{MOST, Search};
 use crate::effects::Effect;
 use crate::hypothesis::determined::is_simpler;
-use crate::hypothesis::fit::{Fit, PROBE, STEPS, Term};
+use crate::hypothesis::fit::{Fit, PROBE, Term};
 use crate::hypothesis::likelihood::NEAR_THE_NOISE;
 use crate::hypothesis::model::{Coordinate, Model};
 use crate::hypothesis::starts::{Screening, StartPoint};
@@ -228,13 +228,10 @@ impl Search<'_> {
                 && others().all(|t| f.terms.contains(t))
                 && f.terms.iter().any(|t| t.0 == simple)
         };
-        let likelier = |f: &&Fit| !f.at_bound && self.evidence(f, independent) > self.evidence(fit, independent);
-        let known = pool
-            .iter()
-            .filter(same)
-            .filter(likelier)
-            .max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)));
-        known.cloned().or_else(|| self.as_simpler(fit, at, simple).filter(|f| likelier(&f)))
+        let is_likelier = |f: &Fit| !f.at_bound && self.is_likelier_by(independent, f, fit);
+        let known: Vec<Fit> = pool.iter().filter(same).cloned().collect();
+        let known = self.best(&known, independent).filter(|f| is_likelier(f)).cloned();
+        known.or_else(|| self.as_simpler(fit, at, simple).filter(is_likelier))
     }
 
     /// The fit with the simpler law in the place of an effect that has its size first, too, from where that stands.
@@ -243,8 +240,7 @@ impl Search<'_> {
         model.effects.of_mut(simple)[0] = fit.model.effects.of(fit.terms[at].0)[0];
         let mut terms = fit.terms.clone();
         terms[at] = (simple, 0);
-        let fitted = self.problem.fit(&model, &terms, fit.discrepancy, STEPS)?;
-        self.problem.deepen(&fitted)
+        self.resumed(&Fit { model, terms, ..fit.clone() })
     }
 }
 

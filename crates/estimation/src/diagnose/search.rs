@@ -271,8 +271,8 @@ impl Search<'_> {
         by_motion.flatten().unwrap_or(parameters)
     }
 
-    /// A fit from another look at the record, made to its end.
-    fn resumed(&self, known: &Fit) -> Option<Fit> {
+    /// A fit from another look at the record, or begun from another's values, made to its end.
+    pub fn resumed(&self, known: &Fit) -> Option<Fit> {
         let fit = self.problem.fit(&known.model, &known.terms, known.discrepancy, STEPS)?;
         self.problem.deepen(&fit)
     }

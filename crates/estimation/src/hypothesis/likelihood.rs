@@ -15,8 +15,9 @@
 //! That density takes the torque as given: the discrepancy moves the axis. Where the motion is given, as far as a drive follows its
 //! reference, the discrepancy is in the torque that it took, and the readings have the density that the reference model gives them:
 //! `ln det C` at the reference's stiffness ([`Band::with_motion_given`]). A torque that does not act as it was logged then has its own
-//! density ([`Band::density_of_torques`]): else what swallows it explained it.
+//! density ([`Band::density_of_torques`]): else what a lag takes out of it would count as explained.
 
+mod acting;
 mod score;
 
 use rustfft::{FftPlanner, num_complex::Complex};
@@ -114,7 +115,7 @@ pub struct TorqueResidual {
     /// The spectra with it, where there is any.
     whole: [Vec<C>; 2],
     vibrations: Vec<Vibration>,
-    /// `ln |dT'/dT|^2` of the torque `T'` that acts over the logged one, of all bins: the density of logged torques over that of acting ones.
+    /// `ln |dT'/dT|^2` of the torque `T'` that acts over the logged one, of all bins, where the motion is given, else zero: the density of logged torques over that of acting ones.
     pub(super) acts: f64,
     /// Square of the inertia of each equation over the larger one's: torques of one acceleration.
     pub(super) alike: [f64; 2],
@@ -328,18 +329,6 @@ impl Band {
         rows
     }
 
-    /// How dense the logged torques lie over those that act, of which a model keeps some on their way in: `ln |dT'/dT|^2` over all bins but
-    /// the mean's.
-    pub(super) fn density_of_torques(&self, record: &Record, kept: &[f64], planner: &mut FftPlanner<f64>) -> f64 {
-        let acting = record.torque.iter().zip(kept).map(|(logged, kept)| logged - kept).collect();
-        let mut spectrum = |torque: Vec<f64>| {
-            let [rows, _] = self.rows(&[torque, vec![0.0; record.len()]], 1.0, planner);
-            rows.into_iter().map(|z| z.norm_sqr().max(f64::MIN_POSITIVE).ln())
-        };
-        let (logged, acting) = (spectrum(record.torque.clone()), spectrum(acting));
-        self.weight.iter().zip(acting.zip(logged)).skip(1).map(|(w, (a, l))| w * (a - l)).sum()
-    }
-
     /// Spectra of the torque on motor and table that a model lacks along a motion, `[theta1, omega1, theta2, omega2]` a sample. What hidden
     /// inertias began with is taken out at a discrepancy; at the rows' own power where none is known.
     pub fn torque_residual(
@@ -497,8 +486,7 @@ impl Band {
                 if self.motion_is_given { log_det - self.factor(self.reference[m], s).3 } else { noise.density };
             weight * ((first * a).norm_sqr() + second + log_det - density)
         };
-        let acts = if self.motion_is_given { l.acts } else { 0.0 };
-        acts - l.weights.iter().zip(&self.weight).enumerate().map(bin).sum::<f64>()
+        l.acts - l.weights.iter().zip(&self.weight).enumerate().map(bin).sum::<f64>()
     }
 
     /// Real values compared.
@@ -582,33 +570,5 @@ impl TorqueResidual {
             acts: 0.0,
             alike: [1.0; 2],
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::axis::{Hold, Structure};
-    use crate::effects::Settings;
-
-    #[test]
-    fn logged_torques_lie_denser_than_those_that_act_by_the_gain_at_each_frequency() {
-        let n = 1024;
-        let torque: Vec<f64> =
-            (0..n).map(|k| (0.9 * f64::from(k)).sin() + (0.02 * f64::from(k * k % 977)).cos()).collect();
-        let record = Record::new(1e-3, Hold::Zoh, torque.clone(), [const { None }; 4]);
-        let model = Model::new(Parameters::PAPER, Structure::Rigid, Settings::default());
-        let band = Band::new(&record, &model, 100.0, &vec![1.0; n as usize]);
-        let density = |kept: &[f64]| band.density_of_torques(&record, kept, &mut FftPlanner::new());
-        let bins = band.weight[1..].iter().sum::<f64>();
-        // Half of the torque is kept: a quarter of its power acts. All that is kept of another sign: four times.
-        let kept = |share: f64| -> Vec<f64> { torque.iter().map(|t| share * t).collect() };
-        assert!((density(&kept(0.5)) + bins * 4.0_f64.ln()).abs() < 1e-6 * bins);
-        assert!((density(&kept(-1.0)) - bins * 4.0_f64.ln()).abs() < 1e-6 * bins);
-        assert_eq!(density(&kept(0.0)), 0.0);
-        // What only comes late has the same power: one sample of 1024, the last in the place of the first.
-        let late: Vec<f64> =
-            (0..torque.len()).map(|k| torque[k] - torque[(k + torque.len() - 1) % torque.len()]).collect();
-        assert!(density(&late).abs() < 1e-6 * bins, "{}", density(&late));
     }
 }
