@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::columns::Made;
+use super::estimates::Rough;
 use crate::trace::guess::{Guess, Role};
 use crate::trace::{AxisKind, COUNTS, Quantity, Signal, Table};
 
@@ -18,7 +19,7 @@ fn four(value: f64) -> String {
 #[derive(Default)]
 pub(super) struct Read {
     /// Inertias, damping and stiffness, roughly.
-    pub rough: Option<[f64; 4]>,
+    pub rough: Option<Rough>,
     /// The lead of the screw over 2*pi, m/rad.
     pub rho: Option<f64>,
     /// The log cannot be believed as it is.
@@ -52,9 +53,11 @@ pub(super) fn write(made: &Made, table: &Table, read: &Read, file: &str) -> Stri
     let (inertia, damping, stiffness) = (of_own(inertia, ".s2"), of_own(damping, ".s"), of_own(stiffness, ""));
     let _ = writeln!(out, "# Made by `eixo init` from {}.", plain(file));
     let _ = writeln!(out, "name = {}", text(&name));
-    let [i1, i2, b, k] = rough.unwrap_or([1.0, 1.0, 1.0, 1000.0]);
+    let [i1, i2, b, k] = rough.map_or([1.0, 1.0, 1.0, 1000.0], |r| r.values);
     let origin = if refused {
         "# Placeholders: the log has a defect that `eixo inspect` names. Put in the values of the data sheet."
+    } else if rough.is_some_and(|r| !r.is_shown) {
+        "# The log hardly shows the inertia beside the other torques: a guess. Put in the value of the data sheet."
     } else if rough.is_some() {
         "# Rough values, read from the log itself: put in those of the data sheet where you have them."
     } else {

@@ -1,12 +1,32 @@
 //! Rough values of the axis, estimated from the log itself.
 
 use crate::axis::Structure;
-use crate::examine::Examination;
+use crate::examine::{Examination, Inertia};
 use crate::identify::run::{Request, identify};
 use crate::trace::{Machine, Signal, Trace};
 
+/// Values to begin with.
+#[derive(Clone, Copy)]
+pub(super) struct Rough {
+    /// Inertias, damping and stiffness.
+    pub values: [f64; 4],
+    /// Whether the log shows the inertia.
+    pub is_shown: bool,
+}
+
 /// Inertias, damping and stiffness as the log has them, roughly; None where they cannot be estimated.
-pub(super) fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<[f64; 4]> {
+pub(super) fn rough(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<Rough> {
+    let identified = identified(trace, machine, examination).map(|values| Rough { values, is_shown: true });
+    // Where noise rules the coupling, the inertia is still known.
+    identified.or_else(|| {
+        let Inertia { value, is_shown } = examination.inertia?;
+        let rigid = machine.structure == Structure::Rigid;
+        Some(Rough { values: if rigid { [value, 0.0, 0.0, 0.0] } else { halved(value, trace.dt) }, is_shown })
+    })
+}
+
+/// The same where `identify` earns them.
+fn identified(trace: &Trace, machine: &Machine, examination: &Examination) -> Option<[f64; 4]> {
     let piece = examination.longest().map(|p| trace.slice(p));
     let found = identify(piece.as_ref().unwrap_or(trace), machine, &Request::default(), "", &mut |_| ()).ok();
     // Estimates that are not earned are those of what the model lacks: a weight, friction.
@@ -17,17 +37,18 @@ pub(super) fn rough(trace: &Trace, machine: &Machine, examination: &Examination)
         (e.value > 0.0 && e.value.is_finite() && e.std.is_none_or(|s| s < 0.5 * e.value)).then_some(e.value)
     };
     if machine.structure == Structure::Rigid {
-        return value("I").or(examination.inertia).map(|i| [i, 0.0, 0.0, 0.0]);
+        return value("I").map(|i| [i, 0.0, 0.0, 0.0]);
     }
-    if let (Some(i1), Some(i2), Some(k)) = (value("I1"), value("I2"), value("K")) {
-        return Some([i1, i2, value("B").unwrap_or(0.02 * (k * i2).sqrt()), k]);
-    }
-    // Where noise rules the coupling, the inertia is still known: half to each side, a coupling that swings at a fiftieth of
-    // the sampling rate, 2 % of the critical damping.
-    let half = 0.5 * examination.inertia?;
-    let w = std::f64::consts::TAU / (50.0 * trace.dt);
+    let (i1, i2, k) = (value("I1")?, value("I2")?, value("K")?);
+    Some([i1, i2, value("B").unwrap_or(0.02 * (k * i2).sqrt()), k])
+}
+
+/// Half of an inertia to each side, a coupling that swings at a fiftieth of the sampling rate, 2 % of the critical damping.
+fn halved(total: f64, dt: f64) -> [f64; 4] {
+    let half = 0.5 * total;
+    let w = std::f64::consts::TAU / (50.0 * dt);
     let k = 0.5 * half * w * w;
-    Some([half, half, 0.02 * (k * half).sqrt(), k])
+    [half, half, 0.02 * (k * half).sqrt(), k]
 }
 
 /// The lead of the screw over 2*pi, m/rad, where the table's position follows the motor's angle: the ratio of their ways.

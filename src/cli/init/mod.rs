@@ -93,7 +93,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "first: mend what is told above, in the log or in [signals] of {}; until then no verdict is given",
             axis.display()
         )?;
-    } else if rough.is_none() {
+    } else if !rough.is_some_and(|r| r.is_shown) {
         out_line!("first: put the inertia into [parameters], which the log does not tell")?;
     }
     out_line!("next: eixo identify {what}")?;

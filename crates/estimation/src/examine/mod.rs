@@ -163,8 +163,17 @@ pub struct Examination {
     pub usable: Vec<Range<usize>>,
     /// Band in which the motion follows the torque, Hz; None where there is none.
     pub band: Option<[f64; 2]>,
-    /// The inertia (mass) that moves, roughly; None where it does not show.
-    pub inertia: Option<f64>,
+    /// The inertia (mass) that moves, roughly; None where no torque goes with the acceleration.
+    pub inertia: Option<Inertia>,
+}
+
+/// The inertia that moves, as a record without a nominal one tells it.
+#[derive(Debug, Clone, Copy, serde::Serialize)]
+pub struct Inertia {
+    /// kg.m2 (kg).
+    pub value: f64,
+    /// Whether it is known to a third; if not, its torque hardly shows beside the others.
+    pub is_shown: bool,
 }
 
 impl Examination {
@@ -305,7 +314,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let guess = || part.nominal.is_none().then(|| rigid::inertia(&part)).flatten();
         let (of_the_lines, guessed) = rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), guess);
         band = of_the_lines;
-        inertia = guessed.or(inertia);
+        inertia = guessed.map(|value| Inertia { value, is_shown: true }).or(inertia);
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia }

@@ -100,9 +100,11 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
 /// ```
 ///
 /// Least squares in the time domain: a weight's torque is a straight line over the angle in a narrow range alone. Torque and motion pass
-/// the same smoothing (a mean over `2*w + 1` samples, twice), so that the equation holds between them; of some widths that which leaves
-/// the least of the torque's power is taken, as noise of the encoder, differentiated twice, takes from the inertia, and a width beyond the
-/// motion's band from all. None where less than three quarters are explained, or the inertia is not known to a third.
+/// Least squares in the time domain: a weight's torque is a straight line over the angle in a narrow range alone. Torque and motion pass
+/// the same smoothing (a mean over `2*w + 1` samples, twice), so that the equation holds between them; of some widths the narrowest from
+/// which the next no more raises the inertia than by its error: noise of the encoder, differentiated twice, takes from it, and a width beyond
+/// the motion's band leaves a weight's torque for it. None where less than three quarters are explained, or the inertia is not known to a
+/// third.
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     determined_in_time(input).map(|found| found.mass)
 }
@@ -110,17 +112,17 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
 /// The fit that [`inertia`] is taken from.
 fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
-    let mut best: Option<TimeDomainFit> = None;
-    for found in at_widths(input, torque, x, None) {
-        if found.left < MAX_RESIDUAL
-            && found.mass > SIGNIFICANT * found.error
-            && found.mass.is_finite()
-            && best.as_ref().is_none_or(|best| found.left < 0.98 * best.left)
-        {
-            best = Some(found);
+    let is_determined =
+        |f: &TimeDomainFit| f.left < MAX_RESIDUAL && f.mass > SIGNIFICANT * f.error && f.mass.is_finite();
+    let mut wider = at_widths(input, torque, x, None).into_iter().filter(is_determined);
+    let mut best = wider.next()?;
+    for next in wider {
+        if next.mass <= best.mass + next.error {
+            break;
         }
+        best = next;
     }
-    best
+    Some(best)
 }
 
 /// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is so

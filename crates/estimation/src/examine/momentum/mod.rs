@@ -14,7 +14,7 @@ mod equation;
 mod lines;
 mod torque;
 
-use super::Input;
+use super::{Inertia, Input};
 use super::encoders::{compare_encoders, encoder_ratio, slow_motion_finding};
 use super::finding::{Finding, Severity};
 use super::motion::Direction;
@@ -84,9 +84,9 @@ fn of_segments(columns: &[&[f64]], dt: f64) -> Option<(Spectra, Vec<usize>)> {
     })
 }
 
-/// Looks at torque and motion. Gives the band in which they are coherent, Hz, and sets the inertia that moves, kg.m2 (kg), where it is
-/// significant.
-pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<f64>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
+/// Looks at torque and motion. Gives the band in which they are coherent, Hz, and sets the inertia that moves, where it is
+/// positive.
+pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<Inertia>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
     let torque = input.torque?;
     check_time_scale(input, findings);
     let rates = || {
@@ -124,7 +124,7 @@ fn single_spectrum(
     columns: &[&[f64]],
     collocated: bool,
     nominal: Option<NominalFit>,
-    inertia: &mut Option<f64>,
+    inertia: &mut Option<Inertia>,
     findings: &mut Vec<Finding>,
 ) {
     let spectra = Spectra::new(columns, fft_length(columns[0].len()), input.dt);
@@ -161,12 +161,12 @@ fn fft_length(n: usize) -> usize {
 }
 
 /// Findings of the fit with free coefficients; those on sign and unit are replaced by the comparison with the nominal axis, where there is
-/// one. Gives the inertia, kg.m2 (kg).
+/// one. Gives the inertia.
 fn merge_with_nominal(
     nominal: Option<NominalFit>,
-    (inertia, found): (Option<f64>, Vec<Finding>),
+    (inertia, found): (Option<Inertia>, Vec<Finding>),
     findings: &mut Vec<Finding>,
-) -> Option<f64> {
+) -> Option<Inertia> {
     let known = nominal.is_some();
     findings.extend(found.into_iter().filter(|f| !(known && ["sign", "units", "inertia"].contains(&f.id))));
     // A table encoder in another unit changes the inertia too: that finding is the cause.

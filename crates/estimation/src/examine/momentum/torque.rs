@@ -7,9 +7,9 @@ use crate::examine::as_logged::explains_as_well_as_late;
 use crate::examine::encoders::motor_side_unexplained;
 use crate::examine::finding::{Finding, Severity};
 use crate::examine::nominal::nominal_explains;
-use crate::examine::rigid::{self, EstimatedInertia, SIGNIFICANTLY_WORSE, inertia_finding};
+use crate::examine::rigid::{self, EstimatedInertia, SIGNIFICANT, SIGNIFICANTLY_WORSE, inertia_finding};
 use crate::examine::spectra::Spectra;
-use crate::examine::{Input, NOMINAL_OFF, standing};
+use crate::examine::{Inertia, Input, NOMINAL_OFF, standing};
 
 /// Share of the torque's power that the momentum equation must explain for the torque to be of this axis.
 const MIN_EXPLAINED: f64 = 0.2;
@@ -29,13 +29,13 @@ const MAX_DELAY: i32 = 48;
 /// Independent averages from which a delay can be distinguished from the phase of a slow motion.
 const AVERAGED: f64 = 3.0;
 
-/// Findings on sign, delay and magnitude of the torque; and the inertia that moves, kg.m2 (kg), where it explains a part of the torque.
+/// Findings on sign, delay and magnitude of the torque; and the inertia that moves, where it is positive.
 pub(super) fn torque_findings(
     input: &Input<'_>,
     s: &Spectra,
     lines: &[usize],
     collocated: bool,
-) -> (Option<f64>, Vec<Finding>) {
+) -> (Option<Inertia>, Vec<Finding>) {
     let mut findings = Vec::new();
     let inertia = fit_torque(input, s, lines, collocated, &mut findings);
     // If the nominal axis explains the torque, free coefficients that fit a resonance otherwise are no finding.
@@ -52,7 +52,7 @@ fn fit_torque(
     lines: &[usize],
     collocated: bool,
     findings: &mut Vec<Finding>,
-) -> Option<f64> {
+) -> Option<Inertia> {
     let total: f64 = lines.iter().map(|f| s.power(T, *f)).sum();
     let mut balance = MomentumEquation { s, lines, collocated, table: None, total };
     if total <= 0.0 {
@@ -177,8 +177,12 @@ fn fit_torque(
     let late = if clocked && between { plus.0 } else { here.0 };
     let found = balance.solve(&gram, &at(late));
     let mass = found.x[0] + if collocated { found.x[1] } else { 0.0 };
-    // Explained shares from which the inertia is significant, and from which it is compared with the nominal one.
-    let shown = (found.inertial > 0.05 && mass > 0.0 && mass.is_finite()).then_some(mass);
+    let of: &[usize] = if collocated { &[0, 1] } else { &[0] };
+    let error = balance.error(&gram, &found, of, f64::from(late) * input.dt);
+    // Explained shares from which the inertia is significant, and from which it is compared with the nominal one. The spectra do not know of
+    // a weight: beside one its standard error is large.
+    let is_shown = found.inertial > 0.05 && mass > SIGNIFICANT * error;
+    let shown = (mass > 0.0 && mass.is_finite()).then_some(Inertia { value: mass, is_shown });
     let (Some(nominal), true) = (input.nominal, found.inertial > 0.3) else { return shown };
     let p = nominal.parameters;
     let ratio = mass / (p.i1 + p.i2);
@@ -193,8 +197,6 @@ fn fit_torque(
     if 1.0 - own <= SIGNIFICANTLY_WORSE * (1.0 - found.share) {
         return shown;
     }
-    let of: &[usize] = if collocated { &[0, 1] } else { &[0] };
-    let error = balance.error(&gram, &found, of, f64::from(late) * input.dt);
     let estimated = EstimatedInertia { value: mass, error, left: 1.0 - found.share };
     findings.extend(inertia_finding(input, &estimated, p.i1 + p.i2, false));
     shown
