@@ -251,6 +251,11 @@ impl PartialEq for LoggedTorque {
 }
 
 impl LoggedTorque {
+    /// Sampling interval, s.
+    pub const fn dt(&self) -> f64 {
+        self.decimation.dt
+    }
+
     /// What settings keep of the torque on its way in, N.m, at the instants of the lower rate; `None` where they ask for a torque from
     /// longer ago than is remembered at the log's rate.
     pub fn kept(&self, effects: &Settings) -> Option<Arc<[f64]>> {

@@ -100,6 +100,18 @@ impl Record {
         self.noise[2 * side].powi(2) * (1.0 + self.corner[side] / frequency)
     }
 
+    /// The same motion without a torque.
+    #[must_use]
+    pub fn undriven(&self) -> Self {
+        Self { torque: vec![0.0; self.torque.len()], between: None, logged: None, ..self.clone() }
+    }
+
+    /// Sampling interval of the log, s.
+    #[must_use]
+    pub fn logged_at(&self) -> f64 {
+        self.logged.as_ref().map_or(self.dt, |(torque, _)| torque.dt())
+    }
+
     /// Instants a sample at which the torque is known.
     #[must_use]
     pub fn instants(&self) -> usize {

@@ -21,6 +21,7 @@ pub struct Scales {
     pub rotation: [f64; 2],
     pub travel: [[f64; 2]; 2],
     pub dt: f64,
+    logged_at: f64,
     pub length: f64,
     pub top: f64,
     pub fastest: [f64; 2],
@@ -171,6 +172,7 @@ impl Scales {
             rotation: [r1, r2],
             travel: [t1, t2],
             dt: p.record.dt,
+            logged_at: p.record.logged_at(),
             length: n * p.record.dt,
             top,
             orders: [0, 1].map(|i| largest_order(speeds(i), p.record.dt, top, noise[i])),
@@ -207,6 +209,7 @@ impl Scales {
                 twist: self.twist,
                 twists: &self.twists,
                 dt: self.dt,
+                logged_at: self.logged_at,
                 length: self.length,
                 band: self.top,
                 inertia: [

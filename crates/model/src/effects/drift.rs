@@ -78,7 +78,10 @@ impl DryFriction for FrictionDrift {
         named: true,
         textbook: false,
         odds: 0.05,
-        bounds: |p, x| p[0].abs() * x.length <= x.torque && is_slow(p[2], x.length),
+        bounds: |p, x| {
+            let most = x.torque / drifted(p[2], x.length);
+            p[0].abs() <= most && p[1].abs() * x.speed <= most && is_slow(p[2], x.length)
+        },
         example: &[4e-3, 1e-4, 0.5],
         variants: &[
             Variant { name: "dry", free: &[0] },

@@ -19,8 +19,10 @@ pub struct Extent<'a> {
     pub twist: f64,
     /// Twist as measured, rad, sorted; empty where not both sides are.
     pub twists: &'a [f64],
-    /// Sampling interval, s.
+    /// Sampling interval at which it is looked at, s.
     pub dt: f64,
+    /// Sampling interval of the log, s.
+    pub logged_at: f64,
     /// Length of the record, s.
     pub length: f64,
     /// Upper end of the band that the motion excites, rad/s.
@@ -103,10 +105,11 @@ impl Extent<'_> {
         self.twists.is_empty() || share_beyond(self.twists, -half_gap, half_gap) >= CONTACT
     }
 
-    /// Whether a delay is one of some samples: the drive's loops run at the rate of its log or faster. Far beyond that it is a shift of the record.
+    /// Whether a delay is one of some samples of the log: the drive's loops run at its rate or faster. Far beyond that it is a shift of the
+    /// record.
     #[must_use]
     pub fn is_some_samples(&self, delay: f64) -> bool {
-        delay <= SOME_SAMPLES * self.dt
+        delay <= SOME_SAMPLES * self.logged_at
     }
 
     /// Whether a first-order lag lets a fifth of the torque pass at the band's end. One with a corner far below the band is no lag but an
@@ -166,6 +169,7 @@ mod tests {
             twist: 0.0,
             twists: &[],
             dt: 4e-4,
+            logged_at: 4e-4,
             length: 1.0,
             band: 1000.0,
             inertia: [1.0; 2],
@@ -173,6 +177,26 @@ mod tests {
             energy: 1.0,
             path: (1.0, 0.0),
         }
+    }
+
+    #[test]
+    fn a_delay_is_one_of_some_samples_of_the_log_however_coarsely_that_is_looked_at() {
+        let coarse = Extent { dt: 0.1, logged_at: 0.01, band: 10.0, ..resting() };
+        let admits = |e: Effect, values: &[f64]| (e.info().bounds)(values, &coarse);
+        assert!(admits(Effect::Delay, &[0.11]) && !admits(Effect::Delay, &[0.13]));
+        assert!(admits(Effect::SensorDelay, &[0.11]) && !admits(Effect::SensorDelay, &[0.13]));
+        assert!(admits(Effect::Latch, &[-0.11, 0.0]) && !admits(Effect::Latch, &[-0.13, 0.0]));
+    }
+
+    #[test]
+    fn a_friction_changes_by_no_more_than_the_largest_torque() {
+        let extent = Extent { length: 20.0, ..resting() };
+        let admits = |values: &[f64]| (Effect::FrictionDrift.info().bounds)(values, &extent);
+        // In twenty seconds by 0.8 of the torque or by 1.2; of what fades with a time constant of ten by 0.69 or 1.04.
+        for of in [|v| [v, 0.0, 0.0], |v: f64| [0.0, -v, 0.0]] {
+            assert!(admits(&of(0.04)) && !admits(&of(0.06)));
+        }
+        assert!(admits(&[0.08, 0.0, 0.1]) && !admits(&[0.12, 0.0, 0.1]));
     }
 
     #[test]

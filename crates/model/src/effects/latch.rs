@@ -36,7 +36,7 @@ impl Sensor for Latch {
         textbook: false,
         odds: 0.1,
         bounds: |p, x| {
-            let early = p[0] <= 0.0 && p[0] >= -12.0 * x.dt && p[1] * x.band <= 5.0;
+            let early = p[0] <= 0.0 && x.is_some_samples(-p[0]) && x.passes_the_band(p[1]);
             early && (x.turns_phase(p[0]) || x.turns_phase(p[1]))
         },
         example: &[2.3e-3, 1.5e-3],

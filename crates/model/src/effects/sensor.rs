@@ -252,7 +252,7 @@ impl Sensor for SensorDelay {
         named: true,
         textbook: false,
         odds: 1.0,
-        bounds: |p, x| p[0] <= 12.0 * x.dt,
+        bounds: |p, x| x.is_some_samples(p[0]),
         example: &[2.3e-3],
         variants: &[Variant { name: "", free: &[0] }],
     };
