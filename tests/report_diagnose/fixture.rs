@@ -122,6 +122,7 @@ pub fn friction(machine: &str) -> Diagnosis {
         }],
         rounding: Some(Rounding { step: 1e-3, channels: vec!["theta1"], role: RoundingRole::Noise }),
         cut_short: false,
+        motion_is_given: false,
         closed_loop: None,
     }
 }

@@ -169,7 +169,11 @@ pub fn warnings(d: &Diagnosis, motion: Option<AxisKind>) -> Vec<String> {
          part (--from, --to) to have all of it."
             .to_owned()
     });
-    rounding.chain(run_off(d)).chain(cut_short).collect()
+    let given = d.motion_is_given.then(|| {
+        "With the torque taken as it was logged no model of this axis follows the motion: what is told is of the torque that the          measured motion takes. An effect of an encoder, a dead zone, a torque limit and a friction that changes are not looked for so."
+            .to_owned()
+    });
+    rounding.chain(run_off(d)).chain(cut_short).chain(given).collect()
 }
 
 /// That the inertia that fits is far from the nominal one, whatever else was found.

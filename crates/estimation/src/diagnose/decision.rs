@@ -17,8 +17,8 @@ pub struct Decision {
     pub verdict: Verdict,
     /// Whether the search ended before every exchange was tried.
     pub cut_short: bool,
-    /// Whether a hypothesis that might have been told made the axis another one.
-    pub ran_off: bool,
+    /// Whether the motion was taken as given, and not the torque.
+    pub motion_is_given: bool,
     /// Model as given.
     pub given: Fit,
     /// Its parameters fitted.
@@ -86,7 +86,7 @@ mod tests {
         Decision {
             verdict: Verdict::Parameters,
             cut_short: false,
-            ran_off: false,
+            motion_is_given: false,
             given: parameters.clone(),
             chosen: parameters.clone(),
             parameters,

@@ -92,6 +92,8 @@ pub struct Diagnosis {
     pub rounding: Option<Rounding>,
     /// Whether the search for causes ended at its limit of work.
     pub cut_short: bool,
+    /// Whether the motion was taken as given, and not the torque.
+    pub motion_is_given: bool,
     /// What the drive's loop says, for a record under control whose drive is known.
     pub closed_loop: Option<ClosedLoop>,
 }

@@ -110,7 +110,7 @@ impl Prepared {
         let problem =
             Problem::of(&self.record, &self.band, case.nominal, self.peak).counted_in(work).along_what_is_given();
         let reference = self.reference;
-        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), ran_off: false.into(), progress }
+        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
     }
 
     /// Share of the torque that a fit leaves.

@@ -74,10 +74,10 @@ impl<'a> Looks<'a> {
         Self { case, suspects, work: Work::default(), motion_is_given: false, progress }
     }
 
-    /// The same with the motion given: an encoder's own effect is none of its torque, and of a torque that is swallowed any other would have
-    /// done as well.
+    /// The same with the motion given: an encoder's own effect is none of its torque, of a torque that is swallowed any other would have done
+    /// as well, and a friction that changes is what any foreign torque does to one that does not.
     fn with_motion_given(self) -> Self {
-        let is_told = |e: &Effect| e.info().place != Place::Sensor && !e.bends_torque();
+        let is_told = |e: &Effect| e.info().place != Place::Sensor && !e.bends_torque() && !e.is_changing_friction();
         Self { suspects: self.suspects.iter().copied().filter(is_told).collect(), motion_is_given: true, ..self }
     }
 
@@ -97,18 +97,17 @@ impl<'a> Looks<'a> {
     }
 
     /// The decision on a record, and the look that it was made in. With the torque given an axis is the heavier the less of its torque the
-    /// motion needs: where it would be another one and nothing else is told of it, the motion is given.
+    /// motion needs, and a friction that holds it takes any torque: where nothing is told of it so, the motion is given.
     fn decided(self, train: &Record) -> (Prepared, Decision) {
         let found = self.looked(train);
         let nominal = &self.case.nominal;
-        let tells_nothing = found.1.ran_off && found.1.verdict == Verdict::Unexplained;
         // A known effect of an encoder leaves the motion to be told.
         let is_measured = nominal.effects.active().sensors().is_empty();
-        if nominal.structure == Structure::Rigid && is_measured && tells_nothing {
-            (self.progress)("with the motion given");
-            return self.with_motion_given().looked(train);
+        if nominal.structure != Structure::Rigid || !is_measured || found.1.verdict != Verdict::Unexplained {
+            return found;
         }
-        found
+        (self.progress)("with the motion given");
+        self.with_motion_given().looked(train)
     }
 
     /// The decision of all looks, with the torque given or the motion.

@@ -47,8 +47,6 @@ pub struct Search<'a> {
     pub gap: Discrepancy,
     /// Whether something was left untried for want of work.
     pub cut_short: AtomicBool,
-    /// Whether a hypothesis that might have been told made the axis another one.
-    pub ran_off: AtomicBool,
     /// Told what is being done.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }

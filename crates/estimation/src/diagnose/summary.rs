@@ -73,6 +73,7 @@ pub fn build(
         parameters: parameters(case, decision),
         rounding: None,
         cut_short: decision.cut_short,
+        motion_is_given: decision.motion_is_given,
         closed_loop: None,
     }
 }

@@ -54,6 +54,12 @@ impl InverseDynamics {
         Some(of)
     }
 
+    /// The same along another motion, of which only the effects know: the equations of the axis are linear in the measured one.
+    #[must_use]
+    pub fn along(self, motion: Vec<[f64; 4]>, trajectory: Trajectory) -> Self {
+        Self { motion, trajectory: trajectory.into(), ..self }
+    }
+
     /// Whether a model can be compared: its encoder reads its position when the torque says.
     pub fn has_a_place_for(model: &Model) -> bool {
         model.effects.active().sensors().is_empty()

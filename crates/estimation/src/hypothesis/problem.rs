@@ -18,6 +18,7 @@ use super::tracking::{
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
+use crate::effects::Settings;
 
 /// Turn of a motion in a sample, rad, up to which a model can be held to it.
 pub const HELD: f64 = 0.5;
@@ -91,10 +92,13 @@ impl Problem<'_> {
         Self { resolution: Resolution::Coarse, ..self.clone() }
     }
 
-    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared. Of two inertias what an effect does to the
-    /// motion between them is as large as what is left.
+    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared, unless that is given. Of two inertias what an
+    /// effect does to the motion between them is as large as what is left.
     #[must_use]
     pub fn along_the_motion_of(&self, fit: &Fit) -> Self {
+        if self.band.motion_is_given() {
+            return self.clone();
+        }
         let dynamics = || {
             if self.nominal.structure != Structure::Rigid {
                 return None;
@@ -108,10 +112,26 @@ impl Problem<'_> {
     /// The same along the motion as measured, where that is given.
     #[must_use]
     pub fn along_what_is_given(self) -> Self {
-        if !self.band.motion_is_given() {
-            return self;
-        }
-        self.given(&self.nominal).map_or_else(|| self.clone(), |fit| self.along_the_motion_of(&fit))
+        if self.band.motion_is_given() { self.along_the_measured_motion() } else { self }
+    }
+
+    /// The same along the motion as measured, whatever is given.
+    #[must_use]
+    pub fn along_the_measured_motion(&self) -> Self {
+        Self { dynamics: self.measured_dynamics().map(Arc::new), ..self.clone() }
+    }
+
+    /// What models lack along the motion as measured. The torque that a log gives or a model lacks takes an axis of little inertia anywhere:
+    /// the feedback alone takes one that nothing drives or brakes along the record.
+    fn measured_dynamics(&self) -> Option<InverseDynamics> {
+        let given = self.given(&self.nominal)?;
+        let (tracked, trajectory) = self.track_step_by_step(&given.model, given.bandwidth)?;
+        let dynamics = InverseDynamics::new(&given.model, given.bandwidth, tracked, trajectory, self.record)?;
+        let free = Model::new(self.nominal.parameters, self.nominal.structure, Settings::default());
+        let per = self.counted(&self.nominal);
+        let tightest = [HELD / self.record.dt; 2];
+        let (tracked, trajectory) = track_step_by_step(&free, &self.record.undriven(), tightest, per)?;
+        Some(dynamics.along(tracked.motion, trajectory))
     }
 
     /// The same, its steps counted with those of other looks.

@@ -87,3 +87,51 @@ fn what_another_model_lacks_along_the_motion_of_one_is_what_its_own_simulation_l
         assert!(off <= share, "{i}: {off}");
     }
 }
+
+/// A light joint on a slow way to and fro, rad, at times, s, under a torque of its speed and the time, N.m.
+fn slow_joint(torque: impl Fn(f64, f64) -> f64) -> Record {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let times = || (0..SAMPLES).map(|k| DT * f64::from(k));
+    let theta = times().map(|t| 0.6 * (0.9 * t).sin() + noise(&mut rng, 1e-6)).collect();
+    let torque = times().map(|t| torque(0.54 * (0.9 * t).cos(), t)).collect();
+    of_one_encoder(0.0, torque, theta)
+}
+
+#[test]
+fn the_motion_as_measured_is_known_of_a_light_axis_whose_torque_is_not() {
+    let record = slow_joint(|_, t| 3.0 * (1.7 * t + 1.0).sin());
+    let model = Model::new(parameters(0.02), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &model, Reach::Ruled);
+    let problem = Problem::of(&searched.record, &searched.band, model, searched.peak);
+    let given = problem.given(&model).expect("a run");
+    let off = |problem: &Problem<'_>| {
+        let motion = problem.motion_of(&given).expect("a motion");
+        let theta = searched.record.channels[0].as_ref().expect("measured");
+        motion.iter().zip(theta).skip(theta.len() / 10).map(|(m, y)| (m[0] - y).abs()).fold(0.0, f64::max)
+    };
+    // The axis as given is dragged after it by a torque that it does not know of.
+    let (own, measured) = (off(&problem), off(&problem.along_the_measured_motion()));
+    assert!(own > 0.1 && measured < 0.02, "{own} {measured}");
+}
+
+#[test]
+fn a_friction_that_holds_the_model_explains_no_motion_and_one_that_slides_does() {
+    let coulomb =
+        |level: f64| Model::new(parameters(0.02), Structure::Rigid, with(&[(Effect::CoulombMotor, 0, level)]));
+    let foreign = slow_joint(|_, t| 3.0 * (1.7 * t + 1.0).sin());
+    let own = slow_joint(|v, _| 3.0 * v.signum());
+    for (record, level, explains) in [(&foreign, 3.5, false), (&own, 3.0, true)] {
+        let nominal = coulomb(0.0);
+        let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
+        let noise = estimate_noise(&record.torque, &channels, None);
+        let case = case(record, nominal, &noise);
+        let (searched, _) = prepared(record, &nominal, Reach::Ruled);
+        let work = Work::default();
+        let search = searched.search(&case, Vec::new(), &work, &|_| ());
+        // Along its own motion it lacks little either way.
+        let at = search.problem.along(&coulomb(level), search.problem.bandwidth([0.0; 2])).expect("a run");
+        let left = searched.band.torque_share(at.s, &searched.record);
+        assert!(left < 0.25, "{left}");
+        assert_eq!(search.explains_the_motion(&coulomb(level)), explains, "{level}");
+    }
+}

@@ -14,12 +14,12 @@ mod equation;
 mod lines;
 mod torque;
 
-use super::{Inertia, Input};
 use super::encoders::{compare_encoders, encoder_ratio, slow_motion_finding};
 use super::finding::{Finding, Severity};
 use super::motion::Direction;
 use super::rigid::{self, NominalFit};
 use super::spectra::Spectra;
+use super::{Inertia, Input};
 use conditions::{check_band, check_directions, check_time_scale};
 use lines::coherent_lines;
 use torque::torque_findings;
@@ -86,7 +86,11 @@ fn of_segments(columns: &[&[f64]], dt: f64) -> Option<(Spectra, Vec<usize>)> {
 
 /// Looks at torque and motion. Gives the band in which they are coherent, Hz, and sets the inertia that moves, where it is
 /// positive.
-pub(super) fn examine(input: &Input<'_>, inertia: &mut Option<Inertia>, findings: &mut Vec<Finding>) -> Option<[f64; 2]> {
+pub(super) fn examine(
+    input: &Input<'_>,
+    inertia: &mut Option<Inertia>,
+    findings: &mut Vec<Finding>,
+) -> Option<[f64; 2]> {
     let torque = input.torque?;
     check_time_scale(input, findings);
     let rates = || {
