@@ -78,8 +78,8 @@ impl Search<'_> {
         self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
         // By the errors that hold, or by its own, as its rivals are.
-        let simple = [&finished, &chosen].into_iter().find_map(|fit| self.simplified(fit, independent, &pool));
-        if let Some(simple) = simple.filter(|_| !is_settled) {
+        let by_either = || [&finished, &chosen].into_iter().find_map(|fit| self.simplified(fit, independent, &pool));
+        if !is_settled && let Some(simple) = by_either() {
             return Continue((simple, pool));
         }
         let mut weighing = self.weigh(&chosen, &finished, parameters, pool, independent);
@@ -168,7 +168,7 @@ impl Search<'_> {
     /// Whether a model of a rigid axis explains its torque along the motion as measured, too. Along the motion of one that friction holds it
     /// lacks no torque, whatever moved the axis.
     pub(super) fn explains_the_motion(&self, model: &Model) -> bool {
-        if self.problem.nominal.structure != Structure::Rigid {
+        if self.problem.nominal.structure != Structure::Rigid || self.band().motion_is_given() {
             return true;
         }
         let problem = self.problem.along_the_measured_motion();
