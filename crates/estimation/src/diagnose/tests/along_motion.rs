@@ -112,6 +112,11 @@ fn the_motion_as_measured_is_known_of_a_light_axis_whose_torque_is_not() {
     // The axis as given is dragged after it by a torque that it does not know of.
     let (own, measured) = (off(&problem), off(&problem.along_the_measured_motion()));
     assert!(own > 0.1 && measured < 0.02, "{own} {measured}");
+    // Where it is given no look beside a fit goes along that one's motion.
+    let band = searched.band.with_motion_given();
+    let problem = Problem::of(&searched.record, &band, model, searched.peak).along_what_is_given();
+    let beside = off(&problem.along_the_motion_of(&given));
+    assert!(beside < 0.02, "{beside}");
 }
 
 #[test]
