@@ -218,3 +218,16 @@ fn a_linear_axis_is_drawn_in_metres_and_newtons() {
     assert!(page(AxisKind::Rotary).contains("omega1 [rad/s]"));
     assert!(page(AxisKind::Linear).contains("omega1 [m/s]") && !page(AxisKind::Linear).contains("omega1 [rad/s]"));
 }
+
+#[test]
+fn that_the_motion_was_given_or_the_search_cut_short_is_told_in_one_line_of_words() {
+    let given = Diagnosis { motion_is_given: true, ..friction("x-axis") };
+    let short = Diagnosis { cut_short: true, ..friction("x-axis") };
+    for (d, words) in
+        [(given, "of the torque that the measured motion takes"), (short, "Diagnose a shorter part (--from")]
+    {
+        let told = value(&d, &[]);
+        let last = told["warnings"].as_array().and_then(|w| w.last()?.as_str()).expect("a warning");
+        assert!(last.contains(words) && !last.contains("  "), "{last}");
+    }
+}

@@ -170,7 +170,9 @@ pub fn warnings(d: &Diagnosis, motion: Option<AxisKind>) -> Vec<String> {
             .to_owned()
     });
     let given = d.motion_is_given.then(|| {
-        "With the torque taken as it was logged no model of this axis follows the motion: what is told is of the torque that the          measured motion takes. An effect of an encoder, a dead zone, a torque limit and a friction that changes are not looked for so."
+        "With the torque taken as it was logged no model of this axis follows the motion: what is told is of the torque that the \
+         measured motion takes. An effect of an encoder, a dead zone, a torque limit and a friction that changes are not looked \
+         for so."
             .to_owned()
     });
     rounding.chain(run_off(d)).chain(cut_short).chain(given).collect()

@@ -115,7 +115,8 @@ pub struct TorqueResidual {
     /// The spectra with it, where there is any.
     whole: [Vec<C>; 2],
     vibrations: Vec<Vibration>,
-    /// `ln |dT'/dT|^2` of the torque `T'` that acts over the logged one, of all bins, where the motion is given, else zero: the density of logged torques over that of acting ones.
+    /// `ln |dT'/dT|^2` of the torque `T'` that acts over the logged one, of all bins, where the motion is given, else zero: the density of
+    /// logged torques over that of acting ones.
     pub(super) acts: f64,
     /// Square of the inertia of each equation over the larger one's: torques of one acceleration.
     pub(super) alike: [f64; 2],
