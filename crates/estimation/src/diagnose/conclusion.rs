@@ -171,7 +171,7 @@ impl Search<'_> {
         if self.problem.nominal.structure != Structure::Rigid || self.band().motion_is_given() {
             return true;
         }
-        let problem = self.problem.along_the_measured_motion();
+        let problem = self.measured.get_or_init(|| self.problem.along_the_measured_motion());
         // Of an encoder that reads otherwise the motion is not known.
         let is_known = problem.is_without_simulation(model);
         let at = is_known.then(|| problem.along(model, problem.bandwidth([0.0; 2]))).flatten();

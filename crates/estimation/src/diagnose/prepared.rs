@@ -1,6 +1,7 @@
 //! A record made ready for the search: in the band of its motion, at the rate of that band, its noise seen through the axis as it is.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -110,7 +111,15 @@ impl Prepared {
         let problem =
             Problem::of(&self.record, &self.band, case.nominal, self.peak).counted_in(work).along_what_is_given();
         let reference = self.reference;
-        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
+        Search {
+            problem,
+            reference,
+            suspects,
+            gap: [0.0; 2],
+            cut_short: false.into(),
+            measured: OnceLock::new(),
+            progress,
+        }
     }
 
     /// Share of the torque that a fit leaves.
