@@ -71,6 +71,13 @@ impl Extent<'_> {
         (0.5 * self.torque_deviation..self.torque).contains(&torque)
     }
 
+    /// Whether something can pull the axis back by a torque, N.m, with a stiffness of up to so much, N.m/rad: the drive holds it, or the axis
+    /// swings on it and turns back. An inertia `I` that passes the middle of a spring `k` at the speed `w` is turned by `w*sqrt(I*k)`.
+    #[must_use]
+    pub fn is_pulled_back(&self, torque: f64, stiffness: f64) -> bool {
+        torque <= self.torque + self.fastest * (self.inertia[0] * stiffness).sqrt()
+    }
+
     /// Travel of the effect's side, rad.
     #[must_use]
     pub fn travel(&self) -> f64 {
@@ -186,6 +193,21 @@ mod tests {
         assert!(admits(Effect::Delay, &[0.11]) && !admits(Effect::Delay, &[0.13]));
         assert!(admits(Effect::SensorDelay, &[0.11]) && !admits(Effect::SensorDelay, &[0.13]));
         assert!(admits(Effect::Latch, &[-0.11, 0.0]) && !admits(Effect::Latch, &[-0.13, 0.0]));
+    }
+
+    #[test]
+    fn a_weight_is_held_by_the_largest_torque_or_swings() {
+        // At a quarter of the travel from its middle, 0.5 rad, the spring pulls by half of its stiffness; past the middle at 2 rad/s an inertia
+        // of 1 kg.m2 on it is turned by twice the root of that.
+        let extent = |fastest: f64| Extent { positions: &[-1.0, 1.0], fastest, ..resting() };
+        let spring =
+            |stiffness: f64, fastest: f64| (Effect::ExternalSpring.info().bounds)(&[stiffness, 0.0], &extent(fastest));
+        assert!(spring(1.9, 0.0) && !spring(2.1, 0.0));
+        assert!(spring(19.0, 2.0) && !spring(20.5, 2.0));
+        let weight =
+            |size: f64, fastest: f64| (Effect::Gravity.info().bounds)(&[0.6 * size, 0.8 * size, 1.0], &extent(fastest));
+        assert!(weight(1.9, 0.0) && !weight(2.1, 0.0));
+        assert!(weight(19.0, 2.0) && !weight(20.5, 2.0));
     }
 
     #[test]

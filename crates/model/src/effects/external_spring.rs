@@ -27,7 +27,7 @@ impl Force for ExternalSpring {
         named: true,
         textbook: false,
         odds: ONCE,
-        bounds: |p, x| p[0] * x.travel() <= 4.0 * x.torque,
+        bounds: |p, x| x.is_pulled_back(0.25 * p[0] * x.travel(), p[0]),
         example: &[5e-3, 0.2],
         variants: &[Variant { name: "", free: &[0, 1] }],
     };

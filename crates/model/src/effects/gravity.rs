@@ -32,7 +32,8 @@ impl Force for Gravity {
         textbook: false,
         odds: 1.0,
         bounds: |p, x| {
-            p[0].hypot(p[1]) * (0.25 * p[2] * x.travel()).min(1.0) <= x.torque
+            let weight = p[0].hypot(p[1]);
+            x.is_pulled_back(weight * (0.25 * p[2] * x.travel()).min(1.0), weight * p[2])
                 && p[2] * x.travel() >= 0.2
                 && p[2] * x.travel() <= 0.75 * std::f64::consts::TAU
         },

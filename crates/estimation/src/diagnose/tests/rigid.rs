@@ -229,6 +229,18 @@ fn driven(n: u32, torque: impl Fn(f64) -> f64, effects: Settings, seed: u64) -> 
 }
 
 #[test]
+fn a_weight_of_many_times_the_torque_is_told_of_a_hinge_that_swings() {
+    // The torque is in step with the swing, as where a weak drive swings a pendulum up.
+    let hidden = [(Effect::Gravity, 0, 8.0), (Effect::ViscousMotor, 0, 0.3)];
+    let record = driven(SAMPLES, |t| 0.9 * (1.9 * t).sin(), with(&hidden), 3);
+    let swing = record.channels[0].iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!((0.6..1.5).contains(&swing), "{swing}");
+    let o = diagnosed(&record, INERTIA);
+    assert_eq!(named(&o), ["gravity", "viscous_friction"], "{:#?}", ranking(&o));
+    assert!((o.improved.effects.of(Effect::Gravity)[0] / 8.0 - 1.0).abs() < 0.02);
+}
+
+#[test]
 fn a_dead_zone_is_told_as_wide_as_it_is_from_a_command_that_changes_faster_than_the_motion() {
     let width = 1.0;
     let effects = with(&[(Effect::DeadZone, 0, width), (Effect::ActuatorLag, 0, 6e-3)]);
