@@ -101,8 +101,8 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
 ///
 /// Least squares in the time domain: a weight's torque is a straight line over the angle in a narrow range alone. Torque and motion pass
 /// the same smoothing (a mean over `2*w + 1` samples, twice), so that the equation holds between them; of some widths the narrowest from
-/// which the next no more raises the inertia than by its error: noise of the encoder, differentiated twice, takes from it, and a width beyond
-/// the motion's band leaves a weight's torque for it. None where less than three quarters are explained, or the inertia is not known to a
+/// which the next no more raises the inertia than by its error, or than by three of them where it knows it less: noise of the encoder,
+/// differentiated twice, takes from it, and a width beyond the motion's band leaves a weight's torque for it, or a constant one. None where less than three quarters are explained, or the inertia is not known to a
 /// third.
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     determined_in_time(input).map(|found| found.mass)
@@ -113,15 +113,27 @@ fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
     let is_determined =
         |f: &TimeDomainFit| f.left < MAX_RESIDUAL && f.mass > SIGNIFICANT * f.error && f.mass.is_finite();
-    let mut wider = at_widths(input, torque, x, None).into_iter().filter(is_determined);
-    let mut best = wider.next()?;
-    for next in wider {
-        if next.mass <= best.mass + next.error {
+    let all = at_widths(input, torque, x, None);
+    let standing = standing(&all.iter().map(|f| is_determined(f).then_some([f.mass, f.error])).collect::<Vec<_>>());
+    all.into_iter().nth(standing?)
+}
+
+/// Which of some values and their errors is not raised by the next, where it is one: by more than its error, or than by three of them where
+/// that knows it less.
+fn standing(values: &[Option<[f64; 2]>]) -> Option<usize> {
+    let known = || values.iter().enumerate().filter_map(|(i, of)| Some((i, (*of)?)));
+    let raises = |[value, error]: [f64; 2], [next, next_error]: [f64; 2]| {
+        let knows_less = next_error / next > error / value;
+        next - value > if knows_less { SIGNIFICANT } else { 1.0 } * next_error
+    };
+    let mut at = known().next()?;
+    for next in known().skip(1) {
+        if !raises(at.1, next.1) {
             break;
         }
-        best = next;
+        at = next;
     }
-    Some(best)
+    Some(at.0)
 }
 
 /// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is so
@@ -161,6 +173,10 @@ pub(super) const SAMPLES: usize = 20_000;
 
 /// Standard errors from which a value is surely not zero.
 pub(super) const SIGNIFICANT: f64 = 3.0;
+
+/// Columns of viscous and of dry friction in the time domain.
+const VISCOUS: usize = 1;
+const DRY: usize = 2;
 
 /// The fit in the time domain.
 struct TimeDomainFit {
@@ -223,12 +239,16 @@ fn time_domain_fit(
     let least = noise.map(|noise| NOISE * noise * of_speed(width) / dt);
     let moves = |k: &usize| least.is_none_or(|least| speed(&q, *k, dt).abs() > least);
     let rows: Vec<usize> = (1..q.len() - 1).step_by(stride).filter(moves).collect();
-    let triangle = triangularise(rows.len(), columns, 1, |i, out| {
+    // Of an axis that never goes back dry friction is a constant torque.
+    let course = |k: &usize| direction.at(speed(&q, *k, dt));
+    let goes_back = rows.iter().any(|k| course(k) != course(&rows[0]));
+    let which: Vec<usize> = (0..columns).filter(|column| goes_back || *column != DRY).collect();
+    let triangle = triangularise(rows.len(), which.len(), 1, |i, out| {
         let k = rows[i];
         let v = speed(&q, k, dt);
         let all = [acceleration(&q, k, dt), v, direction.at(v), q[k] - middle, 1.0, q[k].sin(), q[k].cos()];
-        out[..columns].copy_from_slice(&all[..columns]);
-        out[columns] = t[k];
+        out.iter_mut().zip(&which).for_each(|(out, column)| *out = all[*column]);
+        out[which.len()] = t[k];
     });
     let solution = triangle.solve().ok()?;
     let mean = rows.iter().map(|k| t[*k]).sum::<f64>() / rows.len() as f64;
@@ -237,14 +257,16 @@ fn time_domain_fit(
     let variance = |i: usize, k: usize| solution.variance(0) * solution.inverse[(i, k)] * (2 * width + 1) as f64;
     let left = solution.residual[(0, 0)] / total;
     let of = |i: usize| solution.phi[(i, 0)];
+    let frictions: &[(usize, f64)] = if goes_back { &[(VISCOUS, fast), (DRY, 1.0)] } else { &[(VISCOUS, fast)] };
+    let pairs = || frictions.iter().flat_map(|a| frictions.iter().map(move |b| (a, b)));
     left.is_finite().then(|| TimeDomainFit {
         left,
         mass: of(0),
         error: variance(0, 0).sqrt(),
-        friction: of(1) * fast + of(2),
-        friction_error: (fast * fast * variance(1, 1) + 2.0 * fast * variance(1, 2) + variance(2, 2)).sqrt(),
+        friction: frictions.iter().map(|(i, by)| by * of(*i)).sum(),
+        friction_error: pairs().map(|((i, a), (k, b))| a * b * variance(*i, *k)).sum::<f64>().sqrt(),
         samples: (rows.len() * stride) as f64 / (2 * width + 1) as f64,
-        coefficients: columns as f64,
+        coefficients: which.len() as f64,
     })
 }
 
@@ -499,5 +521,19 @@ mod tests {
         let scatter = (estimates.iter().map(|e| (e[0] - mean(0)).powi(2)).sum::<f64>() / 39.0).sqrt();
         // The scatter of forty estimates is known to a ninth.
         assert!((0.6..1.6).contains(&(mean(1) / scatter)), "{} against {scatter} of {}", mean(1), mean(0));
+    }
+
+    #[test]
+    fn the_value_is_taken_that_the_next_no_more_raises() {
+        let of = |values: &[[f64; 2]]| standing(&values.iter().copied().map(Some).collect::<Vec<_>>());
+        // Rises as noise goes, then stands.
+        assert_eq!(of(&[[0.2, 0.02], [0.8, 0.05], [1.0, 0.04], [1.02, 0.03], [1.1, 0.02]]), Some(2));
+        // Rises on, each time better known; and less known, by what it is not known to.
+        assert_eq!(of(&[[0.8, 0.08], [0.9, 0.07], [1.0, 0.06]]), Some(2));
+        assert_eq!(of(&[[0.1, 0.02], [0.9, 0.1], [1.2, 0.2], [2.4, 0.6]]), Some(1));
+        // Less known than at first, but raised by many errors.
+        assert_eq!(of(&[[0.01, 0.001], [0.9, 0.1], [0.95, 0.1]]), Some(1));
+        assert_eq!(standing(&[None, Some([1.0, 0.1]), None, Some([0.9, 0.1])]), Some(1));
+        assert_eq!(standing(&[None, None]), None);
     }
 }

@@ -51,6 +51,29 @@ fn the_inertia_of_a_pendulum_under_friction_is_read_from_a_few_slow_swings() {
 }
 
 #[test]
+fn the_inertia_of_an_axis_that_never_goes_back_is_read_from_its_changes_of_speed() {
+    let (dt, n) = (1e-3, 800);
+    let (inertia, viscous, friction) = (1.7e-4, 5e-4, 2.5e-2);
+    let (mut e, mut off) = (noise(7, 2e-4), noise(8, 1e-3));
+    // It speeds up by 9 rad/s and slows down by 15.
+    let since = |k: usize| ((k as f64 * dt).min(0.3), (k as f64 * dt - 0.3).max(0.0));
+    let mut angle = |k: usize| {
+        let (up, down) = since(k);
+        50.0 * (up + down) + 15.0 * up * up + 9.0 * down - 15.0 * down * down + e()
+    };
+    let x: Vec<f64> = (0..n).map(&mut angle).collect();
+    let mut torque = |k: usize| {
+        let (up, down) = since(k);
+        let acceleration = if down > 0.0 { -30.0 } else { 30.0 };
+        inertia * acceleration + viscous * (50.0 + 30.0 * (up - down)) + friction + off()
+    };
+    let torque: Vec<f64> = (0..n).map(&mut torque).collect();
+    let found = examine(&Input { dt, torque: Some(&torque), theta1: Some(&x), ..Input::default() });
+    let told = found.inertia.expect("an inertia");
+    assert!(told.is_shown && (told.value / inertia - 1.0).abs() < 0.1, "{told:?}");
+}
+
+#[test]
 fn an_inertia_that_hardly_shows_beside_friction_and_a_foreign_torque_is_a_guess() {
     let (dt, n) = (1e-2, 4000);
     let (inertia, friction, foreign) = (0.1, 4.0, 2.0);
