@@ -14,16 +14,12 @@ use super::pool::likeliest_of;
 use super::search::{ALIKE, Search, is_extension};
 use super::verdict::Verdict;
 use super::weighing::{Confusable, Nested, Weighed, Weighing, has_one_like, instead, is_likely};
-use crate::axis::Structure;
 use crate::effects::{Effect, Family, ONCE};
 use crate::hypothesis::determined::{is_simpler, is_undetermined, steadiness};
 use crate::hypothesis::fit::{Fit, Term};
 use crate::hypothesis::model::Model;
 use crate::trace::machine::NOMINAL_OFF;
 
-/// Share of the torque that a hypothesis lacks at most along the motion as measured, where it lacks less along its own: of right ones on
-/// noisy encoders it was up to 0.3, of frictions that held the axis 0.6 to 1.3.
-const HELD_BY_FRICTION: f64 = 0.5;
 /// Hypotheses that are told, each with its own run over the held-out data.
 pub const REPORTED: usize = 12;
 
@@ -138,6 +134,7 @@ impl Search<'_> {
             motion_is_given: self.band().motion_is_given(),
             given,
             parameters,
+            astray: self.astray(&finished),
             chosen: finished,
             ranking,
             shares,
@@ -162,20 +159,7 @@ impl Search<'_> {
 
     /// Whether a hypothesis leaves no more of the torque than that its causes are none of suspects, however large the gap was.
     fn is_understood(&self, chosen: &Fit) -> bool {
-        self.left(chosen) <= MATERIAL
-    }
-
-    /// Whether a model of a rigid axis explains its torque along the motion as measured, too. Along the motion of one that friction holds it
-    /// lacks no torque, whatever moved the axis.
-    pub(super) fn explains_the_motion(&self, model: &Model) -> bool {
-        if self.problem.nominal.structure != Structure::Rigid || self.band().motion_is_given() {
-            return true;
-        }
-        let problem = self.measured.get_or_init(|| self.problem.along_the_measured_motion());
-        // Of an encoder that reads otherwise the motion is not known.
-        let is_known = problem.is_without_simulation(model);
-        let at = is_known.then(|| problem.along(model, problem.bandwidth([0.0; 2]))).flatten();
-        at.is_none_or(|at| self.band().torque_share(at.s, self.problem.record) <= HELD_BY_FRICTION)
+        self.left_of_the_motion(chosen) <= MATERIAL
     }
 
     /// Whether the parameters alone are likelier than the nominal ones, with none as far off as it may be: one that is is not known.
@@ -206,8 +190,7 @@ impl Search<'_> {
             .clone()
             .map(|i| is_determined(i).then(|| self.nested(chosen, i, parameters, &pool)).flatten())
             .collect();
-        let confidence =
-            if self.explains_the_motion(&chosen.model) { self.confidence(parameters, chosen) } else { 0.0 };
+        let confidence = self.confidence(parameters, chosen);
         let standing = |i: usize| {
             let effect = chosen.terms[i].0;
             let decisive = match &nested[i] {

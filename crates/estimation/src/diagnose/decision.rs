@@ -1,5 +1,6 @@
 //! What a diagnosis decides: the verdict, and the hypotheses that it was reached among.
 
+use super::astray::Astray;
 use super::diagnosis::Undecided;
 use super::verdict::Verdict;
 use super::weighing::{Confusable, Weighed, likely};
@@ -25,6 +26,8 @@ pub struct Decision {
     pub parameters: Fit,
     /// The hypothesis decided for.
     pub chosen: Fit,
+    /// What that leaves, where it goes another way than the axis did.
+    pub astray: Option<Astray>,
     /// Every hypothesis that was fitted, best first.
     pub ranking: Vec<Weighed>,
     /// Share of the gap of each effect of the chosen hypothesis.
@@ -88,6 +91,7 @@ mod tests {
             cut_short: false,
             motion_is_given: false,
             given: parameters.clone(),
+            astray: None,
             chosen: parameters.clone(),
             parameters,
             ranking: Vec::new(),

@@ -1,6 +1,7 @@
 //! The gap between model and machine: where, which, how far.
 
 mod assess;
+mod astray;
 mod closed_loop;
 mod conclusion;
 mod confidence;

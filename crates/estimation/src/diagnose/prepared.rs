@@ -124,7 +124,12 @@ impl Prepared {
 
     /// Share of the torque that a fit leaves.
     pub fn left(&self, fit: &Fit) -> f64 {
-        self.band.torque_share(fit.discrepancy, &self.record)
+        self.share(fit.discrepancy)
+    }
+
+    /// Share of the torque that a discrepancy is.
+    pub fn share(&self, discrepancy: Discrepancy) -> f64 {
+        self.band.torque_share(discrepancy, &self.record)
     }
 
     /// The part of a record, as long as the one searched and beyond it, in which a model lacks the most, with what it lacks there; `None` where

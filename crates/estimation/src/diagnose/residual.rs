@@ -1,22 +1,26 @@
 //! The torque that a fit lacks along the record: where it shows, how large it is, and what it looks like.
 
+use super::decision::Decision;
 use super::diagnosis::{Remainder, Site};
 use super::location::{Location, Residual, along};
 use super::prepared::Prepared;
 use crate::axis::Structure;
 use crate::effects::Place;
-use crate::hypothesis::fit::Fit;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::tracking::{Tracked, steps_per_sample, track};
 use crate::trace::numerics::dot;
 
-/// What a model lacks along the record, in the band, and where that shows.
-fn residual_torque(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> (Tracked, [Vec<f64>; 2], Site) {
-    let tracked = track(model, &p.record, bandwidth, steps_per_sample(model, &p.record))
-        .unwrap_or_else(|| Tracked::nothing(p.record.len()));
+/// What a model lacks along the record.
+fn run(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Tracked {
+    track(model, &p.record, bandwidth, steps_per_sample(model, &p.record))
+        .unwrap_or_else(|| Tracked::nothing(p.record.len()))
+}
+
+/// The same in the band, and where it shows.
+fn shown(p: &Prepared, tracked: &Tracked, structure: Structure) -> ([Vec<f64>; 2], Site) {
     let series = [0, 1].map(|i| p.band.filtered(&tracked.torque[i]));
-    let site = where_by_torque(&series, model.structure == Structure::Rigid);
-    (tracked, series, site)
+    let site = where_by_torque(&series, structure == Structure::Rigid);
+    (series, site)
 }
 
 fn residual(series: &[f64], tracked: &Tracked) -> Residual {
@@ -25,7 +29,8 @@ fn residual(series: &[f64], tracked: &Tracked) -> Residual {
 
 /// Where the torque that a model lacks shows along the record.
 pub fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
-    let (tracked, series, site) = residual_torque(p, model, bandwidth);
+    let tracked = run(p, model, bandwidth);
+    let (series, site) = shown(p, &tracked, model.structure);
     let mut residual = residual(&series[0], &tracked);
     if model.structure == Structure::TwoInertia {
         let [_, r2] = series;
@@ -34,14 +39,17 @@ pub fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
     along(&p.record, &residual, site)
 }
 
-/// What a fit leaves, in figures and by its looks.
-pub fn remains(p: &Prepared, fit: &Fit) -> Remainder {
-    let (tracked, series, site) = residual_torque(p, &fit.model, fit.bandwidth);
+/// What the hypothesis decided for leaves, in figures and by its looks.
+pub fn remains(p: &Prepared, decision: &Decision) -> Remainder {
+    let (fit, astray) = (&decision.chosen, decision.astray.as_ref());
+    let tracked = astray.map_or_else(|| run(p, &fit.model, fit.bandwidth), |a| a.tracked.clone());
+    let (series, site) = shown(p, &tracked, fit.model.structure);
     let shown = &series[usize::from(site == Site::At(Place::Table))];
+    let (rows, discrepancy) = astray.map_or((&fit.rows, fit.discrepancy), |a| (&a.along.rows, a.along.s));
     Remainder {
-        torque_rms: p.band.torque_rms(fit.discrepancy),
-        share: p.left(fit),
-        noise_multiple: p.band.noise_multiple(&fit.rows),
+        torque_rms: p.band.torque_rms(discrepancy),
+        share: p.share(discrepancy),
+        noise_multiple: p.band.noise_multiple(rows),
         site,
         looks: along(&p.record, &residual(shown, &tracked), site).looks,
     }

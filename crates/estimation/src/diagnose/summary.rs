@@ -59,7 +59,7 @@ pub fn build(
         ranking,
         confusable: decision.confusable.clone(),
         undecided: decision.undecided.clone(),
-        remainder: remains(searched, &decision.chosen),
+        remainder: remains(searched, decision),
         gap: GapReport {
             closure: holdout.closure,
             closure_of_effect: holdout.closure_of_effect,

@@ -49,7 +49,7 @@ const SHARPER: f64 = 0.25;
 const SHARPENING: usize = 6;
 
 /// A model along the record.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Along {
     pub model: Model,
     pub rows: TorqueResidual,

@@ -19,6 +19,7 @@ use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
 use crate::effects::Settings;
+use crate::numerics::level::{deviation, rms};
 
 /// Turn of a motion in a sample, rad, up to which a model can be held to it.
 pub const HELD: f64 = 0.5;
@@ -180,6 +181,19 @@ impl Problem<'_> {
         }
     }
 
+    /// How far the readings of the motor's or the only side are from a fit's own motion, over what counts of the record: rms over that of
+    /// their noise, and over the motion's own deviation. `None` where no position is read, or none that the torque says.
+    pub fn distance_of_readings(&self, fit: &Fit) -> Option<[f64; 2]> {
+        if !InverseDynamics::has_a_place_for(&fit.model) {
+            return None;
+        }
+        let read = self.record.channels[0].as_ref()?;
+        let motion = self.track(&fit.model, fit.bandwidth)?.motion;
+        let off = |((read, at), weight): ((&f64, &[f64; 4]), &f64)| weight * (read - at[0]);
+        let off: Vec<f64> = read.iter().zip(&motion).zip(&self.band.taper).map(off).collect();
+        Some([self.record.noise[0], deviation(read)].map(|size| rms(&off) / size.max(f64::MIN_POSITIVE)))
+    }
+
     pub fn base(&self) -> Vec<Free> {
         BaseParameter::of(self.nominal.structure).iter().map(|p| Free::Base(*p)).collect()
     }
@@ -270,6 +284,12 @@ impl Problem<'_> {
             }
             (residual, dynamics)
         })
+    }
+
+    /// What a model lacks along the motion of another's run, where models are compared so, in time.
+    pub fn lacked_without_simulation(&self, model: &Model) -> Option<Tracked> {
+        let dynamics = self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model))?;
+        Some(Tracked { torque: dynamics.torque(model, self.record), motion: dynamics.motion.clone() })
     }
 
     /// Whether a model is compared along the motion of another's run, whatever bandwidth it would follow the record at.
