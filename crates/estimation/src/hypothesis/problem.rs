@@ -128,11 +128,14 @@ impl Problem<'_> {
         let given = self.given(&self.nominal)?;
         let (tracked, trajectory) = self.track_step_by_step(&given.model, given.bandwidth)?;
         let dynamics = InverseDynamics::new(&given.model, given.bandwidth, tracked, trajectory, self.record)?;
-        let free = Model::new(self.nominal.parameters, self.nominal.structure, Settings::default());
-        let per = self.counted(&self.nominal);
-        let tightest = [HELD / self.record.dt; 2];
-        let (tracked, trajectory) = track_step_by_step(&free, &self.record.undriven(), tightest, per)?;
+        let (tracked, trajectory) = self.measured_run([HELD / self.record.dt; 2])?;
         Some(dynamics.along(tracked.motion, trajectory))
+    }
+
+    /// The motion as measured: an axis that nothing drives or brakes, held to the record.
+    pub(super) fn measured_run(&self, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
+        let free = Model::new(self.nominal.parameters, self.nominal.structure, Settings::default());
+        track_step_by_step(&free, &self.record.undriven(), bandwidth, self.counted(&self.nominal))
     }
 
     /// The same, its steps counted with those of other looks.

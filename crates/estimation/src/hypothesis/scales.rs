@@ -125,8 +125,14 @@ fn acting(model: &Model, record: &Record, moved: &[f64]) -> (f64, [f64; 2]) {
 
 impl Scales {
     pub fn new(p: &Problem<'_>, fit: &Fit) -> Option<Self> {
-        // Parameters that have gone far may not bear the feedback that their discrepancy asks for.
-        let t = p.track(&fit.model, p.bandwidth(fit.discrepancy)).or_else(|| p.track(&fit.model, fit.bandwidth))?;
+        let bandwidth = p.bandwidth(fit.discrepancy);
+        let t = if p.nominal.structure == Structure::Rigid {
+            // A light axis is dragged anywhere by the torque that its parameters lack.
+            p.measured_run(bandwidth)?.0
+        } else {
+            // Parameters that have gone far may not bear the feedback that their discrepancy asks for.
+            p.track(&fit.model, bandwidth).or_else(|| p.track(&fit.model, fit.bandwidth))?
+        };
         let n = t.motion.len() as f64;
         let rms = |f: &dyn Fn(&[f64; 4]) -> f64| (t.motion.iter().map(|m| f(m).powi(2)).sum::<f64>() / n).sqrt();
         let side = |i: usize| {

@@ -146,3 +146,24 @@ fn a_friction_that_holds_the_model_leaves_the_torque_of_the_motion_and_one_that_
         assert!(leaves.contains(&left), "{level}: {left}");
     }
 }
+
+#[test]
+fn what_a_light_joint_may_have_is_told_by_where_it_was_and_not_by_where_its_torque_would_have_taken_it() {
+    // Half a turn to and fro under a friction that is nearly all of its torque.
+    let way = |t: f64| 1.5 * (0.9 * t).sin();
+    let times = || (0..SAMPLES).map(|k| DT * f64::from(k));
+    let theta = times().map(way).collect();
+    let torque = times().map(|t| 3.0 * (1.35 * (0.9 * t).cos()).signum()).collect();
+    let record = of_one_encoder(0.0, torque, theta);
+    let model = Model::new(parameters(0.002), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &model, Reach::Ruled);
+    let problem = Problem::of(&searched.record, &searched.band, model, searched.peak);
+    let alone = problem.given(&model).expect("a run");
+    let scales = Scales::new(&problem, &alone).expect("a run");
+    let admits = |effect: Effect, size: f64| {
+        let model = Model::new(parameters(0.002), Structure::Rigid, with(&[(effect, 0, size)]));
+        scales.admit(&searched.record, &model, std::iter::once(effect))
+    };
+    assert!(admits(Effect::Gravity, 2.0) && !admits(Effect::Unbalance, 2.0));
+    assert!(admits(Effect::CoulombMotor, 3.0) && !admits(Effect::CoulombMotor, 5.0));
+}

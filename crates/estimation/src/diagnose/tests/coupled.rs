@@ -1,7 +1,6 @@
 //! Two inertias: an encoder on each side, or on the motor alone.
 
 use super::*;
-use crate::hypothesis::scales::Scales;
 
 /// Two inertias that a controller of gains for position and speed, 1/s2 and 1/s, moves along a way, the motor's encoder alone read `n` times.
 fn of_the_motor(

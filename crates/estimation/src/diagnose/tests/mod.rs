@@ -19,6 +19,7 @@ use crate::hypothesis::fit::{Fit, STEPS, Term};
 use crate::hypothesis::likelihood::{C, TorqueResidual};
 use crate::hypothesis::model::{Free, Model};
 use crate::hypothesis::problem::{Problem, Work};
+use crate::hypothesis::scales::Scales;
 use crate::hypothesis::tracking::{steps_per_sample, track, track_step_by_step};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
