@@ -3,7 +3,7 @@
 use super::astray::Astray;
 use super::diagnosis::Undecided;
 use super::verdict::Verdict;
-use super::weighing::{Confusable, Weighed, likely};
+use super::weighing::{Confusable, Weighed, is_likely, likely};
 use crate::hypothesis::fit::Fit;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -46,6 +46,12 @@ impl Decision {
     /// Causes that are named.
     pub fn named(&self) -> usize {
         if self.verdict == Verdict::Effect { likely(&self.probabilities) } else { 0 }
+    }
+
+    /// How many of the causes that are named are expected to be there.
+    pub fn expected(&self) -> f64 {
+        let named = self.probabilities.iter().filter(|p| self.verdict == Verdict::Effect && is_likely(p));
+        named.sum()
     }
 
     /// True if the parameters all changed by one factor: a wrong torque constant.

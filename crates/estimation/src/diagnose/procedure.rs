@@ -112,7 +112,7 @@ impl<'a> Looks<'a> {
         let other = self.with_motion_given().looked(train);
         let left = other.0.left(&other.1.chosen);
         let explains_more =
-            |astray: f64| other.1.verdict == Verdict::Effect && is_materially_less(left * left, astray * astray);
+            |astray: f64| is_materially_less(left * left, astray * astray) && other.1.expected() > found.1.expected();
         if is_explained && !astray.is_some_and(explains_more) { found } else { other }
     }
 
