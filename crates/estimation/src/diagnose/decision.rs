@@ -122,5 +122,6 @@ mod tests {
     fn causes_are_named_where_they_are_likely_and_the_verdict_is_theirs() {
         let of = |verdict| Decision { verdict, probabilities: vec![0.9, 0.5, 0.7], ..decision(scaled([1.0; 4])) };
         assert_eq!([Verdict::Effect, Verdict::Unexplained].map(|v| of(v).named()), [2, 0]);
+        assert_eq!([Verdict::Effect, Verdict::Unexplained].map(|v| of(v).expected()), [0.9 + 0.7, 0.0]);
     }
 }
