@@ -102,8 +102,8 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
 /// Least squares in the time domain: a weight's torque is a straight line over the angle in a narrow range alone. Torque and motion pass
 /// the same smoothing (a mean over `2*w + 1` samples, twice), so that the equation holds between them; of some widths the narrowest from
 /// which the next no more raises the inertia than by its error, or than by three of them where it knows it less: noise of the encoder,
-/// differentiated twice, takes from it, and a width beyond the motion's band leaves a weight's torque for it, or a constant one. None where less than three quarters are explained, or the inertia is not known to a
-/// third.
+/// differentiated twice, takes from it, and a width beyond the motion's band leaves a weight's torque for it, or a constant one. None where
+/// less than three quarters are explained, or the inertia is not known to a third.
 pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     determined_in_time(input).map(|found| found.mass)
 }
