@@ -113,27 +113,22 @@ fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
     let is_determined =
         |f: &TimeDomainFit| f.left < MAX_RESIDUAL && f.mass > SIGNIFICANT * f.error && f.mass.is_finite();
-    let all = at_widths(input, torque, x, None);
-    let standing = standing(&all.iter().map(|f| is_determined(f).then_some([f.mass, f.error])).collect::<Vec<_>>());
-    all.into_iter().nth(standing?)
+    standing(at_widths(input, torque, x, None).into_iter().filter(is_determined), |f| [f.mass, f.error])
 }
 
-/// Which of some values and their errors is not raised by the next, where it is one: by more than its error, or than by three of them where
-/// that knows it less.
-fn standing(values: &[Option<[f64; 2]>]) -> Option<usize> {
-    let known = || values.iter().enumerate().filter_map(|(i, of)| Some((i, (*of)?)));
-    let raises = |[value, error]: [f64; 2], [next, next_error]: [f64; 2]| {
-        let knows_less = next_error / next > error / value;
-        next - value > if knows_less { SIGNIFICANT } else { 1.0 } * next_error
-    };
-    let mut at = known().next()?;
-    for next in known().skip(1) {
-        if !raises(at.1, next.1) {
+/// The first of some, by a value and its error, that the next does not raise: by more than its error, or than by three of them where that
+/// knows it less.
+fn standing<T>(mut all: impl Iterator<Item = T>, of: impl Fn(&T) -> [f64; 2]) -> Option<T> {
+    let mut best = all.next()?;
+    for next in all {
+        let [[value, error], [raised, next_error]] = [of(&best), of(&next)];
+        let knows_less = next_error / raised > error / value;
+        if raised - value <= if knows_less { SIGNIFICANT } else { 1.0 } * next_error {
             break;
         }
-        at = next;
+        best = next;
     }
-    Some(at.0)
+    Some(best)
 }
 
 /// Whether the same equation explains most of the torque with a friction or an inertia that is significantly positive and none that is so
@@ -525,7 +520,7 @@ mod tests {
 
     #[test]
     fn the_value_is_taken_that_the_next_no_more_raises() {
-        let of = |values: &[[f64; 2]]| standing(&values.iter().copied().map(Some).collect::<Vec<_>>());
+        let of = |values: &[[f64; 2]]| standing(values.iter().enumerate(), |(_, of)| **of).map(|(i, _)| i);
         // Rises as noise goes, then stands.
         assert_eq!(of(&[[0.2, 0.02], [0.8, 0.05], [1.0, 0.04], [1.02, 0.03], [1.1, 0.02]]), Some(2));
         // Rises on, each time better known; and less known, by what it is not known to.
@@ -533,7 +528,6 @@ mod tests {
         assert_eq!(of(&[[0.1, 0.02], [0.9, 0.1], [1.2, 0.2], [2.4, 0.6]]), Some(1));
         // Less known than at first, but raised by many errors.
         assert_eq!(of(&[[0.01, 0.001], [0.9, 0.1], [0.95, 0.1]]), Some(1));
-        assert_eq!(standing(&[None, Some([1.0, 0.1]), None, Some([0.9, 0.1])]), Some(1));
-        assert_eq!(standing(&[None, None]), None);
+        assert_eq!([of(&[[1.0, 0.1], [0.9, 0.1]]), of(&[])], [Some(0), None]);
     }
 }
