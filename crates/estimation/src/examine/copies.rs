@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Two sensors, or a sensor and a torque, never agree to a millionth at every sample: they differ by noise, quantisation and the twist of the
-//! coupling.
+//! coupling. On an axis that goes far in one direction these may be less than a millionth of its way: a copy has the other's noise, too.
 
 use super::finding::{Finding, Severity, rounded};
 use super::least::Line;
@@ -14,6 +14,8 @@ use super::{Channel, Input};
 
 /// Residual over a column's standard deviation up to which it is rounding and the column a copy.
 const ROUNDING: f64 = 1e-6;
+/// Share of a column's second differences that is its rounding where it is a copy; of two sensors' noise it is all and more.
+const APART: f64 = 0.1;
 /// Largest delay or lead of a copy, samples: a cycle or two of a slower task.
 const LATE: usize = 10;
 /// Samples, evenly spaced over the record, that are compared first and second: nearly every pair differs in the first ones; of those that
@@ -42,7 +44,14 @@ fn copy(x: &[f64], y: &[f64]) -> Option<f64> {
     let every = |samples: usize| (x.len() / samples).max(1);
     slope(x, y, every(FIRST), 100.0 * ROUNDING)?;
     slope(x, y, every(THEN), 10.0 * ROUNDING)?;
-    slope(x, y, 1, ROUNDING)
+    slope(x, y, 1, ROUNDING).filter(|a| shares_noise(x, y, *a))
+}
+
+/// Whether what is fast in `y`, and of no motion, is that of `a*x`: what second differences have apart is small beside their own.
+fn shares_noise(x: &[f64], y: &[f64], a: f64) -> bool {
+    let fast = |v: &[f64], k: usize| v[k + 1] - 2.0 * v[k] + v[k - 1];
+    let squares = |of: &dyn Fn(usize) -> f64| (1..y.len().max(1) - 1).map(|k| of(k).powi(2)).sum::<f64>();
+    squares(&|k| fast(y, k) - a * fast(x, k)) <= APART * APART * squares(&|k| fast(y, k))
 }
 
 /// The slope of `y` over `x` at every `stride`-th sample, where the residual is at most `rounding` times the standard deviation of `y`.

@@ -40,9 +40,27 @@ pub(super) fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
     sums
 }
 
+/// Standard deviation that a white noise has in the second difference over `dt`, s, of what is smoothed so: the weights' own is that of three
+/// samples `2*width + 1` apart, in the noise's unit a second squared.
+pub(super) fn noise_of_acceleration(noise: f64, width: usize, dt: f64) -> f64 {
+    6.0_f64.sqrt() * noise / ((2 * width + 1) as f64 * dt).powi(2)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn noise_is_as_large_in_an_acceleration_as_its_weights_are() {
+        for width in [0, 1, 4] {
+            let mut one = vec![0.0; 101];
+            one[50] = 3.0;
+            let all = smoothed(&one, width);
+            let squares: f64 = all.windows(3).map(|w| ((w[2] - 2.0 * w[1] + w[0]) / 1e-4).powi(2)).sum();
+            let told = noise_of_acceleration(3.0, width, 1e-2);
+            assert!((told / squares.sqrt() - 1.0).abs() < 1e-9, "{width}: {told}, {}", squares.sqrt());
+        }
+    }
 
     #[test]
     fn a_mean_twice_is_one_with_the_weights_of_a_triangle() {

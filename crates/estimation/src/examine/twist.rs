@@ -20,7 +20,8 @@ use super::motion::Direction;
 use super::motor_side::fitting_twist;
 use super::regression::Regression;
 use super::rigid::{SAMPLES, SIGNIFICANT};
-use super::smoothing::{smoothed, widths};
+use super::robust::noise;
+use super::smoothing::{noise_of_acceleration, smoothed, widths};
 use super::{Input, NOMINAL_OFF};
 use crate::numerics::level::deviation;
 
@@ -81,10 +82,12 @@ enum Column {
     Unknown,
 }
 
-/// What the column is by the table's equation of motion: the table's angle wherever it holds with that.
+/// What the column is by the table's equation of motion: the table's angle wherever it holds with that. Nothing speaks against that where
+/// the column's acceleration, or what is left of it, is its noise, as of a table that friction holds.
 fn by_the_tables_equation(input: &Input<'_>, x: &[f64], y: &[f64]) -> Column {
     let mut as_table = f64::INFINITY;
     let mut as_twist = [f64::INFINITY; MULTIPLES.len()];
+    let noise = noise(y);
     // In the time domain: friction has no line of its own, and of a short record few lines are slow.
     for width in widths(x.len()) {
         let (x, y) = (smoothed(x, width), smoothed(y, width));
@@ -92,7 +95,11 @@ fn by_the_tables_equation(input: &Input<'_>, x: &[f64], y: &[f64]) -> Column {
             if reading.holds {
                 return Column::Table;
             }
-            as_table = as_table.min(reading.left);
+            // At twice the noise's variance it is more than that.
+            let noise = 2.0 * (noise_of_acceleration(noise, width, input.dt) / reading.acceleration).powi(2);
+            if noise < 1.0 {
+                as_table = as_table.min(if reading.left > noise { reading.left } else { 0.0 });
+            }
         }
         MULTIPLES.par_iter().zip(&mut as_twist).for_each(|(multiple, least)| {
             let reading = Reading::of(input, x.len(), |k| [x[k] - y[k] / multiple, y[k] / multiple]);
@@ -106,7 +113,9 @@ fn by_the_tables_equation(input: &Input<'_>, x: &[f64], y: &[f64]) -> Column {
 
 /// A column's reading in the table's equation of motion.
 struct Reading {
-    /// Share of the variance of the table's acceleration that is left.
+    /// Standard deviation of the table's acceleration, rad/s^2 (m/s^2).
+    acceleration: f64,
+    /// Share of its variance that is left.
     left: f64,
     /// Little is, with a significant stiffness that is about the nominal one where one is known.
     holds: bool,
@@ -128,13 +137,14 @@ impl Reading {
         };
         let fit = Regression::of(n, row)?;
         let accelerations: Vec<f64> = (1..n - 1).step_by((n / SAMPLES).max(1)).map(acceleration).collect();
-        let left = (fit.left / deviation(&accelerations)).powi(2);
+        let accelerations = deviation(&accelerations);
+        let left = (fit.left / accelerations).powi(2);
         let stiffness = fit.values[0];
         let of_nominal = input.nominal.map(|nominal| stiffness * nominal.parameters.i2 / nominal.parameters.k);
         let holds = left < LEFT
             && of_nominal.is_none_or(|ratio| (NOMINAL_OFF.recip()..NOMINAL_OFF).contains(&ratio))
             && stiffness > SIGNIFICANT * fit.errors(row)[0];
-        left.is_finite().then_some(Self { left, holds })
+        left.is_finite().then_some(Self { acceleration: accelerations, left, holds })
     }
 }
 

@@ -208,3 +208,44 @@ fn a_table_that_moves_only_where_the_coupling_pulls_hardest_is_held_by_friction_
     columns.v[3].reverse();
     assert!(!standing::friction_holds_table(&columns.positions()));
 }
+
+#[test]
+fn a_table_that_its_bristles_hold_creeps_with_the_motor_and_is_not_taken_for_the_twist() {
+    // A light table held by presliding friction seventy times as stiff as its coupling; slow bows, to and fro, under a motor ruled by a drive.
+    let p = Parameters { i1: 2.4e-4, i2: 6e-6, b: 5.5e-4, k: 0.0176, rho: 1.0 };
+    let nominal = Some(Nominal { structure: Structure::TwoInertia, parameters: p });
+    let (dt, share) = (5.6e-4, 0.0144);
+    let looked_at = |noisy: f64| {
+        let (mut of_motor, mut of_table) = (noise(47, noisy), noise(48, noisy));
+        let mut columns = Columns { dt, v: Default::default() };
+        for k in 0..888_u32 {
+            let t = f64::from(k) * dt;
+            let (x, v, a) = (0.0135 * (1.0 - (14.0 * t).cos()), 0.19 * (14.0 * t).sin(), 2.6 * (14.0 * t).cos());
+            columns.v[0].push(p.i1 * a + (1.0 - share) * (p.k * x + p.b * v) + 4e-4 * (97.0 * t).sin());
+            columns.v[1].push(x + of_motor());
+            columns.v[3].push(share * x + of_table());
+        }
+        refused(&Input { nominal, ..columns.positions() })
+    };
+    assert_eq!(looked_at(2e-5), [""; 0]);
+    // Without noise nothing is left of it as the table's angle, either.
+    assert_eq!(looked_at(1e-9), [""; 0]);
+}
+
+#[test]
+fn two_encoders_of_an_axis_that_goes_a_million_noises_far_are_no_copies() {
+    let (mut of_motor, mut of_table) = (noise(49, 1e-4), noise(50, 1e-4));
+    let mut c = Columns { dt: 1e-2, v: Default::default() };
+    for k in 0..8192_u32 {
+        let t = f64::from(k) * 1e-2;
+        let v = 20.0 + 2.0 * (0.7 * t).sin();
+        let x = 20.0 * t - 2.0 / 0.7 * (0.7 * t).cos();
+        c.v[0].push(2e-4 * v + 1e-3 * (0.7 * t).cos());
+        c.v[1].push(x + of_motor());
+        c.v[3].push(x + of_table());
+    }
+    assert!(!refused(&c.positions()).contains(&"copy"), "{:?}", refused(&c.positions()));
+    // The one of them scaled, and written with so few digits that rounding is a tenth of its noise.
+    c.v[3] = c.v[1].iter().map(|x| (1e5 * 2.5 * x).round() / 1e5).collect();
+    assert!(refused(&c.positions()).contains(&"copy"), "{:?}", refused(&c.positions()));
+}
