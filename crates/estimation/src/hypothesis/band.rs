@@ -13,6 +13,9 @@ const SHOWS: f64 = 4.0;
 /// The same with which it rules: under control feedback ties torque and noise together (Gautier & Khalil's practice).
 const RULES: f64 = 400.0;
 
+/// Bins that a band has at least, where the motion may show and not rule: a few causes follow fewer, whatever these are of.
+const FEWEST: usize = 8;
+
 /// How far a band goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
@@ -118,8 +121,28 @@ pub fn limit(record: &Record, mask: &[f64], reach: Reach) -> f64 {
                 sum >= power * all
             })
             .unwrap_or(top);
-        let f = ((beyond * at as f64) as usize).min(top.max(8)) as f64 * step;
+        let f = ((beyond * at as f64) as usize).min(top).max(FEWEST) as f64 * step;
         best = best.max(f);
     }
     best.min(0.4 / record.dt)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::Hold;
+
+    #[test]
+    fn the_band_of_a_slow_motion_has_bins_enough_and_that_of_a_fast_one_ends_half_as_far_beyond_it() {
+        // Two periods and sixty over four seconds, whose window spreads them over a bin or two.
+        for (periods, least, most) in [(2.0, 8, 8), (60.0, 90, 100)] {
+            let (n, dt) = (400, 1e-2);
+            let way = |k: i32| (std::f64::consts::TAU * periods * f64::from(k) / f64::from(n)).sin();
+            let theta = (0..n).map(way).collect();
+            let mut record = Record::new(dt, Hold::Linear, vec![0.0; n as usize], [Some(theta), None, None, None]);
+            record.noise[0] = 1e-9;
+            let bins = limit(&record, &mask(&record, Structure::Rigid), Reach::Ruled) * f64::from(n) * dt;
+            assert!((f64::from(least) - 0.5..f64::from(most) + 0.5).contains(&bins), "{periods}: {bins}");
+        }
+    }
 }

@@ -44,10 +44,9 @@ pub struct Scales {
     structure: Structure,
 }
 
-/// Least rms of the torque that acts on an axis, over that of the logged one: an amplifier that swallows more than it passes is none.
+/// Least rms of the torque that acts on an axis, over that of the logged one, and least deviation: an amplifier that swallows more than it
+/// passes is none, and a limit below most of a torque makes a constant of it, beside which a load explains any motion.
 const ACTS: f64 = 0.5;
-/// The same of its deviation: a limit below all of a torque makes a constant of it, beside which a load explains any motion.
-const VARIES: f64 = 0.1;
 /// Noises below which a turn of the motion is none.
 const TURN: f64 = 6.0;
 /// Share of the path on which a torque that goes with the position must be in the band for it to be seen, where that is less than the
@@ -197,7 +196,7 @@ impl Scales {
         let mut work = self.work;
         if !is_as_logged(model) {
             let (done, [acts, varies]) = acting(model, record, &self.moved);
-            if acts < ACTS * level::rms(&record.torque) || varies < VARIES * self.torque {
+            if acts < ACTS * level::rms(&record.torque) || varies < ACTS * self.torque {
                 return false;
             }
             work = done;
