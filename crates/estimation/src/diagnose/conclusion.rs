@@ -20,9 +20,6 @@ use crate::hypothesis::fit::{Fit, Term};
 use crate::hypothesis::model::Model;
 use crate::trace::machine::NOMINAL_OFF;
 
-/// Share of the torque that a hypothesis which goes astray leaves at most along the motion as measured: right ones leave up to 0.4 of an axis
-/// that often stands, where friction takes any torque, and frictions that held a moving one 0.6 to 1.3.
-const HELD_BY_FRICTION: f64 = 0.5;
 /// Hypotheses that are told, each with its own run over the held-out data.
 pub const REPORTED: usize = 12;
 
@@ -137,7 +134,6 @@ impl Search<'_> {
             motion_is_given: self.band().motion_is_given(),
             given,
             parameters,
-            astray: self.astray(&finished),
             chosen: finished,
             ranking,
             shares,
@@ -162,7 +158,7 @@ impl Search<'_> {
 
     /// Whether a hypothesis leaves no more of the torque than that its causes are none of suspects, however large the gap was.
     fn is_understood(&self, chosen: &Fit) -> bool {
-        self.left(chosen) <= MATERIAL && self.left_of_the_motion(chosen) <= HELD_BY_FRICTION
+        self.left(chosen) <= MATERIAL
     }
 
     /// Whether the parameters alone are likelier than the nominal ones, with none as far off as it may be: one that is is not known.

@@ -26,7 +26,7 @@ impl Search<'_> {
         let is_complete = self.at_floor(chosen) || self.independent([chosen]) > WHITE;
         let [left, before] = [chosen, parameters].map(|fit| self.left(fit));
         let unexplained = if is_complete { 0.0 } else { (left / before.max(f64::MIN_POSITIVE)).powi(2) };
-        confidence_beside(self.left_of_the_motion(chosen)) * confidence_in_whole(unexplained)
+        confidence_beside(left) * confidence_in_whole(unexplained)
     }
 
     /// Whether what a fit leaves may be the error of a measured current, or the encoders' noise.

@@ -1,9 +1,8 @@
 //! What a diagnosis decides: the verdict, and the hypotheses that it was reached among.
 
-use super::astray::Astray;
 use super::diagnosis::Undecided;
 use super::verdict::Verdict;
-use super::weighing::{Confusable, Weighed, is_likely, likely};
+use super::weighing::{Confusable, Weighed, likely};
 use crate::hypothesis::fit::Fit;
 
 /// A gain counts as the cause of changed parameters when each of them changed by it, to this share.
@@ -26,8 +25,6 @@ pub struct Decision {
     pub parameters: Fit,
     /// The hypothesis decided for.
     pub chosen: Fit,
-    /// What that leaves, where it goes another way than the axis did.
-    pub astray: Option<Astray>,
     /// Every hypothesis that was fitted, best first.
     pub ranking: Vec<Weighed>,
     /// Share of the gap of each effect of the chosen hypothesis.
@@ -46,12 +43,6 @@ impl Decision {
     /// Causes that are named.
     pub fn named(&self) -> usize {
         if self.verdict == Verdict::Effect { likely(&self.probabilities) } else { 0 }
-    }
-
-    /// How many of the causes that are named are expected to be there.
-    pub fn expected(&self) -> f64 {
-        let named = self.probabilities.iter().filter(|p| self.verdict == Verdict::Effect && is_likely(p));
-        named.sum()
     }
 
     /// True if the parameters all changed by one factor: a wrong torque constant.
@@ -97,7 +88,6 @@ mod tests {
             cut_short: false,
             motion_is_given: false,
             given: parameters.clone(),
-            astray: None,
             chosen: parameters.clone(),
             parameters,
             ranking: Vec::new(),
@@ -122,6 +112,5 @@ mod tests {
     fn causes_are_named_where_they_are_likely_and_the_verdict_is_theirs() {
         let of = |verdict| Decision { verdict, probabilities: vec![0.9, 0.5, 0.7], ..decision(scaled([1.0; 4])) };
         assert_eq!([Verdict::Effect, Verdict::Unexplained].map(|v| of(v).named()), [2, 0]);
-        assert_eq!([Verdict::Effect, Verdict::Unexplained].map(|v| of(v).expected()), [0.9 + 0.7, 0.0]);
     }
 }

@@ -20,7 +20,7 @@ use crate::hypothesis::fit::Fit;
 use crate::hypothesis::hidden::any_vibrations;
 use crate::hypothesis::likelihood::Sight;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::tracking::{FreeRun, start_states, steps_per_sample, track};
+use crate::hypothesis::tracking::{FreeRun, start_states};
 use crate::numerics::level::deviation;
 
 /// Samples in a window.
@@ -192,8 +192,7 @@ fn in_torque(seen: &Prepared, fits: [&Fit; 3]) -> Gap {
     let (errors, residuals): (Vec<Vec<Errors>>, Vec<Vec<[f64; 4]>>) = fits
         .par_iter()
         .map(|fit| {
-            let tracked = track(&fit.model, record, fit.bandwidth, steps_per_sample(&fit.model, record));
-            let Some(tracked) = tracked else {
+            let Some(tracked) = seen.problem(fit.model).lacked(&fit.model, fit.bandwidth) else {
                 return (vec![Errors::from_element(f64::INFINITY); parts], vec![[f64::NAN; 4]; n]);
             };
             let planner = &mut FftPlanner::new();

@@ -1,7 +1,6 @@
 //! The gap between model and machine: where, which, how far.
 
 mod assess;
-mod astray;
 mod closed_loop;
 mod conclusion;
 mod confidence;

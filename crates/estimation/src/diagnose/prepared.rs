@@ -1,7 +1,6 @@
 //! A record made ready for the search: in the band of its motion, at the rate of that band, its noise seen through the axis as it is.
 
 use std::f64::consts::FRAC_PI_2;
-use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -108,28 +107,19 @@ impl Prepared {
         work: &Work,
         progress: &'a (dyn Fn(&str) + Sync),
     ) -> Search<'a> {
-        let problem =
-            Problem::of(&self.record, &self.band, case.nominal, self.peak).counted_in(work).along_what_is_given();
+        let problem = self.problem(case.nominal).counted_in(work);
         let reference = self.reference;
-        Search {
-            problem,
-            reference,
-            suspects,
-            gap: [0.0; 2],
-            cut_short: false.into(),
-            measured: OnceLock::new(),
-            progress,
-        }
+        Search { problem, reference, suspects, gap: [0.0; 2], cut_short: false.into(), progress }
+    }
+
+    /// The record in its band, to which models are held that a nominal one is known of.
+    pub fn problem(&self, nominal: Model) -> Problem<'_> {
+        Problem::of(&self.record, &self.band, nominal, self.peak).along_what_is_given()
     }
 
     /// Share of the torque that a fit leaves.
     pub fn left(&self, fit: &Fit) -> f64 {
-        self.share(fit.discrepancy)
-    }
-
-    /// Share of the torque that a discrepancy is.
-    pub fn share(&self, discrepancy: Discrepancy) -> f64 {
-        self.band.torque_share(discrepancy, &self.record)
+        self.band.torque_share(fit.discrepancy, &self.record)
     }
 
     /// The part of a record, as long as the one searched and beyond it, in which a model lacks the most, with what it lacks there; `None` where

@@ -97,23 +97,18 @@ impl<'a> Looks<'a> {
     }
 
     /// The decision on a record, and the look that it was made in. With the torque given an axis is the heavier the less of its torque the
-    /// motion needs, and one that goes astray lacks little: where nothing is told of it so, or that, the motion is given.
+    /// motion needs: where nothing is told of it so the motion is given.
     fn decided(self, train: &Record) -> (Prepared, Decision) {
         let found = self.looked(train);
         let nominal = &self.case.nominal;
         // A known effect of an encoder leaves the motion to be told.
         let is_measured = nominal.effects.active().sensors().is_empty();
         let is_explained = found.1.verdict != Verdict::Unexplained;
-        let astray = found.1.astray.as_ref().map(|a| found.0.share(a.along.s)).filter(|left| *left > UNDERSTOOD);
-        if nominal.structure != Structure::Rigid || !is_measured || is_explained && astray.is_none() {
+        if nominal.structure != Structure::Rigid || !is_measured || is_explained {
             return found;
         }
         (self.progress)("with the motion given");
-        let other = self.with_motion_given().looked(train);
-        let left = other.0.left(&other.1.chosen);
-        let explains_more =
-            |astray: f64| is_materially_less(left * left, astray * astray) && other.1.expected() > found.1.expected();
-        if is_explained && !astray.is_some_and(explains_more) { found } else { other }
+        self.with_motion_given().looked(train)
     }
 
     /// The decision of all looks, with the torque given or the motion.

@@ -7,13 +7,12 @@ use super::prepared::Prepared;
 use crate::axis::Structure;
 use crate::effects::Place;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::tracking::{Tracked, steps_per_sample, track};
+use crate::hypothesis::tracking::Tracked;
 use crate::trace::numerics::dot;
 
 /// What a model lacks along the record.
-fn run(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Tracked {
-    track(model, &p.record, bandwidth, steps_per_sample(model, &p.record))
-        .unwrap_or_else(|| Tracked::nothing(p.record.len()))
+fn lacked(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Tracked {
+    p.problem(*model).lacked(model, bandwidth).unwrap_or_else(|| Tracked::nothing(p.record.len()))
 }
 
 /// The same in the band, and where it shows.
@@ -29,7 +28,7 @@ fn residual(series: &[f64], tracked: &Tracked) -> Residual {
 
 /// Where the torque that a model lacks shows along the record.
 pub fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
-    let tracked = run(p, model, bandwidth);
+    let tracked = lacked(p, model, bandwidth);
     let (series, site) = shown(p, &tracked, model.structure);
     let mut residual = residual(&series[0], &tracked);
     if model.structure == Structure::TwoInertia {
@@ -41,15 +40,14 @@ pub fn located(p: &Prepared, model: &Model, bandwidth: [f64; 2]) -> Location {
 
 /// What the hypothesis decided for leaves, in figures and by its looks.
 pub fn remains(p: &Prepared, decision: &Decision) -> Remainder {
-    let (fit, astray) = (&decision.chosen, decision.astray.as_ref());
-    let tracked = astray.map_or_else(|| run(p, &fit.model, fit.bandwidth), |a| a.tracked.clone());
+    let fit = &decision.chosen;
+    let tracked = lacked(p, &fit.model, fit.bandwidth);
     let (series, site) = shown(p, &tracked, fit.model.structure);
     let shown = &series[usize::from(site == Site::At(Place::Table))];
-    let (rows, discrepancy) = astray.map_or((&fit.rows, fit.discrepancy), |a| (&a.along.rows, a.along.s));
     Remainder {
-        torque_rms: p.band.torque_rms(discrepancy),
-        share: p.share(discrepancy),
-        noise_multiple: p.band.noise_multiple(rows),
+        torque_rms: p.band.torque_rms(fit.discrepancy),
+        share: p.left(fit),
+        noise_multiple: p.band.noise_multiple(&fit.rows),
         site,
         looks: along(&p.record, &residual(shown, &tracked), site).looks,
     }

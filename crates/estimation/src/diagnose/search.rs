@@ -10,7 +10,6 @@
 //!
 //! Held-out data have no part in it.
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
@@ -48,8 +47,6 @@ pub struct Search<'a> {
     pub gap: Discrepancy,
     /// Whether something was left untried for want of work.
     pub cut_short: AtomicBool,
-    /// The same along the motion as measured, once it was asked for: it is the same for every hypothesis.
-    pub measured: OnceLock<Problem<'a>>,
     /// Told what is being done.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }

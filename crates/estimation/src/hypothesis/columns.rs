@@ -3,7 +3,7 @@
 use super::descent::Along;
 use super::likelihood::C;
 use super::model::{BaseParameter, Coordinate, Free, Model};
-use super::problem::{PLANNER, Problem};
+use super::problem::{Columns, PLANNER, Problem};
 use super::tracking::{Resolution, Torques};
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
@@ -35,13 +35,22 @@ impl Problem<'_> {
     /// What a coordinate changes of what a model lacks, by a run of the model a step further.
     pub fn simulated_column(&self, c: &Coordinate, at: &Along) -> Option<[Vec<C>; 2]> {
         let h = self.step_within(c, &at.model);
-        let moved = self.rows(&moved(&at.model, c, h), at.bandwidth, Some(at.rows.weighed_at))?;
+        let (model, weighed_at) = (moved(&at.model, c, h), Some(at.rows.weighed_at));
+        let moved = match at.columns {
+            Columns::AsMeasured => {
+                self.residual(&model, &self.measured_motion()?.lacked(&model, self.record), weighed_at)
+            }
+            _ => self.rows(&model, at.bandwidth, weighed_at)?,
+        };
         Some([0, 1].map(|e| moved.rows[e].iter().zip(&at.rows.rows[e]).map(|(a, b)| (a - b) / h).collect()))
     }
 
     /// What a coordinate changes of what the effects that it is one of resist the model's motion with, where that was kept.
     fn column_along_motion(&self, c: &Coordinate, at: &Along) -> Option<[Vec<C>; 2]> {
-        let trajectory = at.trajectory.as_ref().filter(|_| !has_mode(&at.model))?;
+        let Columns::Along(trajectory) = &at.columns else { return None };
+        if has_mode(&at.model) {
+            return None;
+        }
         let effects: Vec<Effect> = match c.free {
             Free::Base(p) if is_inertia(p) => Vec::new(),
             Free::Base(_) => coupling_effects(&at.model).collect(),

@@ -6,8 +6,6 @@
 //! the noise the motion as measured has reversals and blows of the noise in it: there the model is let go along its own motion, as far
 //! as that is likelier.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy::Discrepancy;
@@ -15,11 +13,10 @@ use super::evidence::PRIOR;
 use super::fit::{Fit, Term};
 use super::likelihood::{Band, C, Sight, TorqueResidual};
 use super::model::{BaseParameter, Coordinate, Free, Model};
-use super::problem::Problem;
+use super::problem::{Columns, Problem};
 use super::scatter;
 use super::secant::Secant;
 use super::tracking::Bandwidth;
-use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::trace::machine::NOMINAL_OFF;
 use crate::trace::numerics::dot;
@@ -53,8 +50,8 @@ const SHARPENING: usize = 6;
 pub struct Along {
     pub model: Model,
     pub rows: TorqueResidual,
-    /// The motion that it lacks that along, where columns are told along it.
-    pub trajectory: Option<Arc<Trajectory>>,
+    /// How what its free values change is told.
+    pub columns: Columns,
     pub s: Discrepancy,
     pub bandwidth: Bandwidth,
 }
@@ -135,7 +132,7 @@ impl<'a> Descent<'a> {
             at: Along {
                 model: fit.model,
                 rows: fit.rows.clone(),
-                trajectory: None,
+                columns: Columns::Simulated,
                 s: fit.discrepancy,
                 bandwidth: fit.bandwidth,
             },
@@ -266,12 +263,12 @@ impl<'a> Descent<'a> {
                 continue;
             }
             let weighed_at = Some(at.rows.weighed_at);
-            if let Some((rows, trajectory)) = problem.rows_along_motion(&model, at.bandwidth, weighed_at) {
+            if let Some((rows, columns)) = problem.rows_with_columns(&model, at.bandwidth, weighed_at) {
                 let s = band.rescaled(at.s, &at.model, &model);
                 let after = cost(&rows, s, &y);
                 if after < before {
                     *damping = if *damping < 2e-4 { 0.0 } else { 0.1 * *damping };
-                    next = Some((model, rows, trajectory, s, before - after, y));
+                    next = Some((model, rows, columns, s, before - after, y));
                     break;
                 }
             }
@@ -280,14 +277,14 @@ impl<'a> Descent<'a> {
         self.leaves = leaves;
         // Columns with which no step is better are not brought anywhere.
         let mut secant = self.secant.take();
-        Some(next.map(|(model, rows, trajectory, s, gain, y)| {
+        Some(next.map(|(model, rows, columns, s, gain, y)| {
             if let Some(secant) = &mut secant {
                 let step: Vec<f64> =
                     self.coordinates.iter().zip(&x).zip(&y).map(|((c, x), y)| c.change(*x, *y)).collect();
                 secant.follow([&self.at.rows.rows, &rows.rows], &step, normal.a.diagonal().as_slice());
             }
             self.secant = secant;
-            self.at = Along { model, rows, trajectory, s, bandwidth: self.at.bandwidth };
+            self.at = Along { model, rows, columns, s, bandwidth: self.at.bandwidth };
             gain
         }))
     }
@@ -384,10 +381,10 @@ impl<'a> Descent<'a> {
         for bandwidth in tries.into_iter().filter_map(|(is_new, bandwidth)| is_new.then_some(bandwidth)) {
             let weighed_at = Some(at.rows.weighed_at);
             if differ(bandwidth, at.bandwidth)
-                && let Some((rows, trajectory)) = problem.rows_along_motion(&at.model, bandwidth, weighed_at)
+                && let Some((rows, columns)) = problem.rows_with_columns(&at.model, bandwidth, weighed_at)
                 && problem.band.log_likelihood(&rows, at.s) > own + WORTH
             {
-                (at.rows, at.trajectory, at.bandwidth) = (rows, trajectory, bandwidth);
+                (at.rows, at.columns, at.bandwidth) = (rows, columns, bandwidth);
                 return true;
             }
         }

@@ -5,7 +5,7 @@ use super::descent::{Along, Descent, differ};
 use super::discrepancy::Discrepancy;
 use super::likelihood::{C, TorqueResidual};
 use super::model::{Coordinate, Model};
-use super::problem::Problem;
+use super::problem::{Columns, Problem};
 use super::secant::Secant;
 use super::tracking::{Bandwidth, Resolution, Tracked};
 use crate::effects::Effect;
@@ -95,7 +95,7 @@ impl Problem<'_> {
         tracked.torque[0].copy_from_slice(&self.record.torque);
         let rows = self.residual(&self.nominal, &tracked, None);
         let s = self.band.discrepancy(&rows);
-        self.unfitted(Along { model: self.nominal, rows, trajectory: None, s, bandwidth: self.bandwidth(s) })
+        self.unfitted(Along { model: self.nominal, rows, columns: Columns::Simulated, s, bandwidth: self.bandwidth(s) })
     }
 
     /// The hypothesis without anything fitted.

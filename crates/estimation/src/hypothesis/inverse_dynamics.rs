@@ -75,6 +75,11 @@ impl InverseDynamics {
         })
     }
 
+    /// What a model lacks, along the run's motion.
+    pub fn lacked(&self, model: &Model, record: &Record) -> Tracked {
+        Tracked { torque: self.torque(model, record), motion: self.motion.clone() }
+    }
+
     /// What a model lacks, on motor and table, N.m.
     pub fn torque(&self, model: &Model, record: &Record) -> Torques {
         let acts = |e: &Effect| model.effects.is_on(*e) && !e.is_mode();

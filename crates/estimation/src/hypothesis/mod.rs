@@ -6,7 +6,7 @@
 //! [`fit`] where it ends; [`evidence`] how well the
 //! record speaks for that, [`scatter`] how well it knows the parameters and [`determined`] which of them it does not, [`scales`] what of an
 //! effect it could show, [`candidate`] what one would change and [`starts`] where a fit with one more begins, [`subsets`] where one with several at once does; on a rigid axis such fits are compared along the motion of one
-//! run ([`inverse_dynamics`]). Which hypotheses are compared, and what is concluded from them, is [`crate::diagnose`]'s.
+//! run ([`inverse_dynamics`]), and one that went another way than the axis did along the motion as measured ([`measured`]). Which hypotheses are compared, and what is concluded from them, is [`crate::diagnose`]'s.
 
 mod arriving;
 pub(crate) mod band;
@@ -20,6 +20,7 @@ pub(crate) mod fit;
 pub(crate) mod hidden;
 mod inverse_dynamics;
 pub(crate) mod likelihood;
+mod measured;
 pub(crate) mod model;
 mod parameters;
 pub(crate) mod problem;

@@ -1,7 +1,7 @@
 //! A record in its band, and what a model lacks along it.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use rustfft::FftPlanner;
 
@@ -12,14 +12,10 @@ use super::inverse_dynamics::InverseDynamics;
 use super::likelihood::{Band, MotionSpectra, TorqueResidual};
 use super::model::{BaseParameter, Free, Model};
 use super::scales::Scales;
-use super::tracking::{
-    Bandwidth, LARGEST, Resolution, Torques, Tracked, steps_per_sample_at, track, track_step_by_step,
-};
+use super::tracking::{Bandwidth, Resolution, Tracked, steps_per_sample_at, track, track_step_by_step};
 use super::trajectory::Trajectory;
 use crate::axis::Structure;
 use crate::conditioning::Record;
-use crate::effects::Settings;
-use crate::numerics::level::{deviation, rms};
 
 /// Turn of a motion in a sample, rad, up to which a model can be held to it.
 pub const HELD: f64 = 0.5;
@@ -35,7 +31,7 @@ pub struct Problem<'a> {
     /// Range of theta1 and theta2 over the record, and its length: what a period is told by.
     pub range: [f64; 2],
     /// Speeds of motor and table, rad/s, by which effects are stepped.
-    speeds: [f64; 2],
+    pub(super) speeds: [f64; 2],
     /// Largest torque of the log, N.m: in its band a torque that jumps overshoots.
     pub peak: f64,
     pub scales: Option<Scales>,
@@ -43,10 +39,23 @@ pub struct Problem<'a> {
     pub(super) motion: Option<Arc<MotionSpectra>>,
     pub(super) resolution: Resolution,
     /// The run along which models are compared without a simulation of each, where they are.
-    dynamics: Option<Arc<InverseDynamics>>,
+    pub(super) dynamics: Option<Arc<InverseDynamics>>,
+    /// The motion as measured, once it was asked for.
+    pub(super) measured: Arc<OnceLock<Option<Arc<InverseDynamics>>>>,
     /// Whether every column is simulated.
     pub(super) exact: bool,
-    steps: Work,
+    pub(super) steps: Work,
+}
+
+/// How what the free values of a model change is told.
+#[derive(Debug, Clone)]
+pub enum Columns {
+    /// Along the motion of its run.
+    Along(Arc<Trajectory>),
+    /// Along the motion as measured.
+    AsMeasured,
+    /// By runs of their own.
+    Simulated,
 }
 
 /// Steps simulated so far, in one look at a record or in several.
@@ -80,6 +89,7 @@ impl<'a> Problem<'a> {
             motion: band.motion(record).map(Arc::new),
             resolution: Resolution::Full,
             dynamics: None,
+            measured: Arc::default(),
             exact: false,
             steps: Arc::default(),
         }
@@ -93,7 +103,7 @@ impl Problem<'_> {
         Self { resolution: Resolution::Coarse, ..self.clone() }
     }
 
-    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared, unless that is given. Of two inertias what an
+    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared, unless that is given or another one than the axis took. Of two inertias what an
     /// effect does to the motion between them is as large as what is left.
     #[must_use]
     pub fn along_the_motion_of(&self, fit: &Fit) -> Self {
@@ -105,37 +115,12 @@ impl Problem<'_> {
                 return None;
             }
             let (tracked, trajectory) = self.track_step_by_step(&fit.model, fit.bandwidth)?;
-            InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.record)
+            let measured = self.other_motion(&fit.model, &tracked);
+            let own =
+                || InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.record).map(Arc::new);
+            measured.or_else(own)
         };
-        Self { dynamics: dynamics().map(Arc::new), ..self.clone() }
-    }
-
-    /// The same along the motion as measured, where that is given.
-    #[must_use]
-    pub fn along_what_is_given(self) -> Self {
-        if self.band.motion_is_given() { self.along_the_measured_motion() } else { self }
-    }
-
-    /// The same along the motion as measured, whatever is given.
-    #[must_use]
-    pub fn along_the_measured_motion(&self) -> Self {
-        Self { dynamics: self.measured_dynamics().map(Arc::new), ..self.clone() }
-    }
-
-    /// What models lack along the motion as measured. The torque that a log gives or a model lacks takes an axis of little inertia anywhere:
-    /// the feedback alone takes one that nothing drives or brakes along the record.
-    fn measured_dynamics(&self) -> Option<InverseDynamics> {
-        let given = self.given(&self.nominal)?;
-        let (tracked, trajectory) = self.track_step_by_step(&given.model, given.bandwidth)?;
-        let dynamics = InverseDynamics::new(&given.model, given.bandwidth, tracked, trajectory, self.record)?;
-        let (tracked, trajectory) = self.measured_run([HELD / self.record.dt; 2])?;
-        Some(dynamics.along(tracked.motion, trajectory))
-    }
-
-    /// The motion as measured: an axis that nothing drives or brakes, held to the record.
-    pub(super) fn measured_run(&self, bandwidth: Bandwidth) -> Option<(Tracked, Trajectory)> {
-        let free = Model::new(self.nominal.parameters, self.nominal.structure, Settings::default());
-        track_step_by_step(&free, &self.record.undriven(), bandwidth, self.counted(&self.nominal))
+        Self { dynamics: dynamics(), ..self.clone() }
     }
 
     /// The same, its steps counted with those of other looks.
@@ -160,7 +145,7 @@ impl Problem<'_> {
     }
 
     /// Steps a sample of one run of a model, which are counted.
-    fn counted(&self, model: &Model) -> usize {
+    pub(super) fn counted(&self, model: &Model) -> usize {
         let per = steps_per_sample_at(model, self.record, self.speeds, self.resolution);
         let steps = self.record.len() * per;
         self.steps.fetch_add(steps as u64, Ordering::Relaxed);
@@ -178,23 +163,7 @@ impl Problem<'_> {
 
     /// Motion of a fit along the record, `[theta1, omega1, theta2, omega2]` a sample.
     pub fn motion_of(&self, fit: &Fit) -> Option<Vec<[f64; 4]>> {
-        match &self.dynamics {
-            Some(dynamics) => Some(dynamics.motion.clone()),
-            None => self.track(&fit.model, fit.bandwidth).map(|t| t.motion),
-        }
-    }
-
-    /// How far the readings of the motor's or the only side are from a fit's own motion, over what counts of the record: rms over that of
-    /// their noise, and over the motion's own deviation. `None` where no position is read, or none that the torque says.
-    pub fn distance_of_readings(&self, fit: &Fit) -> Option<[f64; 2]> {
-        if !InverseDynamics::has_a_place_for(&fit.model) {
-            return None;
-        }
-        let read = self.record.channels[0].as_ref()?;
-        let motion = self.track(&fit.model, fit.bandwidth)?.motion;
-        let off = |((read, at), weight): ((&f64, &[f64; 4]), &f64)| weight * (read - at[0]);
-        let off: Vec<f64> = read.iter().zip(&motion).zip(&self.band.taper).map(off).collect();
-        Some([self.record.noise[0], deviation(read)].map(|size| rms(&off) / size.max(f64::MIN_POSITIVE)))
+        self.lacked(&fit.model, fit.bandwidth).map(|t| t.motion)
     }
 
     pub fn base(&self) -> Vec<Free> {
@@ -246,26 +215,33 @@ impl Problem<'_> {
     /// What a model lacks, beside what hidden inertias began with as it is at a discrepancy.
     pub fn rows(&self, model: &Model, bandwidth: Bandwidth, weighed_at: Option<Discrepancy>) -> Option<TorqueResidual> {
         self.without_simulation(model, weighed_at).map(|(rows, _)| rows).or_else(|| {
-            let tracked = self.track(model, bandwidth)?;
-            Some(self.residual(model, &tracked, weighed_at))
+            let lacked = self.lacked_by_simulation(model, bandwidth)?;
+            Some(self.residual(model, &lacked, weighed_at))
         })
     }
 
-    /// The same with the motion that it lacks that along, where columns are told along that.
-    pub fn rows_along_motion(
+    /// The same, with how what free values change is told.
+    pub fn rows_with_columns(
         &self,
         model: &Model,
         bandwidth: Bandwidth,
         weighed_at: Option<Discrepancy>,
-    ) -> Option<(TorqueResidual, Option<Arc<Trajectory>>)> {
+    ) -> Option<(TorqueResidual, Columns)> {
         if let Some((rows, dynamics)) = self.without_simulation(model, weighed_at) {
-            return Some((rows, Some(dynamics.trajectory.clone())));
+            return Some((rows, Columns::Along(dynamics.trajectory.clone())));
         }
-        if !self.has_columns_along_motion(model) {
-            return Some((self.rows(model, bandwidth, weighed_at)?, None));
-        }
-        let (tracked, trajectory) = self.track_step_by_step(model, bandwidth)?;
-        Some((self.residual(model, &tracked, weighed_at), Some(Arc::new(trajectory))))
+        let is_kept = self.has_columns_along_motion(model);
+        let (tracked, own) = if is_kept {
+            let (tracked, trajectory) = self.track_step_by_step(model, bandwidth)?;
+            (tracked, Columns::Along(Arc::new(trajectory)))
+        } else {
+            (self.track(model, bandwidth)?, Columns::Simulated)
+        };
+        let Some(measured) = self.other_motion(model, &tracked) else {
+            return Some((self.residual(model, &tracked, weighed_at), own));
+        };
+        let columns = if is_kept { Columns::Along(measured.trajectory.clone()) } else { Columns::AsMeasured };
+        Some((self.residual(model, &measured.lacked(model, self.record), weighed_at), columns))
     }
 
     /// What a model lacks along the motion of another's run, and that, where models are compared so.
@@ -275,10 +251,9 @@ impl Problem<'_> {
         weighed_at: Option<Discrepancy>,
     ) -> Option<(TorqueResidual, &InverseDynamics)> {
         let dynamics = self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model))?;
-        let torque = dynamics.torque(model, self.record);
-        let is_bounded = torque.iter().flatten().all(|t| t.abs() < LARGEST);
-        is_bounded.then(|| {
-            let mut residual = self.residual_along(model, &torque, &dynamics.motion, weighed_at);
+        let lacked = dynamics.lacked(model, self.record);
+        lacked.is_bounded().then(|| {
+            let mut residual = self.residual(model, &lacked, weighed_at);
             if self.band.motion_is_given()
                 && let Some(kept) = dynamics.kept(model, self.record)
             {
@@ -289,10 +264,12 @@ impl Problem<'_> {
         })
     }
 
-    /// What a model lacks along the motion of another's run, where models are compared so, in time.
-    pub fn lacked_without_simulation(&self, model: &Model) -> Option<Tracked> {
-        let dynamics = self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model))?;
-        Some(Tracked { torque: dynamics.torque(model, self.record), motion: dynamics.motion.clone() })
+    /// What a model lacks along the record, in time: along the motion of another's run where models are compared so.
+    pub fn lacked(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
+        match self.dynamics.as_deref().filter(|_| InverseDynamics::has_a_place_for(model)) {
+            Some(dynamics) => Some(dynamics.lacked(model, self.record)),
+            None => self.lacked_by_simulation(model, bandwidth),
+        }
     }
 
     /// Whether a model is compared along the motion of another's run, whatever bandwidth it would follow the record at.
@@ -301,17 +278,9 @@ impl Problem<'_> {
     }
 
     pub(super) fn residual(&self, model: &Model, tracked: &Tracked, weighed_at: Option<Discrepancy>) -> TorqueResidual {
-        self.residual_along(model, &tracked.torque, &tracked.motion, weighed_at)
-    }
-
-    fn residual_along(
-        &self,
-        model: &Model,
-        torque: &Torques,
-        motion: &[[f64; 4]],
-        weighed_at: Option<Discrepancy>,
-    ) -> TorqueResidual {
-        PLANNER.with_borrow_mut(|planner| self.band.torque_residual(model, torque, motion, weighed_at, planner))
+        let of =
+            |planner: &mut _| self.band.torque_residual(model, &tracked.torque, &tracked.motion, weighed_at, planner);
+        PLANNER.with_borrow_mut(of)
     }
 
     /// A model along the record, and the discrepancy that it leaves. One that reads its position late swings up where it is held to the record
@@ -338,11 +307,11 @@ impl Problem<'_> {
     }
 
     fn along_at(&self, model: &Model, bandwidth: Bandwidth) -> Option<Along> {
-        let (mut rows, trajectory) = self.rows_along_motion(model, bandwidth, None)?;
+        let (mut rows, columns) = self.rows_with_columns(model, bandwidth, None)?;
         let s = self.band.discrepancy(&rows);
         self.band.weigh(&mut rows, s);
         let given = self.dynamics.as_ref().filter(|_| self.is_without_simulation(model));
-        Some(Along { model: *model, rows, trajectory, s, bandwidth: given.map_or(bandwidth, |d| d.bandwidth) })
+        Some(Along { model: *model, rows, columns, s, bandwidth: given.map_or(bandwidth, |d| d.bandwidth) })
     }
 }
 

@@ -127,7 +127,7 @@ impl Scales {
         let bandwidth = p.bandwidth(fit.discrepancy);
         let t = if p.nominal.structure == Structure::Rigid {
             // A light axis is dragged anywhere by the torque that its parameters lack.
-            p.measured_run(bandwidth)?.0
+            p.free_run(bandwidth)?.0
         } else {
             // Parameters that have gone far may not bear the feedback that their discrepancy asks for.
             p.track(&fit.model, bandwidth).or_else(|| p.track(&fit.model, fit.bandwidth))?

@@ -39,6 +39,12 @@ impl Tracked {
     pub fn nothing(n: usize) -> Self {
         Self { torque: [vec![0.0; n], vec![0.0; n]], motion: vec![[0.0; 4]; n] }
     }
+
+    /// Whether the squares of what is lacking are numbers.
+    #[must_use]
+    pub fn is_bounded(&self) -> bool {
+        self.torque.iter().flatten().all(|t| t.abs() < LARGEST)
+    }
 }
 
 /// Bandwidth of the feedback on each side, rad/s.

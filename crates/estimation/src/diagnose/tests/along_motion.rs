@@ -126,23 +126,15 @@ fn a_friction_that_holds_the_model_leaves_the_torque_of_the_motion_and_one_that_
     let foreign = slow_joint(|_, t| 3.0 * (1.7 * t + 1.0).sin());
     let own = slow_joint(|v, _| 3.0 * v.signum());
     for (record, level, leaves) in [(&foreign, 3.5, 0.9..2.0), (&own, 3.0, 0.0..0.1)] {
-        let nominal = coulomb(0.0);
-        let channels = [0, 1, 2, 3].map(|c: usize| record.channels[c].as_deref());
-        let noise = estimate_noise(&record.torque, &channels, None);
-        let case = case(record, nominal, &noise);
-        let (searched, _) = prepared(record, &nominal, Reach::Ruled);
-        let work = Work::default();
-        let search = searched.search(&case, Vec::new(), &work, &|_| ());
+        let (searched, _) = prepared(record, &coulomb(0.0), Reach::Ruled);
+        let problem = searched.problem(coulomb(0.0));
+        let (model, bandwidth) = (coulomb(level), problem.bandwidth([0.0; 2]));
         // Along its own motion it lacks little either way.
-        let at = search.problem.along(&coulomb(level), search.problem.bandwidth([0.0; 2])).expect("a run");
-        let fit = Fit {
-            terms: vec![(Effect::CoulombMotor, 0)],
-            discrepancy: at.s,
-            bandwidth: at.bandwidth,
-            ..Fit::of_likelihood(at.model, &[], 0.0)
-        };
-        assert!(search.left(&fit) < 0.25, "{}", search.left(&fit));
-        let left = search.left_of_the_motion(&fit);
+        let run = problem.track(&model, bandwidth).expect("a run");
+        let own = rms(&searched.band.filtered(&run.torque[0])) / searched.torque_rms;
+        assert!(own < 0.25, "{own}");
+        let at = problem.along(&model, bandwidth).expect("a run");
+        let left = searched.band.torque_share(at.s, &searched.record);
         assert!(leaves.contains(&left), "{level}: {left}");
     }
 }
@@ -166,4 +158,22 @@ fn what_a_light_joint_may_have_is_told_by_where_it_was_and_not_by_where_its_torq
     };
     assert!(admits(Effect::Gravity, 2.0) && !admits(Effect::Unbalance, 2.0));
     assert!(admits(Effect::CoulombMotor, 3.0) && !admits(Effect::CoulombMotor, 5.0));
+}
+
+#[test]
+fn a_limit_that_swallows_more_of_what_a_torque_varies_by_than_it_passes_is_none() {
+    // A weight of 10 N.m and a friction of 3 either way: of 13 and 7 a limit of 8 makes 8 and 7, one of 11.5 leaves three quarters.
+    let times = || (0..SAMPLES).map(|k| DT * f64::from(k));
+    let theta = times().map(|t| 1.5 * (0.9 * t).sin()).collect();
+    let torque = times().map(|t| 10.0 + 3.0 * (0.9 * t).cos().signum()).collect();
+    let record = of_one_encoder(0.0, torque, theta);
+    let model = Model::new(parameters(0.002), Structure::Rigid, Settings::default());
+    let (searched, _) = prepared(&record, &model, Reach::Ruled);
+    let problem = searched.problem(model);
+    let scales = Scales::new(&problem, &problem.given(&model).expect("a run")).expect("a run");
+    let admits = |limit: f64| {
+        let model = Model::new(parameters(0.002), Structure::Rigid, with(&[(Effect::Saturation, 0, limit)]));
+        scales.admit(&searched.record, &model, std::iter::once(Effect::Saturation))
+    };
+    assert!(!admits(8.0) && admits(11.5));
 }

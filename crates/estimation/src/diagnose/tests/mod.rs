@@ -21,6 +21,7 @@ use crate::hypothesis::model::{Free, Model};
 use crate::hypothesis::problem::{Problem, Work};
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::tracking::{steps_per_sample, track, track_step_by_step};
+use crate::numerics::level::rms;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
