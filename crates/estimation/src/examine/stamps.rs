@@ -10,6 +10,8 @@ const JITTER: f64 = 0.02;
 const LOST: f64 = 1.5;
 /// A step of so many intervals has lost samples whatever its neighbours say.
 const LOST_FOR_SURE: f64 = 2.5;
+/// Distance from a whole number of a stamp in units of its last digit.
+const WHOLE: f64 = 1e-6;
 /// Stamps on each side of a step that tell whether it is one sample too long or one stamp is late.
 const NEIGHBOURS: usize = 5;
 
@@ -62,11 +64,9 @@ pub(super) fn examine(input: &Input<'_>, findings: &mut Vec<Finding>) {
     let uneven = quantile(stamps.windows(2).map(|w| w[1] - w[0] - usual), 0.9) / usual;
     if uneven > JITTER {
         let decimals = (0..9).find(|d| {
-            let scale = 10_f64.powi(*d);
-            stamps
-                .iter()
-                .take(1000)
-                .all(|t| ((t * scale) - (t * scale).round()).abs() < 1e-6 * (t * scale).abs().max(1.0))
+            // But for what a number far from zero is rounded to itself.
+            let is_whole = |t: f64| (t - t.round()).abs() < WHOLE + 4.0 * f64::EPSILON * t.abs();
+            stamps.iter().take(1000).all(|t| is_whole(t * 10_f64.powi(*d)))
         });
         let rounded = decimals.filter(|d| 10_f64.powi(-d) > 0.05 * usual);
         findings.push(match rounded {
@@ -131,5 +131,21 @@ mod tests {
         assert!((count(&lost) - 4.0).abs() < 1e-9);
         lost.remove(1);
         assert!((count(&lost) - 5.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn stamps_are_rounded_by_their_digits_however_late_the_clock_is() {
+        for start in [0.0, 831.345, 1.7e9] {
+            let even = |k: usize| start + 1.05e-2 * k as f64;
+            let jittered: Vec<f64> = (0..400).map(|k| even(k) + 3.1e-4 * ((k * k % 7) as f64 - 3.0)).collect();
+            let names = |stamps: &[f64]| {
+                let mut findings = Vec::new();
+                examine(&Input { stamps: Some(stamps), ..Input::default() }, &mut findings);
+                findings.iter().map(|f| f.id).collect::<Vec<_>>()
+            };
+            assert_eq!(names(&jittered), ["time_jitter"], "{start}");
+            let rounded: Vec<f64> = (0..400).map(|k| (even(k) * 1e3).round() / 1e3).collect();
+            assert_eq!(names(&rounded), ["time_rounded"], "{start}");
+        }
     }
 }
