@@ -14,8 +14,9 @@ use super::{Channel, Input};
 
 /// Residual over a column's standard deviation up to which it is rounding and the column a copy.
 const ROUNDING: f64 = 1e-6;
-/// Share of a column's second differences that is its rounding where it is a copy; of two sensors' noise it is all and more.
-const APART: f64 = 0.1;
+/// Share of a column's second differences that is its rounding where it is a copy. Two sensors' noise is all of it and more, beside a motion that
+/// turns within a sample a tenth.
+const APART: f64 = 0.02;
 /// Largest delay or lead of a copy, samples: a cycle or two of a slower task.
 const LATE: usize = 10;
 /// Samples, evenly spaced over the record, that are compared first and second: nearly every pair differs in the first ones; of those that

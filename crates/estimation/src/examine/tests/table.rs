@@ -245,6 +245,14 @@ fn two_encoders_of_an_axis_that_goes_a_million_noises_far_are_no_copies() {
         c.v[3].push(x + of_table());
     }
     assert!(!refused(&c.positions()).contains(&"copy"), "{:?}", refused(&c.positions()));
+    // Nor where the motion itself is fast, beside which their noise is small.
+    let mut fast = c.clone();
+    for k in 0..8192 {
+        let way = 1e-2 * (f64::from(k) * 1.7).sin();
+        fast.v[1][k as usize] += way;
+        fast.v[3][k as usize] += way;
+    }
+    assert!(!refused(&fast.positions()).contains(&"copy"), "{:?}", refused(&fast.positions()));
     // The one of them scaled, and written with so few digits that rounding is a tenth of its noise.
     c.v[3] = c.v[1].iter().map(|x| (1e5 * 2.5 * x).round() / 1e5).collect();
     assert!(refused(&c.positions()).contains(&"copy"), "{:?}", refused(&c.positions()));
