@@ -58,9 +58,9 @@ impl Problem<'_> {
         Model::new(self.nominal.parameters, self.nominal.structure, Settings::default())
     }
 
-    /// The motion as measured where a run of a rigid axis was another one. Of a model whose effects lack the same along any motion, or that reads
+    /// The motion as measured where a run of a rigid axis was another one, and what the model lacks along it. Of a model whose effects lack the same along any motion, or that reads
     /// its position late, the own one is taken.
-    pub(super) fn other_motion(&self, model: &Model, run: &Tracked) -> Option<Arc<InverseDynamics>> {
+    pub(super) fn other_motion(&self, model: &Model, run: &Tracked) -> Option<(Arc<InverseDynamics>, Tracked)> {
         let is_bent = |e: &Effect| model.effects.is_on(*e) && (e.is_dry() || e.is_force()) && !e.is_mode();
         let is_rigid = model.structure == Structure::Rigid;
         if !is_rigid || !EFFECTS.iter().any(is_bent) || !InverseDynamics::has_a_place_for(model) {
@@ -71,13 +71,14 @@ impl Problem<'_> {
         let off = rms(&read.iter().zip(&run.motion).zip(&self.band.taper).map(off).collect::<Vec<f64>>());
         let is_other = off > NEAR_THE_NOISE * self.record.noise[0] && off > ASTRAY * deviation(read);
         let measured = is_other.then(|| self.measured_motion()).flatten()?;
-        measured.lacked(model, self.record).is_bounded().then_some(measured)
+        let lacked = measured.lacked(model, self.record);
+        lacked.is_bounded().then_some((measured, lacked))
     }
 
     /// What a model lacks along its run, or along the motion as measured where that was another one.
     pub(super) fn lacked_by_simulation(&self, model: &Model, bandwidth: Bandwidth) -> Option<Tracked> {
         let run = self.track(model, bandwidth)?;
-        let measured = self.other_motion(model, &run);
-        Some(measured.map_or(run, |measured| measured.lacked(model, self.record)))
+        let other = self.other_motion(model, &run);
+        Some(other.map_or(run, |(_, lacked)| lacked))
     }
 }

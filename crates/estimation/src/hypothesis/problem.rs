@@ -103,8 +103,8 @@ impl Problem<'_> {
         Self { resolution: Resolution::Coarse, ..self.clone() }
     }
 
-    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared, unless that is given or another one than the axis took. Of two inertias what an
-    /// effect does to the motion between them is as large as what is left.
+    /// The same for looks beside a fit of a rigid axis, along whose motion others are compared, unless that is given or another one than the
+    /// axis took. Of two inertias what an effect does to the motion between them is as large as what is left.
     #[must_use]
     pub fn along_the_motion_of(&self, fit: &Fit) -> Self {
         if self.band.motion_is_given() {
@@ -115,7 +115,7 @@ impl Problem<'_> {
                 return None;
             }
             let (tracked, trajectory) = self.track_step_by_step(&fit.model, fit.bandwidth)?;
-            let measured = self.other_motion(&fit.model, &tracked);
+            let measured = self.other_motion(&fit.model, &tracked).map(|(measured, _)| measured);
             let own =
                 || InverseDynamics::new(&fit.model, fit.bandwidth, tracked, trajectory, self.record).map(Arc::new);
             measured.or_else(own)
@@ -237,11 +237,11 @@ impl Problem<'_> {
         } else {
             (self.track(model, bandwidth)?, Columns::Simulated)
         };
-        let Some(measured) = self.other_motion(model, &tracked) else {
+        let Some((measured, lacked)) = self.other_motion(model, &tracked) else {
             return Some((self.residual(model, &tracked, weighed_at), own));
         };
         let columns = if is_kept { Columns::Along(measured.trajectory.clone()) } else { Columns::AsMeasured };
-        Some((self.residual(model, &measured.lacked(model, self.record), weighed_at), columns))
+        Some((self.residual(model, &lacked, weighed_at), columns))
     }
 
     /// What a model lacks along the motion of another's run, and that, where models are compared so.
