@@ -1,6 +1,8 @@
 //! How much what no cause explains doubts those that are found beside it, and how much of it needs no cause.
 
+use super::gap::left_in_windows;
 use super::search::Search;
+use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect};
 use crate::hypothesis::fit::Fit;
 
@@ -10,6 +12,9 @@ const DOUBT: f64 = 0.35;
 /// Share of the gap's power that no cause explains beside which a cause is as likely none: where the library lacks what a machine has, what
 /// does a part of the same is found in its place (the same sets).
 const PART: f64 = 0.2;
+/// The same of the power by which the axis of two inertias, run in windows of its own, goes another way than the record: a torque that only
+/// resembles what is lacking takes the axis off slowly, by little torque (the same sets).
+const PART_OF_MOTION: f64 = 0.01;
 /// Share of the torque that may be left white where no cause is named: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
 /// The same of any colour: what does not come and go as noise does has a cause, known or not. Of 240 healthy axes one leaves more.
@@ -25,8 +30,22 @@ impl Search<'_> {
     pub fn confidence(&self, parameters: &Fit, chosen: &Fit) -> f64 {
         let is_complete = self.at_floor(chosen) || self.independent([chosen]) > WHITE;
         let [left, before] = [chosen, parameters].map(|fit| self.left(fit));
-        let unexplained = if is_complete { 0.0 } else { (left / before.max(f64::MIN_POSITIVE)).powi(2) };
-        confidence_beside(left) * confidence_in_whole(unexplained)
+        if is_complete {
+            return confidence_beside(left);
+        }
+        let unexplained = (left / before.max(f64::MIN_POSITIVE)).powi(2);
+        confidence_beside(left) * confidence_in_whole(unexplained) * self.confidence_in_motion(parameters, chosen)
+    }
+
+    /// Confidence in causes by the motion that the axis makes of them. What a rigid one lacks is told along the motion as measured.
+    fn confidence_in_motion(&self, parameters: &Fit, chosen: &Fit) -> f64 {
+        match chosen.model.structure {
+            Structure::Rigid => 1.0,
+            Structure::TwoInertia => {
+                let left = left_in_windows(self.problem.record, &parameters.model, &chosen.model);
+                1.0 / (1.0 + left / PART_OF_MOTION)
+            }
+        }
     }
 
     /// Whether what a fit leaves may be the error of a measured current, or the encoders' noise.
