@@ -42,8 +42,7 @@ impl Search<'_> {
         match chosen.model.structure {
             Structure::Rigid => 1.0,
             Structure::TwoInertia => {
-                let left = left_in_windows(self.problem.record, &parameters.model, &chosen.model);
-                1.0 / (1.0 + left / PART_OF_MOTION)
+                confidence_in_motion(left_in_windows(self.problem.record, &parameters.model, &chosen.model))
             }
         }
     }
@@ -79,6 +78,11 @@ fn confidence_in_whole(unexplained: f64) -> f64 {
     1.0 / (1.0 + (unexplained / PART).powi(2))
 }
 
+/// The same of a share of the power by which the motion is off ([`PART_OF_MOTION`]).
+fn confidence_in_motion(left: f64) -> f64 {
+    1.0 / (1.0 + left / PART_OF_MOTION)
+}
+
 /// How often machines have the like of an effect, whatever its law.
 pub fn usual_odds(effect: Effect) -> f64 {
     let like = EFFECTS.iter().filter(|like| like.is_alternative_to(effect)).map(|like| like.info().odds);
@@ -105,6 +109,11 @@ mod tests {
         // Half of them are beside the part of the gap that doubts as much, a tenth beside a third of that.
         for (unexplained, none) in [(PART, 0.5), (PART / 3.0, 0.1), (3.0 * PART, 0.9)] {
             assert!((confidence_in_whole(unexplained) - (1.0 - none)).abs() < 1e-12, "{unexplained}");
+        }
+        // As likely none beside a hundredth of the power by which the motion is off, three times as likely beside three; a run that leaves
+        // every bound believes none.
+        for (left, none) in [(0.0, 0.0), (PART_OF_MOTION, 0.5), (3.0 * PART_OF_MOTION, 0.75), (f64::INFINITY, 1.0)] {
+            assert!((confidence_in_motion(left) - (1.0 - none)).abs() < 1e-12, "{left}");
         }
     }
 
