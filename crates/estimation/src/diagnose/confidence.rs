@@ -12,9 +12,6 @@ const DOUBT: f64 = 0.35;
 /// Share of the gap's power that no cause explains beside which a cause is as likely none: where the library lacks what a machine has, what
 /// does a part of the same is found in its place (the same sets).
 const PART: f64 = 0.2;
-/// The same of the power by which the axis of two inertias, run in windows of its own, goes another way than the record: a torque that only
-/// resembles what is lacking takes the axis off slowly, by little torque (the same sets).
-const PART_OF_MOTION: f64 = 0.01;
 /// Share of the torque that may be left white where no cause is named: the error of a measured current (one to five per cent).
 pub const UNCAUSED: f64 = 0.05;
 /// The same of any colour: what does not come and go as noise does has a cause, known or not. Of 240 healthy axes one leaves more.
@@ -78,9 +75,10 @@ fn confidence_in_whole(unexplained: f64) -> f64 {
     1.0 / (1.0 + (unexplained / PART).powi(2))
 }
 
-/// The same of a share of the power by which the motion is off ([`PART_OF_MOTION`]).
+/// Confidence in causes with which the motion is off by so much of the power by which it is without them: beside as much they are as likely
+/// none. A real machine's slow motion is never explained whole.
 fn confidence_in_motion(left: f64) -> f64 {
-    1.0 / (1.0 + left / PART_OF_MOTION)
+    1.0 / (1.0 + left * left)
 }
 
 /// How often machines have the like of an effect, whatever its law.
@@ -110,9 +108,8 @@ mod tests {
         for (unexplained, none) in [(PART, 0.5), (PART / 3.0, 0.1), (3.0 * PART, 0.9)] {
             assert!((confidence_in_whole(unexplained) - (1.0 - none)).abs() < 1e-12, "{unexplained}");
         }
-        // As likely none beside a hundredth of the power by which the motion is off, three times as likely beside three; a run that leaves
-        // every bound believes none.
-        for (left, none) in [(0.0, 0.0), (PART_OF_MOTION, 0.5), (3.0 * PART_OF_MOTION, 0.75), (f64::INFINITY, 1.0)] {
+        // A run that leaves every bound believes none.
+        for (left, none) in [(0.0, 0.0), (0.5, 0.2), (1.0, 0.5), (3.0, 0.9), (f64::INFINITY, 1.0)] {
             assert!((confidence_in_motion(left) - (1.0 - none)).abs() < 1e-12, "{left}");
         }
     }
