@@ -1,8 +1,6 @@
 //! How much what no cause explains doubts those that are found beside it, and how much of it needs no cause.
 
-use super::gap::left_in_windows;
 use super::search::Search;
-use crate::axis::Structure;
 use crate::effects::{EFFECTS, Effect};
 use crate::hypothesis::fit::Fit;
 
@@ -27,21 +25,8 @@ impl Search<'_> {
     pub fn confidence(&self, parameters: &Fit, chosen: &Fit) -> f64 {
         let is_complete = self.at_floor(chosen) || self.independent([chosen]) > WHITE;
         let [left, before] = [chosen, parameters].map(|fit| self.left(fit));
-        if is_complete {
-            return confidence_beside(left);
-        }
-        let unexplained = (left / before.max(f64::MIN_POSITIVE)).powi(2);
-        confidence_beside(left) * confidence_in_whole(unexplained) * self.confidence_in_motion(parameters, chosen)
-    }
-
-    /// Confidence in causes by the motion that the axis makes of them. What a rigid one lacks is told along the motion as measured.
-    fn confidence_in_motion(&self, parameters: &Fit, chosen: &Fit) -> f64 {
-        match chosen.model.structure {
-            Structure::Rigid => 1.0,
-            Structure::TwoInertia => {
-                confidence_in_motion(left_in_windows(self.problem.record, &parameters.model, &chosen.model))
-            }
-        }
+        let unexplained = if is_complete { 0.0 } else { (left / before.max(f64::MIN_POSITIVE)).powi(2) };
+        confidence_beside(left) * confidence_in_whole(unexplained)
     }
 
     /// Whether what a fit leaves may be the error of a measured current, or the encoders' noise.
@@ -75,12 +60,6 @@ fn confidence_in_whole(unexplained: f64) -> f64 {
     1.0 / (1.0 + (unexplained / PART).powi(2))
 }
 
-/// Confidence in causes with which the motion is off by so much of the power by which it is without them: beside as much they are as likely
-/// none. A real machine's slow motion is never explained whole.
-fn confidence_in_motion(left: f64) -> f64 {
-    1.0 / (1.0 + left * left)
-}
-
 /// How often machines have the like of an effect, whatever its law.
 pub fn usual_odds(effect: Effect) -> f64 {
     let like = EFFECTS.iter().filter(|like| like.is_alternative_to(effect)).map(|like| like.info().odds);
@@ -107,10 +86,6 @@ mod tests {
         // Half of them are beside the part of the gap that doubts as much, a tenth beside a third of that.
         for (unexplained, none) in [(PART, 0.5), (PART / 3.0, 0.1), (3.0 * PART, 0.9)] {
             assert!((confidence_in_whole(unexplained) - (1.0 - none)).abs() < 1e-12, "{unexplained}");
-        }
-        // A run that leaves every bound believes none.
-        for (left, none) in [(0.0, 0.0), (0.5, 0.2), (1.0, 0.5), (3.0, 0.9), (f64::INFINITY, 1.0)] {
-            assert!((confidence_in_motion(left) - (1.0 - none)).abs() < 1e-12, "{left}");
         }
     }
 

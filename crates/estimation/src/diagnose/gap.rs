@@ -18,7 +18,7 @@ use super::prepared::Prepared;
 use crate::conditioning::{CHANNELS, Record};
 use crate::hypothesis::fit::Fit;
 use crate::hypothesis::hidden::any_vibrations;
-use crate::hypothesis::likelihood::{AT_FLOOR, Sight};
+use crate::hypothesis::likelihood::Sight;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::tracking::{FreeRun, start_states};
 use crate::numerics::level::deviation;
@@ -138,17 +138,6 @@ pub fn closure_by(known: &Gap, record: &Record, seen: &Prepared, fits: [&Fit; 3]
     let signals = Signals::of(record);
     let left = signals.mean(&pieces(record, &fits[2].model, &stretches(record, known.of)));
     closure(known.given, signals.weighed(&left), signals.floor)
-}
-
-/// Share of the power of what a model's runs in windows are off beyond the noise by which another's are, too: nothing within the noise's
-/// floor, which is an estimate itself.
-#[must_use]
-pub fn left_in_windows(record: &Record, before: &Model, after: &Model) -> f64 {
-    let signals = Signals::of(record);
-    let ranges = windows(record.len());
-    let off = |model: &Model| signals.weighed(&signals.mean(&pieces(record, model, &ranges)));
-    let left = off(after) - AT_FLOOR * signals.floor;
-    if left <= 0.0 { 0.0 } else { left / (off(before) - signals.floor).max(f64::MIN_POSITIVE) }
 }
 
 /// The gap along runs of the models.

@@ -34,7 +34,7 @@ use crate::numerics::level::deviation;
 /// has several times as much at the motion's.
 pub const NEAR_THE_NOISE: f64 = 10.0;
 /// Squared residual per value, in units of the noise, up to which a hypothesis is at the floor.
-pub const AT_FLOOR: f64 = 1.15;
+const AT_FLOOR: f64 = 1.15;
 
 pub type C = Complex<f64>;
 

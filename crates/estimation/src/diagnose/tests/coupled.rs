@@ -478,14 +478,3 @@ fn what_is_less_than_drives_are_true_to_is_told_where_one_effect_leaves_the_nois
     let o = diagnosed_as(&record, Structure::TwoInertia, Parameters::PAPER);
     assert_eq!(o.decision.chosen.effects(), [Effect::LeadError], "{:#?}", ranking(&o));
 }
-
-#[test]
-fn of_a_load_half_of_which_is_in_a_model_its_motion_leaves_a_quarter_of_the_power() {
-    let load = 0.02;
-    let under = |share: f64| Model::new(BELT, Structure::TwoInertia, with(&[(Effect::LoadMotor, 0, share * load)]));
-    let record = of_two_inertias(BELT, under(1.0).effects, 0.01, 0);
-    let left = [0.0, 0.5, 1.0, 2.0].map(|share| left_in_windows(&record, &under(0.0), &under(share)));
-    assert!((left[0] - 1.0).abs() < 1e-3 && (left[1] - 0.25).abs() < 1e-3 && (left[3] - 1.0).abs() < 1e-2, "{left:?}");
-    // What is as the noise is, which is an estimate itself, leaves none.
-    assert_eq!(left[2], 0.0);
-}

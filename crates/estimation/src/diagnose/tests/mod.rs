@@ -7,7 +7,6 @@ mod rigid;
 use super::assess::{Case, Outcome};
 use super::diagnose;
 use super::diagnosis::{ClosureOf, Site};
-use super::gap::left_in_windows;
 use super::pool::Pool;
 use super::prepared::prepared;
 use super::search::{Search, decide, decide_further};
