@@ -22,13 +22,15 @@ pub(super) struct Read {
     pub rough: Option<Rough>,
     /// The lead of the screw over 2*pi, m/rad.
     pub rho: Option<f64>,
+    /// The torque acts as if it ran straight from sample to sample.
+    pub runs_straight: bool,
     /// The log cannot be believed as it is.
     pub refused: bool,
 }
 
 /// The axis file, with comments.
 pub(super) fn write(made: &Made, table: &Table, read: &Read, file: &str) -> String {
-    let Read { rough, rho, refused } = *read;
+    let Read { rough, rho, runs_straight, refused } = *read;
     let mut out = String::new();
     let text = |s: &str| toml::Value::String(s.to_owned()).to_string();
     let plain = |s: &str| s.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
@@ -113,12 +115,15 @@ pub(super) fn write(made: &Made, table: &Table, read: &Read, file: &str) -> Stri
             continue;
         }
         let scale = if signal == Signal::T { made.torque_scale } else { 1.0 };
-        let hold = match signal {
-            Signal::T if made.counts() => format!(", unit = \"{COUNTS}\", hold = \"zoh\""),
-            Signal::T => ", hold = \"zoh\"".to_owned(),
+        let hold = match (signal, if runs_straight { "linear" } else { "zoh" }) {
+            (Signal::T, hold) if made.counts() => format!(", unit = \"{COUNTS}\", hold = \"{hold}\""),
+            (Signal::T, hold) => format!(", hold = \"{hold}\""),
             _ => String::new(),
         };
         let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, &hold));
+        if signal == Signal::T && runs_straight {
+            out.push_str("# hold: the motion follows a torque that runs straight between samples; held, twice as much of it is left over.\n");
+        }
         if signal == Signal::T && g.unit.is_none_or(|u| u.quantity == Quantity::Drive) && scale == 1.0 {
             let unit = match g.unit {
                 Some(unit) => unit.symbol.to_owned(),

@@ -60,7 +60,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let examination = examine(&Input::of(&loaded.trace, loaded.stamps.as_deref()).against(&machine, false));
     // Of a log that cannot be believed no number is written.
     let rough = if examination.refuses() { None } else { rough(&loaded.trace, &machine, &examination) };
-    let text = write(&made, &table, &Read { rough, rho, refused: examination.refuses() }, &file);
+    let text = write(
+        &made,
+        &table,
+        &Read { rough, rho, runs_straight: examination.runs_straight, refused: examination.refuses() },
+        &file,
+    );
     let machine =
         Machine::parse(&text, &axis.display().to_string()).context("the axis file that was made does not read back")?;
     let seen = Inspected {

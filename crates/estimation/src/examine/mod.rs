@@ -165,6 +165,10 @@ pub struct Examination {
     pub band: Option<[f64; 2]>,
     /// The inertia (mass) that moves, roughly; None where no torque goes with the acceleration.
     pub inertia: Option<Inertia>,
+    /// Whether the torque acts as if it ran straight from sample to sample, where no nominal model is known: as one that is measured at
+    /// each, not as one that a drive holds from one to the next.
+    #[serde(skip)]
+    pub runs_straight: bool,
 }
 
 /// The inertia that moves, as a record without a nominal one tells it.
@@ -287,7 +291,7 @@ pub fn examine(input: &Input<'_>) -> Examination {
     let usable = usable::examine(input, &bad, &mut findings);
     // What the channels say of each other is asked where the drive is on; a dead one says nothing of any.
     let piece = usable.iter().max_by_key(|r| r.len()).cloned().unwrap_or(0..n);
-    let (mut band, mut inertia) = (None, None);
+    let (mut band, mut inertia, mut runs_straight) = (None, None, false);
     if piece.len() >= 64 {
         let mut part = slice(input, &piece);
         part.torque = part.torque.filter(|v| robust::span(v) > 0.0);
@@ -311,13 +315,15 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let part = if twist.is_some() { Input { theta2: None, omega2: None, ..part } } else { part };
         findings.extend(twist);
         // A guess is asked for where no nominal value is known.
-        let guess = || part.nominal.is_none().then(|| rigid::inertia(&part)).flatten();
+        let guess = || part.nominal.is_none().then(|| (rigid::inertia(&part), rigid::runs_straight(&part)));
         let (of_the_lines, guessed) = rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), guess);
         band = of_the_lines;
-        inertia = guessed.map(|value| Inertia { value, is_shown: true }).or(inertia);
+        let (shown, straight) = guessed.unwrap_or_default();
+        inertia = shown.map(|value| Inertia { value, is_shown: true }).or(inertia);
+        runs_straight = straight;
     }
     finding::sort(&mut findings);
-    Examination { findings, usable, band, inertia }
+    Examination { findings, usable, band, inertia, runs_straight }
 }
 
 /// A part of an examination that needs no other's findings.

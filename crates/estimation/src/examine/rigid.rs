@@ -108,6 +108,20 @@ pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
     determined_in_time(input).map(|found| found.mass)
 }
 
+/// Share of the torque left by the right one of two assumptions, over that left by the other, up to which it is taken: what neither
+/// explains both leave.
+const HALF: f64 = 0.5;
+
+/// Whether the torque of [`inertia`] leaves less than half as much where it runs straight from sample to sample as where it is held from one
+/// to the next, whose mean acts half a sample late.
+pub(super) fn runs_straight(input: &Input<'_>) -> bool {
+    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
+    let acts: Vec<f64> = (0..torque.len()).map(|k| 0.5 * (torque[k.saturating_sub(1)] + torque[k])).collect();
+    let [straight, held] = [torque, &acts].map(|torque| at_widths(input, torque, x, None));
+    let is_clear = |(s, h): (&TimeDomainFit, &TimeDomainFit)| s.left < MAX_RESIDUAL && s.left < HALF * h.left;
+    straight.len() == held.len() && straight.iter().zip(&held).any(is_clear)
+}
+
 /// The fit that [`inertia`] is taken from.
 fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
     let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);

@@ -74,6 +74,33 @@ fn the_inertia_of_an_axis_that_never_goes_back_is_read_from_its_changes_of_speed
 }
 
 #[test]
+fn a_torque_that_runs_straight_between_samples_is_told_from_one_that_is_held() {
+    // A table to and fro under friction, read ten times a move: a torque of its own at each sample, or the mean since the last one.
+    let (dt, n, fine) = (1e-2, 800, 20);
+    let (inertia, viscous, friction) = (2e-5, 1.2e-4, 1.5e-2);
+    let told = |held: bool, seed: u64| {
+        let mut e = noise(seed, 2e-4);
+        let wanted = |t: f64| 1500.0 * (12.0 * t).sin() + 1800.0 * (61.0 * t + 1.0).sin();
+        let (mut x, mut v) = (0.0, 0.0);
+        let (mut torque, mut angle) = (vec![], vec![]);
+        for k in 0..n {
+            angle.push(x + e());
+            torque.push(inertia * wanted(k as f64 * dt));
+            for j in 0..fine {
+                let t = (k as f64 + if held { 0.0 } else { f64::from(j) / f64::from(fine) }) * dt;
+                let resists = viscous * v + friction * (v / 1.0_f64).tanh();
+                v += (wanted(t) - resists / inertia) * dt / f64::from(fine);
+                x += v * dt / f64::from(fine);
+            }
+        }
+        examine(&Input { dt, torque: Some(&torque), theta1: Some(&angle), ..Input::default() }).runs_straight
+    };
+    for seed in 0..4 {
+        assert_eq!([false, true].map(|held| told(held, seed)), [true, false], "{seed}");
+    }
+}
+
+#[test]
 fn an_inertia_that_hardly_shows_beside_friction_and_a_foreign_torque_is_a_guess() {
     let (dt, n) = (1e-2, 4000);
     let (inertia, friction, foreign) = (0.1, 4.0, 2.0);
