@@ -288,6 +288,37 @@ fn a_foreign_log_goes_from_init_to_a_verdict_without_an_editor() {
 }
 
 #[test]
+fn the_axis_file_of_a_slow_log_says_whether_its_torque_runs_straight_between_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    // An axis of 2e-3 kg.m2 and 1e-2 N.m.s/rad under three tones, read every 20 ms.
+    let dt = 2e-2;
+    let at = |t: f64| {
+        let (mut x, mut torque) = (0.0, 0.0);
+        for (amplitude, w) in [(0.5, 3.0), (0.1, 11.0), (0.03, 37.0)] {
+            let (s, c) = f64::sin_cos(w * t);
+            x += amplitude * s;
+            torque += amplitude * w * (1e-2 * c - 2e-3 * w * s);
+        }
+        (x, torque)
+    };
+    // A torque that was measured at each sample, and one that stands from each to the next, where its mean is the one in the middle.
+    for (name, later, hold) in [("straight", 0.0, "linear"), ("held", 0.5, "zoh")] {
+        let row = |k: usize| {
+            let t = k as f64 * dt;
+            format!("{t:.2},{:.6},{:.6}", at(t + later * dt).1, at(t).0)
+        };
+        std::fs::write(folder.path().join(format!("{name}.csv")), format!("t_s,T,theta1\n{}", rows(1000, row)))
+            .unwrap();
+        let (log, file) = (format!("{name}.csv"), format!("{name}.toml"));
+        let done = run::eixo_in(folder.path(), &["init", &log, "--yes", "-o", &file]);
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        let axis = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        assert!(axis.contains(&format!("hold = \"{hold}\"")), "{axis}");
+        assert_eq!(axis.contains("# hold: running straight"), hold == "linear", "{axis}");
+    }
+}
+
+#[test]
 fn a_number_of_the_drive_without_a_unit_is_in_counts_and_never_in_newton_metres() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("arm")).unwrap();

@@ -122,7 +122,7 @@ pub(super) fn write(made: &Made, table: &Table, read: &Read, file: &str) -> Stri
         };
         let _ = writeln!(out, "{} = {}", signal.name(), entry(g, table, scale, &text, &hold));
         if signal == Signal::T && runs_straight {
-            out.push_str("# hold: the motion follows a torque that runs straight between samples; held, twice as much of it is left over.\n");
+            out.push_str("# hold: running straight between samples the torque leaves less than half the power that it does held.\n");
         }
         if signal == Signal::T && g.unit.is_none_or(|u| u.quantity == Quantity::Drive) && scale == 1.0 {
             let unit = match g.unit {

@@ -315,12 +315,11 @@ pub fn examine(input: &Input<'_>) -> Examination {
         let part = if twist.is_some() { Input { theta2: None, omega2: None, ..part } } else { part };
         findings.extend(twist);
         // A guess is asked for where no nominal value is known.
-        let guess = || part.nominal.is_none().then(|| (rigid::inertia(&part), rigid::runs_straight(&part)));
+        let guess = || if part.nominal.is_none() { rigid::Guess::of(&part) } else { rigid::Guess::default() };
         let (of_the_lines, guessed) = rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), guess);
         band = of_the_lines;
-        let (shown, straight) = guessed.unwrap_or_default();
-        inertia = shown.map(|value| Inertia { value, is_shown: true }).or(inertia);
-        runs_straight = straight;
+        inertia = guessed.inertia.map(|value| Inertia { value, is_shown: true }).or(inertia);
+        runs_straight = guessed.runs_straight;
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia, runs_straight }

@@ -92,42 +92,43 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
     inertia_finding(input, &estimated, inertia, true).map(NominalFit::Inconsistent)
 }
 
-/// The inertia, kg.m2 (kg), that explains most of the torque together with friction, a weight on a hinge and a spring; no nominal model is
-/// needed:
+/// What the balance of torque in the time domain tells of a record whose nominal model is not known:
 ///
 /// ```text
 /// T = M*a + c*v + F*sign(v) + k*x + g*sin(x) + h*cos(x) + b        rotary; without sine and cosine where it moves along a line
 /// ```
 ///
-/// Least squares in the time domain: a weight's torque is a straight line over the angle in a narrow range alone. Torque and motion pass
-/// the same smoothing (a mean over `2*w + 1` samples, twice), so that the equation holds between them; of some widths the narrowest from
-/// which the next no more raises the inertia than by its error, or than by three of them where it knows it less: noise of the encoder,
-/// differentiated twice, takes from it, and a width beyond the motion's band leaves a weight's torque for it, or a constant one. None where
-/// less than three quarters are explained, or the inertia is not known to a third.
-pub(super) fn inertia(input: &Input<'_>) -> Option<f64> {
-    determined_in_time(input).map(|found| found.mass)
+/// Least squares: a weight's torque is a straight line over the angle in a narrow range alone. Torque and motion pass the same smoothing (a
+/// mean over `2*w + 1` samples, twice), so that the equation holds between them.
+#[derive(Default)]
+pub(super) struct Guess {
+    /// The inertia, kg.m2 (kg), that explains most of the torque: of some widths the narrowest from which the next no more raises it than by its
+    /// error, or than by three of them where it knows it less: noise of the encoder, differentiated twice, takes from it, and a width beyond
+    /// the motion's band leaves a weight's torque for it, or a constant one. None where less than three quarters are explained, or the inertia
+    /// is not known to a third.
+    pub(super) inertia: Option<f64>,
+    /// Whether at some width the torque leaves less than half of its power where it runs straight from sample to sample as where it is held
+    /// from one to the next, whose mean acts half a sample late.
+    pub(super) runs_straight: bool,
 }
 
-/// Share of the torque left by the right one of two assumptions, over that left by the other, up to which it is taken: what neither
-/// explains both leave.
+/// Share of the power that the right one of two assumptions leaves of the torque, over that of the other, up to which it is taken: what
+/// neither explains both leave.
 const HALF: f64 = 0.5;
 
-/// Whether the torque of [`inertia`] leaves less than half as much where it runs straight from sample to sample as where it is held from one
-/// to the next, whose mean acts half a sample late.
-pub(super) fn runs_straight(input: &Input<'_>) -> bool {
-    let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return false };
-    let acts: Vec<f64> = (0..torque.len()).map(|k| 0.5 * (torque[k.saturating_sub(1)] + torque[k])).collect();
-    let [straight, held] = [torque, &acts].map(|torque| at_widths(input, torque, x, None));
-    let is_clear = |(s, h): (&TimeDomainFit, &TimeDomainFit)| s.left < MAX_RESIDUAL && s.left < HALF * h.left;
-    straight.len() == held.len() && straight.iter().zip(&held).any(is_clear)
+impl Guess {
+    pub(super) fn of(input: &Input<'_>) -> Self {
+        let fits = in_time(input, Samples::All);
+        let runs_straight = fits.iter().any(|f| f.left < MAX_RESIDUAL && f.left < HALF * f.left_held);
+        Self { inertia: determined(fits).map(|found| found.mass), runs_straight }
+    }
 }
 
-/// The fit that [`inertia`] is taken from.
-fn determined_in_time(input: &Input<'_>) -> Option<TimeDomainFit> {
-    let (torque, x) = (input.torque?, input.theta1.or(input.theta2)?);
+/// Of fits at rising widths that which [`Guess::inertia`] is taken from.
+fn determined(fits: Vec<TimeDomainFit>) -> Option<TimeDomainFit> {
     let is_determined =
         |f: &TimeDomainFit| f.left < MAX_RESIDUAL && f.mass > SIGNIFICANT * f.error && f.mass.is_finite();
-    standing(at_widths(input, torque, x, None).into_iter().filter(is_determined), |f| [f.mass, f.error])
+    standing(fits.into_iter().filter(is_determined), |f| [f.mass, f.error])
 }
 
 /// The first of some, by a value and its error, that the next does not raise: by more than its error, or than by three of them where that
@@ -150,21 +151,33 @@ fn standing<T>(mut all: impl Iterator<Item = T>, of: impl Fn(&T) -> [f64; 2]) ->
 /// noise. It is asked where the axis moves beyond the noise of its encoder: at rest friction balances any torque below breakaway, and has
 /// no sign.
 pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
-    in_time(input).into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(|found| {
-        found.unbiased() < MAX_RESIDUAL
-            && counts_as_logged(found.friction / found.friction_error, found.mass / found.error)
-    })
+    in_time(input, Samples::Moving).into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(
+        |found| {
+            found.unbiased() < MAX_RESIDUAL
+                && counts_as_logged(found.friction / found.friction_error, found.mass / found.error)
+        },
+    )
 }
 
 /// Whether the same equation has an inertia as logged, within bounds, kg.m2 (kg): of a torque turned round it is negative.
 fn has_inertia(input: &Input<'_>, [least, most]: [f64; 2]) -> bool {
-    in_time(input).iter().any(|f| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass))
+    in_time(input, Samples::Moving).iter().any(|f| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass))
 }
 
-/// The fits in the time domain at all widths; none without torque and position.
-fn in_time(input: &Input<'_>) -> Vec<TimeDomainFit> {
+/// Samples that a fit in the time domain takes.
+#[derive(Clone, Copy, PartialEq)]
+enum Samples {
+    All,
+    /// Those at which the axis moves beyond the noise of its encoder.
+    Moving,
+}
+
+/// The fits in the time domain with the smoothings of all widths, the narrowest first; none without torque and position.
+fn in_time(input: &Input<'_>, samples: Samples) -> Vec<TimeDomainFit> {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return Vec::new() };
-    at_widths(input, torque, x, Some(noise(x)))
+    let noise = (samples == Samples::Moving).then(|| noise(x));
+    let widths: Vec<usize> = widths(x.len()).collect();
+    widths.into_par_iter().filter_map(|width| time_domain_fit(input, torque, x, width, noise)).collect()
 }
 
 /// Whether a friction and an inertia, in their standard errors, are of a torque that counts as the motion does. Both turn round with it: a
@@ -191,6 +204,8 @@ const DRY: usize = 2;
 struct TimeDomainFit {
     /// Residual share of the torque's variance.
     left: f64,
+    /// The same of a torque that is held from sample to sample, by its mean over the two that each is the middle of.
+    left_held: f64,
     /// Inertia and its standard error, kg.m2 (kg).
     mass: f64,
     error: f64,
@@ -210,13 +225,6 @@ impl TimeDomainFit {
     }
 }
 
-/// The fits with the smoothings of all widths, the narrowest first; with the encoder's `noise`, rad (m), of the samples at which the axis moves
-/// beyond it.
-fn at_widths(input: &Input<'_>, torque: &[f64], x: &[f64], noise: Option<f64>) -> Vec<TimeDomainFit> {
-    let widths: Vec<usize> = widths(x.len()).collect();
-    widths.into_par_iter().filter_map(|width| time_domain_fit(input, torque, x, width, noise)).collect()
-}
-
 /// Standard deviation of a speed over two samples, times their interval, after a mean over `2*width + 1` samples, twice, of a white noise of
 /// one: that of a difference of two such means, whose `2*(2*width + 1)` weights are all about one size.
 fn of_speed(width: usize) -> f64 {
@@ -230,7 +238,8 @@ pub(super) fn turns_a_weight(input: &Input<'_>, x: &[f64]) -> bool {
     input.motion == AxisKind::Rotary && size > HINGE && size < TURNS
 }
 
-/// The fit with a smoothing of `width` samples to either side; `noise` as in [`at_widths`].
+/// The fit with a smoothing of `width` samples to either side; with the encoder's `noise`, rad (m), of the samples at which the axis moves
+/// beyond it.
 fn time_domain_fit(
     input: &Input<'_>,
     torque: &[f64],
@@ -252,24 +261,28 @@ fn time_domain_fit(
     let course = |k: &usize| direction.at(speed(&q, *k, dt));
     let goes_back = rows.iter().any(|k| course(k) != course(&rows[0]));
     let which: Vec<usize> = (0..columns).filter(|column| goes_back || *column != DRY).collect();
-    let triangle = triangularise(rows.len(), which.len(), 1, |i, out| {
+    let held = |k: usize| 0.5 * (t[k - 1] + t[k]);
+    let triangle = triangularise(rows.len(), which.len(), 2, |i, out| {
         let k = rows[i];
         let v = speed(&q, k, dt);
         let all = [acceleration(&q, k, dt), v, direction.at(v), q[k] - middle, 1.0, q[k].sin(), q[k].cos()];
         out.iter_mut().zip(&which).for_each(|(out, column)| *out = all[*column]);
-        out[which.len()] = t[k];
+        (out[which.len()], out[which.len() + 1]) = (t[k], held(k));
     });
     let solution = triangle.solve().ok()?;
-    let mean = rows.iter().map(|k| t[*k]).sum::<f64>() / rows.len() as f64;
-    let total: f64 = rows.iter().map(|k| (t[*k] - mean).powi(2)).sum();
+    let variation = |torque: &dyn Fn(usize) -> f64| {
+        let mean = rows.iter().map(|k| torque(*k)).sum::<f64>() / rows.len() as f64;
+        rows.iter().map(|k| (torque(*k) - mean).powi(2)).sum::<f64>()
+    };
     // Smoothed samples are not independent: one in a width is.
     let variance = |i: usize, k: usize| solution.variance(0) * solution.inverse[(i, k)] * (2 * width + 1) as f64;
-    let left = solution.residual[(0, 0)] / total;
+    let left = solution.residual[(0, 0)] / variation(&|k| t[k]);
     let of = |i: usize| solution.phi[(i, 0)];
     let frictions: &[(usize, f64)] = if goes_back { &[(VISCOUS, fast), (DRY, 1.0)] } else { &[(VISCOUS, fast)] };
     let pairs = || frictions.iter().flat_map(|a| frictions.iter().map(move |b| (a, b)));
     left.is_finite().then(|| TimeDomainFit {
         left,
+        left_held: solution.residual[(1, 1)] / variation(&held),
         mass: of(0),
         error: variance(0, 0).sqrt(),
         friction: frictions.iter().map(|(i, by)| by * of(*i)).sum(),
@@ -323,7 +336,7 @@ pub(super) fn inertia_finding(
     let near = 1.0 / NOMINAL_OFF..NOMINAL_OFF;
     let is_off = low >= near.end || high <= near.start;
     let otherwise = |fit: &TimeDomainFit| fit.left < found.left && near.contains(&(fit.mass / nominal));
-    if !is_off || determined_in_time(input).is_some_and(|fit| otherwise(&fit)) {
+    if !is_off || determined(in_time(input, Samples::All)).is_some_and(|fit| otherwise(&fit)) {
         return None;
     }
     let unit = AxisKind::unit(input.motion, "kg.m2");
