@@ -315,6 +315,17 @@ fn the_axis_file_of_a_slow_log_says_whether_its_torque_runs_straight_between_sam
         let axis = std::fs::read_to_string(folder.path().join(file)).unwrap();
         assert!(axis.contains(&format!("hold = \"{hold}\"")), "{axis}");
         assert_eq!(axis.contains("# hold: running straight"), hold == "linear", "{axis}");
+        // Where the file says nothing the record does; where it says another thing it counts, and is doubted.
+        for (given, said) in [("", "it is taken as straight"), (", hold = \"zoh\"", "[hold] ")] {
+            let axis = axis.replace(&format!(", hold = \"{hold}\""), given).replace(", hold = \"linear\"", given);
+            std::fs::write(folder.path().join("axis.toml"), &axis).unwrap();
+            for command in [&["diagnose"][..], &["identify"]] {
+                let done = run::eixo_in(folder.path(), &[command, &[&log, "--axis", "axis.toml"]].concat());
+                let warned = String::from_utf8_lossy(&[done.stdout, done.stderr].concat()).replace('\n', " ");
+                assert_eq!(done.status.code(), Some(0), "{warned}");
+                assert_eq!(warned.contains(said), hold == "linear", "{command:?} {axis} {warned}");
+            }
+        }
     }
 }
 

@@ -109,7 +109,7 @@ fn examine(
     believed: Believed,
     progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
-    let machine = Machine::read(axis)?;
+    let mut machine = Machine::read(axis)?;
     let Recorded { record: train, noise, mut warnings, reference, command, driven } =
         record(trace, &machine, believed)?;
     warnings.extend(noise.jitter.map(|samples| {
@@ -121,7 +121,8 @@ fn examine(
             percent(samples, Medium::Terminal)
         )
     }));
-    // The part is that of the first record; the second one is used from its start to its end.
+    // The part is that of the first record; the second one is used from its start to its end. What the torque does is asked of the first.
+    machine.signals.hold = Some(train.hold);
     let whole = Believed { trust: believed.trust, ..Believed::default() };
     let holdout = holdout.map(|p| record(p, &machine, whole).map(|r| (r, p))).transpose()?;
     warnings.extend(holdout.iter().flat_map(|(r, _)| r.warnings.iter().cloned()));

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
+use crate::axis::Hold;
 use crate::examine::{Examination, Input, Severity, examine};
 use crate::report::Block;
 use crate::report::driven::Driven;
@@ -145,6 +146,8 @@ pub fn examined_log(
         return Err(Refused { file: path.display().to_string(), examination, warnings, driven }.into());
     }
     warnings.extend(noted(&examination));
+    let mut trace = trace;
+    warnings.extend(acting(&mut trace, &examination, machine));
     let usable = &examination.usable;
     let taken = match extent {
         Extent::Longest => examination.longest(),
@@ -154,7 +157,6 @@ pub fn examined_log(
     if let (Extent::Whole, Some(taken), false) = (&extent, &taken, trust) {
         idle.extend(usable.windows(2).map(|w| w[0].end - taken.start..w[1].start - taken.start));
     }
-    let mut trace = trace;
     if let Some(piece) = taken.filter(|p| p.len() < trace.len() && p.len() >= 64 && !trust) {
         warnings.push(format!(
             "{}: {} of {} samples are used, {:.6} s to {:.6} s; another part is taken with --from and --to",
@@ -168,6 +170,17 @@ pub fn examined_log(
     }
     let doubts = doubts(&examination, trust);
     Ok(Examined { trace, idle, warnings, doubts, driven })
+}
+
+/// Takes the torque as the record shows it to act, where nobody says what it does between samples; says so.
+fn acting(trace: &mut Trace, examination: &Examination, machine: &Machine) -> Option<String> {
+    (machine.signals.hold.is_none() && examination.runs_straight).then(|| {
+        trace.hold = Hold::Linear;
+        "Nothing says what the torque does between two samples, and the motion follows one that runs straight at least twice as well as \
+         one that is held: it is taken as straight. hold = \"linear\" or \"zoh\" at T in [signals] of an axis file, or --hold of identify, \
+         says what it is."
+            .to_owned()
+    })
 }
 
 /// The pieces of a record that were examined.
@@ -201,12 +214,14 @@ pub fn examined_pieces(
     let LoadedPieces { longest: Loaded { trace, stamps, mut warnings, drive }, others } = loaded;
     let driven = Driven { motion: machine.signals.motion, unit: drive };
     let file = path.display();
-    let first = seen(trace, stamps.as_deref(), machine, known)?;
+    let mut first = seen(trace, stamps.as_deref(), machine, known)?;
     if first.examination.refuses() && !trust {
         let (file, examination) = (file.to_string(), first.examination);
         return Err(Refused { file, examination, warnings, driven }.into());
     }
     warnings.extend(noted(&first.examination));
+    warnings.extend(acting(&mut first.trace, &first.examination, machine));
+    let hold = first.trace.hold;
     let doubts = doubts(&first.examination, trust);
     let mut total = 0;
     let mut pieces = Vec::new();
@@ -220,7 +235,8 @@ pub fn examined_pieces(
     take(&first);
     for (trace, stamps) in others {
         let (start, end) = (trace.start, trace.time(trace.len() - 1));
-        let other = seen(trace, stamps.as_deref(), machine, known)?;
+        let mut other = seen(trace, stamps.as_deref(), machine, known)?;
+        other.trace.hold = hold;
         if other.examination.refuses() && !trust {
             warnings.push(format!(
                 "{file}: the piece from {start:.6} s to {end:.6} s is left out: {}",

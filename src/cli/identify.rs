@@ -197,7 +197,7 @@ fn examine(
         None => Machine { name: "axis".to_owned(), ..Machine::default() },
     };
     if let Some(hold) = args.hold {
-        machine.signals.hold = hold;
+        machine.signals.hold = Some(hold);
     }
     let file = path.display().to_string();
     progress("reading the trace");
@@ -233,12 +233,12 @@ fn examine(
     let joined = Joined::of(&pieces)?;
     let request = request(args, axis.is_some());
     let mut result = identify_joined(joined, &machine, &request, &file, progress).context(file.clone())?;
-    let given = args.hold.is_some() || axis.is_some();
+    let given = args.hold.is_some() || axis.is_some() || pieces.iter().any(|t| t.hold == Hold::Linear);
     if !given
         && let Some(other) = hold::straight(&result, &pieces, &machine, &request, &file, progress).context(file)?
     {
         (result, pieces) = other;
-        machine.signals.hold = Hold::Linear;
+        machine.signals.hold = Some(Hold::Linear);
     }
     result.warnings.splice(0..0, warnings);
     result.identifiability.identified &= doubts.is_empty();

@@ -49,8 +49,8 @@ pub struct Mapping {
     pub dt: Option<f64>,
     /// The signals that are mapped; empty: every column that has a signal's name.
     pub signals: Vec<(Signal, Column)>,
-    /// What the torque does between samples.
-    pub hold: Hold,
+    /// What the torque does between samples; None where nobody says, and it is taken as held until the record tells otherwise.
+    pub hold: Option<Hold>,
     /// Rotary or linear units.
     pub motion: AxisKind,
     /// First time used, s, as the file counts it.
@@ -67,7 +67,7 @@ impl Default for Mapping {
             time: Column::named("time"),
             dt: None,
             signals: Vec::new(),
-            hold: Hold::Zoh,
+            hold: None,
             motion: AxisKind::Rotary,
             from: None,
             to: None,
@@ -173,7 +173,7 @@ fn trace(
     warnings: &mut Vec<String>,
 ) -> Result<Trace, TraceError> {
     let Clock { grid, rows, stamps, resampling } = clock;
-    let mut trace = Trace::new(grid.start, grid.dt, mapping.hold);
+    let mut trace = Trace::new(grid.start, grid.dt, mapping.hold.unwrap_or_default());
     for (signal, column) in wanted {
         let mut values = values(table, column, signal.name(), signal.quantity(mapping.motion), rows)?;
         let at = table.position(&column.column);
@@ -182,7 +182,7 @@ fn trace(
             warnings.push(warning);
         }
         warnings.extend(no_torque_constant(table, column, *signal, mapping.motion));
-        let held = matches!(signal, Signal::T | Signal::Command) && mapping.hold == Hold::Zoh;
+        let held = matches!(signal, Signal::T | Signal::Command) && mapping.hold.unwrap_or_default() == Hold::Zoh;
         if let Some(time) = stamps {
             values = match *resampling {
                 Resampling::None => values,

@@ -236,7 +236,7 @@ impl Stream {
             rows,
             time,
             signals,
-            empty: Trace::new(start, dt, mapping.hold),
+            empty: Trace::new(start, dt, mapping.hold.unwrap_or_default()),
             tolerance,
             length: clock.count,
             warnings,

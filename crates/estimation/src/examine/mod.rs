@@ -45,7 +45,7 @@ use rayon::prelude::*;
 
 pub use finding::{Finding, Severity};
 
-use crate::axis::{AxisKind, Parameters, Structure};
+use crate::axis::{AxisKind, Hold, Parameters, Structure};
 use crate::trace::machine::NOMINAL_OFF;
 use crate::trace::{Machine, Signal, Trace, bridge};
 
@@ -81,6 +81,8 @@ pub struct Input<'a> {
     pub nominal: Option<Nominal>,
     /// Rotary or linear, for the units in the sentences.
     pub motion: AxisKind,
+    /// What the torque does between samples, where the user says it.
+    pub hold: Option<Hold>,
 }
 
 /// A channel of the record.
@@ -116,6 +118,7 @@ impl<'a> Input<'a> {
         Self {
             nominal: known.then_some(nominal),
             motion: machine.signals.motion,
+            hold: machine.signals.hold,
             theta2: self.theta2.filter(|_| !rigid),
             omega2: self.omega2.filter(|_| !rigid),
             ..self
@@ -165,8 +168,8 @@ pub struct Examination {
     pub band: Option<[f64; 2]>,
     /// The inertia (mass) that moves, roughly; None where no torque goes with the acceleration.
     pub inertia: Option<Inertia>,
-    /// Whether the torque acts as if it ran straight from sample to sample, where no nominal model is known: as one that is measured at
-    /// each, not as one that a drive holds from one to the next.
+    /// Whether the torque acts as if it ran straight from sample to sample: as one that is measured at each, not as one that a drive holds from
+    /// one to the next.
     #[serde(skip)]
     pub runs_straight: bool,
 }
@@ -262,6 +265,20 @@ fn sizes(input: &Input<'_>, findings: &mut Vec<Finding>) {
 /// Largest size that is taken for a measurement: its fourth power is still finite.
 const MAX_MAGNITUDE: f64 = 1e60;
 
+/// A torque that the user says is held, and does not act so.
+fn taken_as_held() -> Finding {
+    Finding::new(
+        "hold",
+        Severity::Warn,
+        "T",
+        "The motion follows a torque that runs straight from one sample to the next, at least twice as well as one that is held."
+            .to_owned(),
+        "The torque is measured, or the log is a part of the samples of a faster drive: held, it acts half a sample late, and a model reads \
+         that as a delay, a latch or a friction.",
+        "Write hold = \"linear\" at T in [signals] of the axis file.",
+    )
+}
+
 /// Examines a record. All columns must be as long as each other; a shorter one limits what is looked at.
 #[must_use]
 pub fn examine(input: &Input<'_>) -> Examination {
@@ -314,12 +331,14 @@ pub fn examine(input: &Input<'_>) -> Examination {
         // In its place nothing is known of the table.
         let part = if twist.is_some() { Input { theta2: None, omega2: None, ..part } } else { part };
         findings.extend(twist);
-        // A guess is asked for where no nominal value is known.
-        let guess = || if part.nominal.is_none() { rigid::Guess::of(&part) } else { rigid::Guess::default() };
-        let (of_the_lines, guessed) = rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), guess);
+        let (of_the_lines, guessed) =
+            rayon::join(|| momentum::examine(&part, &mut inertia, &mut findings), || rigid::Guess::of(&part));
         band = of_the_lines;
         inertia = guessed.inertia.map(|value| Inertia { value, is_shown: true }).or(inertia);
         runs_straight = guessed.runs_straight;
+        if runs_straight && input.hold == Some(Hold::Zoh) {
+            findings.push(taken_as_held());
+        }
     }
     finding::sort(&mut findings);
     Examination { findings, usable, band, inertia, runs_straight }

@@ -92,7 +92,7 @@ pub(super) fn compare_with_nominal(input: &Input<'_>) -> Option<NominalFit> {
     inertia_finding(input, &estimated, inertia, true).map(NominalFit::Inconsistent)
 }
 
-/// What the balance of torque in the time domain tells of a record whose nominal model is not known:
+/// What the balance of torque in the time domain tells of a record, whatever its nominal model:
 ///
 /// ```text
 /// T = M*a + c*v + F*sign(v) + k*x + g*sin(x) + h*cos(x) + b        rotary; without sine and cosine where it moves along a line
@@ -105,22 +105,26 @@ pub(super) struct Guess {
     /// The inertia, kg.m2 (kg), that explains most of the torque: of some widths the narrowest from which the next no more raises it than by its
     /// error, or than by three of them where it knows it less: noise of the encoder, differentiated twice, takes from it, and a width beyond
     /// the motion's band leaves a weight's torque for it, or a constant one. None where less than three quarters are explained, or the inertia
-    /// is not known to a third.
+    /// is not known to a third, or the nominal one is known.
     pub(super) inertia: Option<f64>,
-    /// Whether at some width the torque leaves less than half of its power where it runs straight from sample to sample as where it is held
-    /// from one to the next, whose mean acts half a sample late.
+    /// Whether at one of the narrow widths the torque leaves less than half of its power where it runs straight from sample to sample as where
+    /// it is held from one to the next, whose mean acts half a sample late, and no more than held a sample earlier: of encoders that are
+    /// late nothing runs straight. Beyond those widths half a sample is less than what a soft coupling turns the motion by.
     pub(super) runs_straight: bool,
 }
 
 /// Share of the power that the right one of two assumptions leaves of the torque, over that of the other, up to which it is taken: what
 /// neither explains both leave.
 const HALF: f64 = 0.5;
+/// Widest smoothing, samples to either side, after which what the torque does between two samples is asked for.
+const BETWEEN_SAMPLES: usize = 4;
 
 impl Guess {
     pub(super) fn of(input: &Input<'_>) -> Self {
-        let fits = in_time(input, Samples::All);
-        let runs_straight = fits.iter().any(|f| f.left < MAX_RESIDUAL && f.left < HALF * f.left_held);
-        Self { inertia: determined(fits).map(|found| found.mass), runs_straight }
+        let is_known = input.nominal.is_some();
+        let fits = in_time(input, Samples::All, if is_known { BETWEEN_SAMPLES } else { usize::MAX });
+        let runs_straight = fits.iter().any(TimeDomainFit::runs_straight);
+        Self { inertia: determined(fits).filter(|_| !is_known).map(|found| found.mass), runs_straight }
     }
 }
 
@@ -151,17 +155,20 @@ fn standing<T>(mut all: impl Iterator<Item = T>, of: impl Fn(&T) -> [f64; 2]) ->
 /// noise. It is asked where the axis moves beyond the noise of its encoder: at rest friction balances any torque below breakaway, and has
 /// no sign.
 pub(super) fn explained_in_time(input: &Input<'_>) -> bool {
-    in_time(input, Samples::Moving).into_iter().min_by(|a, b| a.unbiased().total_cmp(&b.unbiased())).is_some_and(
-        |found| {
+    in_time(input, Samples::Moving, usize::MAX)
+        .into_iter()
+        .min_by(|a, b| a.unbiased().total_cmp(&b.unbiased()))
+        .is_some_and(|found| {
             found.unbiased() < MAX_RESIDUAL
                 && counts_as_logged(found.friction / found.friction_error, found.mass / found.error)
-        },
-    )
+        })
 }
 
 /// Whether the same equation has an inertia as logged, within bounds, kg.m2 (kg): of a torque turned round it is negative.
 fn has_inertia(input: &Input<'_>, [least, most]: [f64; 2]) -> bool {
-    in_time(input, Samples::Moving).iter().any(|f| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass))
+    in_time(input, Samples::Moving, usize::MAX)
+        .iter()
+        .any(|f| f.mass > SIGNIFICANT * f.error && (least..most).contains(&f.mass))
 }
 
 /// Samples that a fit in the time domain takes.
@@ -172,11 +179,11 @@ enum Samples {
     Moving,
 }
 
-/// The fits in the time domain with the smoothings of all widths, the narrowest first; none without torque and position.
-fn in_time(input: &Input<'_>, samples: Samples) -> Vec<TimeDomainFit> {
+/// The fits in the time domain with the smoothings of all widths to the widest, the narrowest first; none without torque and position.
+fn in_time(input: &Input<'_>, samples: Samples, widest: usize) -> Vec<TimeDomainFit> {
     let (Some(torque), Some(x)) = (input.torque, input.theta1.or(input.theta2)) else { return Vec::new() };
     let noise = (samples == Samples::Moving).then(|| noise(x));
-    let widths: Vec<usize> = widths(x.len()).collect();
+    let widths: Vec<usize> = widths(x.len()).filter(|width| *width <= widest).collect();
     widths.into_par_iter().filter_map(|width| time_domain_fit(input, torque, x, width, noise)).collect()
 }
 
@@ -202,10 +209,12 @@ const DRY: usize = 2;
 
 /// The fit in the time domain.
 struct TimeDomainFit {
+    /// Samples to either side that the smoothing takes.
+    width: usize,
     /// Residual share of the torque's variance.
     left: f64,
-    /// The same of a torque that is held from sample to sample, by its mean over the two that each is the middle of.
-    left_held: f64,
+    /// The same of what the second difference of a position is of, of a torque that does so between its samples.
+    acting: Acting<f64>,
     /// Inertia and its standard error, kg.m2 (kg).
     mass: f64,
     error: f64,
@@ -217,7 +226,34 @@ struct TimeDomainFit {
     coefficients: f64,
 }
 
+/// What a torque may do between two samples.
+struct Acting<T> {
+    straight: T,
+    held: T,
+    /// Held, and a sample earlier.
+    early: T,
+}
+
+impl Acting<f64> {
+    /// The mean of a torque, N.m (N), over the two samples that `k` is the middle of, weighted as the second difference of the position is by
+    /// it: exact where the axis has nothing but an inertia.
+    fn of(torque: &[f64], k: usize) -> Self {
+        let [before, at, after] = [torque[k - 1], torque[k], torque[k + 1]];
+        Self { straight: (before + 4.0 * at + after) / 6.0, held: 0.5 * (before + at), early: 0.5 * (at + after) }
+    }
+
+    fn all(self) -> [f64; 3] {
+        [self.straight, self.held, self.early]
+    }
+}
+
 impl TimeDomainFit {
+    /// See [`Guess::runs_straight`].
+    fn runs_straight(&self) -> bool {
+        let Acting { straight, held, early } = self.acting;
+        self.width <= BETWEEN_SAMPLES && straight < MAX_RESIDUAL && straight < HALF * held && straight < early
+    }
+
     /// Residual share of the variance of the torque that unrelated columns leave at one on the average; infinite where they explain any torque.
     fn unbiased(&self) -> f64 {
         let freedom = self.samples - self.coefficients;
@@ -261,28 +297,33 @@ fn time_domain_fit(
     let course = |k: &usize| direction.at(speed(&q, *k, dt));
     let goes_back = rows.iter().any(|k| course(k) != course(&rows[0]));
     let which: Vec<usize> = (0..columns).filter(|column| goes_back || *column != DRY).collect();
-    let held = |k: usize| 0.5 * (t[k - 1] + t[k]);
-    let triangle = triangularise(rows.len(), which.len(), 2, |i, out| {
+    let torques = |k: usize| {
+        let [straight, held, early] = Acting::of(&t, k).all();
+        [t[k], straight, held, early]
+    };
+    let triangle = triangularise(rows.len(), which.len(), 4, |i, out| {
         let k = rows[i];
         let v = speed(&q, k, dt);
         let all = [acceleration(&q, k, dt), v, direction.at(v), q[k] - middle, 1.0, q[k].sin(), q[k].cos()];
         out.iter_mut().zip(&which).for_each(|(out, column)| *out = all[*column]);
-        (out[which.len()], out[which.len() + 1]) = (t[k], held(k));
+        out[which.len()..].copy_from_slice(&torques(k));
     });
     let solution = triangle.solve().ok()?;
-    let variation = |torque: &dyn Fn(usize) -> f64| {
-        let mean = rows.iter().map(|k| torque(*k)).sum::<f64>() / rows.len() as f64;
-        rows.iter().map(|k| (torque(*k) - mean).powi(2)).sum::<f64>()
+    let left = |i: usize| {
+        let mean = rows.iter().map(|k| torques(*k)[i]).sum::<f64>() / rows.len() as f64;
+        solution.residual[(i, i)] / rows.iter().map(|k| (torques(*k)[i] - mean).powi(2)).sum::<f64>()
     };
     // Smoothed samples are not independent: one in a width is.
     let variance = |i: usize, k: usize| solution.variance(0) * solution.inverse[(i, k)] * (2 * width + 1) as f64;
-    let left = solution.residual[(0, 0)] / variation(&|k| t[k]);
+    let acting = Acting { straight: left(1), held: left(2), early: left(3) };
+    let left = left(0);
     let of = |i: usize| solution.phi[(i, 0)];
     let frictions: &[(usize, f64)] = if goes_back { &[(VISCOUS, fast), (DRY, 1.0)] } else { &[(VISCOUS, fast)] };
     let pairs = || frictions.iter().flat_map(|a| frictions.iter().map(move |b| (a, b)));
     left.is_finite().then(|| TimeDomainFit {
+        width,
         left,
-        left_held: solution.residual[(1, 1)] / variation(&held),
+        acting,
         mass: of(0),
         error: variance(0, 0).sqrt(),
         friction: frictions.iter().map(|(i, by)| by * of(*i)).sum(),
@@ -336,7 +377,7 @@ pub(super) fn inertia_finding(
     let near = 1.0 / NOMINAL_OFF..NOMINAL_OFF;
     let is_off = low >= near.end || high <= near.start;
     let otherwise = |fit: &TimeDomainFit| fit.left < found.left && near.contains(&(fit.mass / nominal));
-    if !is_off || determined(in_time(input, Samples::All)).is_some_and(|fit| otherwise(&fit)) {
+    if !is_off || determined(in_time(input, Samples::All, usize::MAX)).is_some_and(|fit| otherwise(&fit)) {
         return None;
     }
     let unit = AxisKind::unit(input.motion, "kg.m2");

@@ -26,7 +26,7 @@ pub fn straight(
     let Some(left) = unexplained(held) else { return Ok(None) };
     progress("the torque running straight between samples");
     let mut machine = machine.clone();
-    machine.signals.hold = Hold::Linear;
+    machine.signals.hold = Some(Hold::Linear);
     let mut pieces = pieces.to_vec();
     pieces.iter_mut().for_each(|t| t.hold = Hold::Linear);
     let mut other = identify_joined(Joined::of(&pieces)?, &machine, request, file, progress)?;

@@ -283,13 +283,11 @@ fn signals(reader: &Reader, section: Option<&Section>, motion: AxisKind) -> Resu
                 dt if dt > 0.0 => mapping.dt = Some(dt),
                 dt => return Err(reader.error(line, &format!("dt is {dt} s: it must be greater than zero"))),
             },
-            "hold" => mapping.hold = hold(reader, value)?,
+            "hold" => mapping.hold = Some(hold(reader, value)?),
             _ => {
                 let signal = Signal::from_name(name);
                 let (column, own_hold) = column(reader, name, value, line, signal == Some(Signal::T))?;
-                if let Some(own) = own_hold {
-                    mapping.hold = own;
-                }
+                mapping.hold = own_hold.or(mapping.hold);
                 match signal {
                     Some(signal) => mapping.signals.push((signal, column)),
                     None => mapping.time = column,
@@ -376,7 +374,7 @@ mod tests {
              theta1 = {{ column = \"x\", unit = \"mm\" }}\n"
         );
         let mapping = Machine::parse(&text, "axis.toml").unwrap().signals;
-        assert_eq!((mapping.hold, mapping.motion), (Hold::Linear, AxisKind::Linear));
+        assert_eq!((mapping.hold, mapping.motion), (Some(Hold::Linear), AxisKind::Linear));
         assert_eq!(mapping.time.column, "t_s");
         assert_eq!(mapping.signals[0].1.scale, 0.52);
         assert_eq!(mapping.signals[1].1.unit.as_deref(), Some("mm"));
@@ -448,7 +446,7 @@ mod tests {
         let effect = EFFECTS[0];
         machine.effects.of_mut(effect)[0] = 0.012_5;
         machine.signals.time.column = "t \"s\"".into();
-        machine.signals.hold = Hold::Linear;
+        machine.signals.hold = Some(Hold::Linear);
         machine.signals.signals =
             vec![(Signal::T, Column { scale: 0.5, ..Column::named("iq") }), (Signal::Theta2, Column::named("q2"))];
         let text = machine.to_toml();

@@ -48,10 +48,12 @@ impl Machine {
         }
         let mapping = &self.signals;
         let plain = mapping.signals.is_empty() && mapping.dt.is_none();
-        if !plain || mapping.hold != Hold::Zoh || mapping.time != Column::named("time") {
+        if !plain || mapping.hold.is_some() || mapping.time != Column::named("time") {
             line("\n[signals]");
-            if mapping.hold == Hold::Linear {
-                line("hold = \"linear\"");
+            match mapping.hold {
+                Some(Hold::Zoh) => line("hold = \"zoh\""),
+                Some(Hold::Linear) => line("hold = \"linear\""),
+                None => {}
             }
             if let Some(dt) = mapping.dt {
                 line(&format!("dt = {dt:?}"));
