@@ -156,7 +156,7 @@ pub(super) fn compare_encoders(input: &Input<'_>, s: &Spectra, lines: &[usize], 
             Severity::Refuse,
             "theta2",
             "theta2 does not follow theta1 where the torque moves it.",
-            "It comes from another axis or another time, or one of the encoders is broken.",
+            "It comes from another axis or another time, one of the encoders is broken, or a belt, chain or clutch between them hangs loose.",
             "Map the right columns in [signals], or leave theta2 out.",
         ));
         return;
