@@ -73,9 +73,7 @@ impl Search<'_> {
         let chosen = if chosen.terms.is_empty() { plain.clone() } else { chosen };
         self.retain_rivals(&chosen, &mut pool, independent);
         let finished = self.problem.finished(&chosen, independent).unwrap_or_else(|| chosen.clone());
-        // By the errors that hold, or by its own, as its rivals are.
-        let by_either = || [&finished, &chosen].into_iter().find_map(|fit| self.simplified(fit, independent, &pool));
-        if !is_settled && let Some(simple) = by_either() {
+        if !is_settled && let Some(simple) = self.simplified(&finished, independent, &pool) {
             return Continue((simple, pool));
         }
         let mut weighing = self.weigh(&chosen, &finished, parameters, pool, independent);

@@ -17,7 +17,6 @@ use rayon::prelude::*;
 use super::decision::Decision;
 use super::moves::{MOVED, MOVED_FAR};
 use super::pool::Pool;
-use super::steps::Measure;
 use crate::axis::Structure;
 use crate::effects::Effect;
 use crate::hypothesis::discrepancy::Discrepancy;
@@ -138,20 +137,12 @@ impl<'a> Ascent<'a> {
         }
     }
 
-    /// Several at once follow any torque by some way: they are believed where they explain it. From the beginning by what a record of any
-    /// length would find: a form that earns its price only beside the next cause was passed by on the way.
+    /// Several at once follow any torque by some way: they are believed where they explain it.
     fn several_at_once(&mut self) {
         let search = &self.search;
-        let evidence = |f: &Fit| search.evidence(f, 1.0);
-        let ways: [(&Fit, Measure<'_>); 2] = [(&self.chosen.clone(), &evidence), (&self.parameters, &akaike)];
-        for (from, by) in ways {
-            let forward = search.forward(from.clone(), by, &mut self.pool);
-            if search.is_exact(&forward) && search.is_likelier(&forward, &self.chosen) {
-                self.chosen = search.stepwise(forward, &mut self.pool);
-            }
-            if search.at_floor(&self.chosen) || search.is_enough(&self.chosen) {
-                break;
-            }
+        let forward = search.forward(self.chosen.clone(), &mut self.pool);
+        if search.is_exact(&forward) && search.is_likelier(&forward, &self.chosen) {
+            self.chosen = search.stepwise(forward, &mut self.pool);
         }
     }
 
@@ -326,11 +317,6 @@ impl Search<'_> {
         let admitted = fits.iter().filter(|f| !f.at_bound);
         admitted.max_by(|a, b| self.evidence(a, independent).total_cmp(&self.evidence(b, independent)))
     }
-}
-
-/// Akaike's criterion, halved and turned: the likelihood expected on another record, with no price of an effect.
-fn akaike(fit: &Fit) -> f64 {
-    fit.log_likelihood - fit.coordinates.len() as f64
 }
 
 /// Whether a fit has all effects of another, and more.

@@ -10,9 +10,6 @@ use crate::axis::Structure;
 use crate::hypothesis::determined::is_lost;
 use crate::hypothesis::fit::{Fit, Term};
 
-/// What one fit is measured against another by: the larger, the better.
-pub type Measure<'m> = &'m dyn Fn(&Fit) -> f64;
-
 impl Search<'_> {
     /// Adds, drops and exchanges effects as long as the evidence grows.
     pub fn stepwise(&self, from: Fit, pool: &mut Pool) -> Fit {
@@ -27,7 +24,6 @@ impl Search<'_> {
             if self.at_floor(&best) {
                 break;
             }
-            let enough = self.is_enough(&best);
             (self.progress)(&format!("{} hypotheses fitted", pool.fits().len()));
             // What is dropped again was no way on: an exchange may be.
             if !self.is_negligible(&best)
@@ -39,9 +35,7 @@ impl Search<'_> {
             }
             // What was named first was named without the others, however little they leave together.
             let other = self.exchanged(best.clone(), pool);
-            // Where next to nothing is left, a freer account only follows what no log is true to.
-            let freer = enough && other.coordinates.len() > best.coordinates.len();
-            if other.terms == best.terms || freer {
+            if other.terms == best.terms {
                 break;
             }
             best = self.pruned(other, pool);
@@ -90,9 +84,10 @@ impl Search<'_> {
         self.is_likelier_by(share, next, best).then(|| next.clone())
     }
 
-    /// Effects added as long as a measure grows that takes all that is left as independent, and dropped at the end where it is not: each of
+    /// Effects added as long as the evidence grows with all that is left taken as independent, and dropped at the end where it is not: each of
     /// several large causes leaves what the others do, beside which it earns next to nothing on its own.
-    pub fn forward(&self, from: Fit, by: Measure<'_>, pool: &mut Pool) -> Fit {
+    pub fn forward(&self, from: Fit, pool: &mut Pool) -> Fit {
+        let by = |f: &Fit| self.evidence(f, 1.0);
         let mut at = from;
         let ends = |f: &Fit| self.at_floor(f) || self.is_enough(f) || self.is_over_half_of_budget();
         while at.terms.len() < MOST && !ends(&at) {
